@@ -12,10 +12,10 @@ from snakemake.logging import DefaultFormatter
 from snakemake_interface_logger_plugins.common import LogEvent
 from snakemake_interface_logger_plugins.registry import LoggerPluginRegistry
 
-from dragdeck.engine.record import RunPart, RunRecord
 from dragdeck.engine.status import RunStatus
 from dragdeck.outlook.explain import Cost
 from dragdeck.outlook.runs import StudyRun
+from dragdeck.records.run import RunPart, RunRecord
 from snakemake_logger_plugin_dragdeck import LogHandler, LogHandlerSettings
 
 FLAGS = ("stdout", "nocolor", "dryrun", "printshellcmds", "verbose", "debug_dag")

@@ -17,11 +17,11 @@ if TYPE_CHECKING:
         UnknownNameError,
     )
     from dragchain.results import FinishedRun, Study, load
-    from dragchain.run.case import Case, Output, load_case, load_outputs
     from dragchain.run.run_parts import iter_frames, iter_prints
     from dragchain.statistics.correlated import MeanEstimate, estimate_mean
     from dragchain.tables.parquet import dump_to_parquet
     from dragchain.tables.write import write_tables
+    from dragdeck.decks.outputs import OutputOfRun, load_outputs
     from dragdeck.dumps.frame import Frame
     from dragdeck.dumps.reader import read_dump
     from dragdeck.errors import (
@@ -31,16 +31,17 @@ if TYPE_CHECKING:
         RejectedRunError,
         TruncatedDumpError,
     )
+    from dragdeck.records.case import CaseOfRun, load_case
 
 __all__ = [
-    "Case",
+    "CaseOfRun",
     "DocumentError",
     "DragdeckError",
     "DumpError",
     "FinishedRun",
     "Frame",
     "MeanEstimate",
-    "Output",
+    "OutputOfRun",
     "RecordError",
     "RejectedRunError",
     "SeriesError",
@@ -62,17 +63,18 @@ __all__ = [
 
 _MODULES = {
     "dragchain.results": ("FinishedRun", "Study", "load"),
-    "dragchain.run.case": ("Case", "Output", "load_case", "load_outputs"),
     "dragchain.run.run_parts": ("iter_frames", "iter_prints"),
     "dragchain.statistics.correlated": ("MeanEstimate", "estimate_mean"),
     "dragchain.tables.parquet": ("dump_to_parquet",),
     "dragchain.tables.write": ("write_tables",),
+    "dragdeck.decks.outputs": ("OutputOfRun", "load_outputs"),
     "dragdeck.dumps.frame": ("Frame",),
     "dragdeck.dumps.reader": ("read_dump",),
     "dragdeck.errors": (
         *("DocumentError", "DragdeckError", "DumpError", "RejectedRunError"),
         "TruncatedDumpError",
     ),
+    "dragdeck.records.case": ("CaseOfRun", "load_case"),
 }
 _HOMES = {name: module for module, names in _MODULES.items() for name in names}
 

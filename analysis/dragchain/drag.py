@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from dragchain.arrays import Floats, Ints
 from dragchain.errors import SeriesError
-from dragchain.run.case import Case
 from dragchain.run.kinematics import axis_speed
 from dragchain.statistics.correlated import MeanEstimate, estimate_mean, estimates, frame_sums
 from dragchain.statistics.estimate import Estimate
 from dragchain.tables.by_step import intact
+from dragdeck.records.case import CaseOfRun
 
 FORCES = ("drag_n", "lateral_n", "vertical_n")
 """The force on the workpiece in the workpiece frame."""
@@ -82,7 +82,7 @@ class DragPeaks:
     prominence_n: Floats
 
 
-def drag_peaks(samples: pd.DataFrame, case: Case) -> DragPeaks:
+def drag_peaks(samples: pd.DataFrame, case: CaseOfRun) -> DragPeaks:
     """The peaks of counted samples with ``time_s`` and ``drag_n``; see `find_drag_peaks`."""
     time_s, drag_n = (samples[name].to_numpy(np.float64) for name in ("time_s", "drag_n"))
     return find_drag_peaks(time_s, drag_n, min_separation_s=peak_separation_s(case))
@@ -138,7 +138,7 @@ def find_drag_peaks(
     return DragPeaks(index.astype(np.int64), time_s[index], drag_n[index], found["prominences"])
 
 
-def peak_separation_s(case: Case) -> float:
+def peak_separation_s(case: CaseOfRun) -> float:
     """The time in which the workpiece travels one mean particle radius, s."""
     return case.media.radius_mean_m / axis_speed(case)
 

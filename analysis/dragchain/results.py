@@ -16,15 +16,15 @@ from dragchain.report.findings import FILE, ProcessFindings
 from dragchain.report.run_data import RunData, process_findings
 from dragchain.report.values import Values, values_of
 from dragchain.run.basis import Basis, notes
-from dragchain.run.case import Scene, load_case
-from dragchain.run.completeness import read_accepted
 from dragchain.tables.by_step import intact, read_table
 from dragchain.tables.columns import descriptions, unit_of
 from dragdeck.errors import RejectedRunError
+from dragdeck.records.case import load_case
+from dragdeck.records.run import read_accepted
 
 _ON_WORKPIECE = ("workpiece_force", "workpiece_contacts", "facets", "contact_events")
 _NETWORK = ("particles", "contacts", "network", "clusters", "chains")
-_TABLES: Mapping[Scene, tuple[str, ...]] = {
+_TABLES: Mapping[str, tuple[str, ...]] = {
     "process": (*_ON_WORKPIECE, *_NETWORK, "thermo"),
     "filling": ("particles", "thermo"),
     "drop_test": ("impacts", "thermo"),

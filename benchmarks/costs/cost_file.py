@@ -6,9 +6,8 @@ import numpy as np
 
 from cost_variants import BASES, SceneName, Variant
 from dragchain.statistics.estimate import Estimate, finite, mean_of
-from dragchain.tradeoff.tradeoff_document import Machine
 from dragdeck.documents import Document, Part
-from dragdeck.outlook.measured import MeasuredCost
+from dragdeck.records.tradeoff import CostEntry, Machine
 from dragdeck.study.model import Fidelity
 
 
@@ -61,7 +60,7 @@ class RoundsFile(Document):
     rows: Sequence[TimedVariant] = ()
 
 
-class VariantCost(MeasuredCost):
+class VariantCost(CostEntry):
     """The cost of a variant.
 
     Attributes

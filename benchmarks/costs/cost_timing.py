@@ -13,11 +13,9 @@ from cost_decks import Beds, CostTemplates, TimedDecks, text_hash, with_own_bloc
 from cost_file import RoundsFile, TimedCosts, TimedVariant, Timing, base_cost, cost
 from cost_variants import BASES, Variant, standard_case, variant_case, variants
 from dragchain.tradeoff.record import processor
-from dragchain.tradeoff.tradeoff_document import Machine
 from dragdeck import __version__
 from dragdeck.cases.case import Case
 from dragdeck.decks import CASE_FILE, DECK_FILE
-from dragdeck.decks.case_file import RunInputs
 from dragdeck.decks.deck import AnyScene
 from dragdeck.decks.render import deck_text, write_run
 from dragdeck.decks.templates import environment
@@ -29,6 +27,8 @@ from dragdeck.engine.run_folder import fingerprint
 from dragdeck.errors import EngineError, InputError, choices
 from dragdeck.files import write_text
 from dragdeck.project import study_templates
+from dragdeck.records.run import CaseFile
+from dragdeck.records.tradeoff import Machine
 from dragdeck.scenes.process import process_scene
 
 SECONDS = 0.15
@@ -223,7 +223,7 @@ class _Bench:
             old.unlink()
         write_run(deck.whole, place, templates)
         write_text(place / _START_FILE, deck_text(deck.start, templates))
-        return fingerprint(place, RunInputs.read(place / CASE_FILE))
+        return fingerprint(place, CaseFile.read(place / CASE_FILE))
 
     def rounds(self, count: int) -> list[TimedVariant]:
         """Time what was not timed yet; the rows of all rounds."""

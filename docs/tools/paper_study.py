@@ -6,10 +6,10 @@ from pathlib import Path
 import pandas as pd
 
 from dragdeck.cases.bed import bed_rayleigh_time, bed_timestep, full_stiffness_number
-from dragdeck.outlook.measured import stable_step_law
 from dragdeck.physics.contact_mechanics import effective_modulus, effective_shear, shear_modulus
 from dragdeck.physics.damping import damping_ratio
 from dragdeck.project import Project
+from dragdeck.records.stability import stable_step_law
 from dragdeck.study.model import BUILT_IN_FIDELITIES
 
 STUDY = Project(Path(__file__).resolve().parents[2]).cases("uhlmann2015")[0].study

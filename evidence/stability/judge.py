@@ -10,9 +10,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from dragchain.run.completeness import AcceptanceCheck, CheckCode, CheckReason
 from dragchain.statistics.estimate import Estimate, flattened
-from dragdeck.outlook.measured import Criteria, RestitutionErrors, SafeSteps, StabilityMap
+from dragdeck.records.run import AcceptanceCheck, CheckCode, CheckReason
+from dragdeck.records.stability import Criteria, RestitutionErrors, SafeSteps, StabilityFile
 from evidence.stability.measures import (
     COLUMNS,
     MEASURES,
@@ -308,7 +308,7 @@ def conditions(points: pd.DataFrame) -> pd.DataFrame:
     -------
     DataFrame
         ``regime condition axis label usable`` (whether its reference is stable, so that a safe
-        step can be asked for), ``safe_fraction`` (no class of ``NOT_SAFE`` up to it),
+        step can be asked for), ``safe_fraction`` (none of `_NOT_SAFE` up to it),
         ``stable_fraction`` (no energy gained and no particles lost up to it), both over the
         Rayleigh time, the same over the critical step (``..._critical``), ``grid_end`` (whether
         the largest step of the grid is the safe one, so the limit lies above), ``restitution``.
@@ -424,7 +424,7 @@ def _envelope(
 
 def summarise_map(
     points: pd.DataFrame, found: pd.DataFrame, runs: Sequence[PointRun]
-) -> StabilityMap:
+) -> StabilityFile:
     """What ``dragdeck check`` uses: safe steps, errors of impacts, and where they come from.
 
     Parameters
@@ -436,7 +436,7 @@ def summarise_map(
     records = [run.record for run in runs if run.record]
     cases = [run.case for run in runs if run.record and run.case]
     started = max((record.started for record in records), default=datetime.now(UTC).isoformat())
-    return StabilityMap(
+    return StabilityFile(
         commands=("snakemake stability",),
         engine_versions=tuple(sorted({record.engine_version for record in records})),
         dragdeck_versions=tuple(sorted({case.versions["dragdeck"] for case in cases})),

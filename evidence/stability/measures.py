@@ -13,8 +13,7 @@ from scipy.spatial import KDTree
 from dragchain.arrays import Floats, Ints
 from dragchain.contact_law.hertz import sphere_mass
 from dragchain.errors import TableError
-from dragchain.run.case import Case, friction_with, load_outputs
-from dragchain.run.completeness import RunRecord
+from dragchain.run.case import friction_with
 from dragchain.run.kinematics import drag_phase, needed
 from dragchain.run.run_parts import iter_frames, iter_prints
 from dragchain.statistics.correlated import estimate_mean
@@ -24,10 +23,12 @@ from dragchain.tables.run_folder import Run
 from dragchain.tables.workpiece_contacts import WorkpieceFrames
 from dragchain.tables.write import workpiece_force_rows
 from dragdeck.decks import CASE_FILE
-from dragdeck.decks.case_file import CaseOfStudy
+from dragdeck.decks.outputs import load_outputs
 from dragdeck.dumps.frame import Columns, Frame
 from dragdeck.physics.contact_network import largest_eigenvalue
 from dragdeck.physics.damping import damping_ratio
+from dragdeck.records.case import CaseOfRun
+from dragdeck.records.run import RunRecord
 from evidence.stability.points import Point, PointsFile
 from evidence.stability.scenes import ImpactCase, ImpactOfRun
 
@@ -61,10 +62,10 @@ class PointRun:
     folder: Path
 
     @cached_property
-    def case(self) -> CaseOfStudy | None:
+    def case(self) -> CaseOfRun | None:
         """What it models; None of a point that no deck could be written for."""
         file = self.folder / CASE_FILE
-        kind = ImpactCase if self.point.regime == "impact" else CaseOfStudy
+        kind = ImpactCase if self.point.regime == "impact" else CaseOfRun
         return kind.read(file) if file.is_file() else None
 
     @property
@@ -301,7 +302,7 @@ def touching(centre_m: Floats, radius_m: Floats, bowl_radius_m: float) -> Contac
 
 
 def network_frequency(
-    case: CaseOfStudy,
+    case: CaseOfRun,
     sticks: bool,
     radius_m: Floats,
     contacts: Contacts,
@@ -311,7 +312,7 @@ def network_frequency(
 
     Parameters
     ----------
-    case : CaseOfStudy
+    case : CaseOfRun
         Gives density and effective moduli.
     sticks : bool
         Whether there is friction, and so a tangential stiffness.
@@ -342,7 +343,7 @@ _LAST_SAMPLES = 50
 """Samples at the end of a resting bed's run whose mean energy counts: a quarter of them."""
 
 
-def _measure_settled(point: PointRun, case: CaseOfStudy) -> Row:
+def _measure_settled(point: PointRun, case: CaseOfRun) -> Row:
     """A bed that settled, and its largest kinetic energy while it did."""
     *_, last = point.frames("particles")
     return {
@@ -352,7 +353,7 @@ def _measure_settled(point: PointRun, case: CaseOfStudy) -> Row:
     }
 
 
-def _measure_resting(point: PointRun, case: CaseOfStudy) -> Row:
+def _measure_resting(point: PointRun, case: CaseOfRun) -> Row:
     """A bed at rest, and its kinetic energy at the end over N m g d.
 
     Its contacts are those before the step under test begins.
@@ -368,7 +369,7 @@ def _measure_resting(point: PointRun, case: CaseOfStudy) -> Row:
     }
 
 
-def _bed(point: PointRun, case: CaseOfStudy, frame: Frame) -> Row:
+def _bed(point: PointRun, case: CaseOfRun, frame: Frame) -> Row:
     radius = _radii(frame)
     contacts = touching(_centres(frame), radius, case.bowl.radius_m)
     return {
@@ -404,7 +405,7 @@ def _resting_energy(own: Row, fine: Row | None) -> float | None:
 # --- impacts, met at different moments within a step -------------------------------------------
 
 
-def _measure_impacts(point: PointRun, case: CaseOfStudy) -> Row:
+def _measure_impacts(point: PointRun, case: CaseOfRun) -> Row:
     """Mean, smallest and largest of the impacts of a run; speeds are over that of the impact."""
     impact = needed(point.impact, "impact")
     plate = impact.size_ratio == 0.0
@@ -488,7 +489,7 @@ _NETWORK_FRAMES = 8
 """Frames of a reference whose networks are looked at; the stiffest counts."""
 
 
-def _measure_drag(point: PointRun, case: CaseOfStudy) -> Row:
+def _measure_drag(point: PointRun, case: CaseOfRun) -> Row:
     """Mean force along the motion with the half-width of its interval, and the energy.
 
     The half-width is infinite if it is not to be relied on. ``motion_ratio`` is the median kinetic
@@ -520,14 +521,14 @@ def _median_motion_j(run: Run) -> float:
     return float(np.median(motion[step > drag_phase(run.case).start_step]))
 
 
-def _usual_motion_j(case: Case, speed_m_s: float) -> float:
+def _usual_motion_j(case: CaseOfRun, speed_m_s: float) -> float:
     media = case.media
     mass = sphere_mass(media.radius_mean_m, media.density_kg_m3)
     thrown = mass * case.gravity_m_s2 * 2.0 * media.radius_mean_m
     return media.count * 0.5 * mass * speed_m_s**2 + thrown
 
 
-def _drag_contacts(point: PointRun, run: Run, case: CaseOfStudy) -> Row:
+def _drag_contacts(point: PointRun, run: Run, case: CaseOfRun) -> Row:
     """Largest overlap of the drag, and frequency of the stiffest of some frames."""
     particles = {frame.step: frame for frame in run.frames("particles")}
     pairs = {frame.step: frame for frame in run.frames("contacts")}
@@ -549,10 +550,10 @@ def _drag_contacts(point: PointRun, run: Run, case: CaseOfStudy) -> Row:
 
 
 def _engine_contacts(
-    frame: Frame, pairs: Frame, workpiece: WorkpieceFrames, case: Case
+    frame: Frame, pairs: Frame, workpiece: WorkpieceFrames, case: CaseOfRun
 ) -> Contacts:
     """The contacts of one frame as the engine wrote them, with bowl and workpiece."""
-    bowl_radius = needed(case.bowl, "bowl").radius_m
+    bowl_radius = case.bowl.radius_m
     walls = workpiece.workpiece, workpiece.bowl
     rows = contact_rows(frame, pairs, *walls, bowl_radius, friction_with(case, "media"))
     ids = np.asarray(frame.columns["particle_id"], dtype=np.int64)
@@ -593,7 +594,7 @@ class Measure(NamedTuple):
         Ratio of energies of a row and that of the fine step; None where that is needed.
     """
 
-    row: Callable[[PointRun, CaseOfStudy], Row]
+    row: Callable[[PointRun, CaseOfRun], Row]
     errors: Callable[[Row, Row], dict[str, Estimate]]
     energy_ratio: Callable[[Row, Row | None], float | None]
 

@@ -14,7 +14,7 @@ from dragchain.arrays import Floats
 from dragchain.figures.panels import head, key, legend_below, log_ticks, new_panels, row_names
 from dragchain.figures.style import BLUE, GREEN, GREY, INK, ORANGE, RED
 from dragchain.report.campaign import write_report
-from dragdeck.outlook.measured import RestitutionErrors
+from dragdeck.records.stability import RestitutionErrors
 from evidence.stability.judge import (
     CLASSES,
     ENERGY,

@@ -7,7 +7,6 @@ from typing import Literal
 from dragdeck.cases.bed import bed_rayleigh_time, particle_material, skin
 from dragdeck.cases.case import Case
 from dragdeck.decks import PACKING_FILE, outputs
-from dragdeck.decks.case_file import BowlOfRun, CaseOfStudy, MediaOfRun, Phase
 from dragdeck.decks.data_file import Body, data_file
 from dragdeck.decks.deck import Deck, Scene
 from dragdeck.documents import Part
@@ -19,6 +18,8 @@ from dragdeck.physics.contact_mechanics import (
 )
 from dragdeck.physics.rounding import timestep
 from dragdeck.physics.run_limits import RunLimits, run_limits
+from dragdeck.records.case import BowlOfRun, CaseOfRun, MediaOfRun
+from dragdeck.records.run import Phase
 from dragdeck.scenes.filling import box_top, filling_content
 from dragdeck.scenes.scene import case_of_study, material_table
 
@@ -85,7 +86,7 @@ class ImpactOfRun(Part):
     contact_time_s: float
 
 
-class ImpactCase(CaseOfStudy):
+class ImpactCase(CaseOfRun):
     """Single impacts."""
 
     scene: Literal["impact"] = "impact"
@@ -221,7 +222,7 @@ class LoadedPacking(Part):
     load_factor: float
 
 
-class ColumnCase(CaseOfStudy):
+class ColumnCase(CaseOfRun):
     """Particles at rest."""
 
     scene: Literal["column"] = "column"

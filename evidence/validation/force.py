@@ -12,7 +12,6 @@ from dragchain.arrays import Floats
 from dragchain.drag import find_drag_peaks, peak_separation_s, read_counted
 from dragchain.loading.contact_events import Thresholds
 from dragchain.loading.document import FILE, ContactType, Loading
-from dragchain.run.case import Case
 from dragchain.run.kinematics import drag_start_s
 from dragchain.run.reference import reference_drags
 from dragchain.statistics.bed_effects import fit_effects
@@ -20,6 +19,7 @@ from dragchain.statistics.correlated import MeanEstimate, estimate_mean
 from dragchain.statistics.estimate import Estimate, Real
 from dragchain.tables.by_step import read_table
 from dragdeck.documents import Part
+from dragdeck.records.case import CaseOfRun
 from evidence.validation.runs import MeasuredRun, RunsByBed, packing_mean
 
 _COMPONENTS = ("drag_n", "lateral_n", "vertical_n")
@@ -239,7 +239,7 @@ def _half_wave(waves: Floats, density: Floats) -> float:
     return float(1.0 / np.interp(0.5 * total[-1], total - 0.5 * density, waves))
 
 
-def compare_drag(drag: Together, case: Case) -> tuple[Compared, ...]:
+def compare_drag(drag: Together, case: CaseOfRun) -> tuple[Compared, ...]:
     """Mean and standard deviation of the drag beside every reference figure of the study."""
     return tuple(
         Compared(
@@ -315,8 +315,12 @@ def setting_effects(runs: RunsByBed) -> list[Effect]:
 
 
 def effect_table(rows: Sequence[Effect]) -> pd.DataFrame:
-    """The effects as a table, one row per quantity and setting."""
-    return pd.DataFrame([dict(row) for row in rows], columns=list(Effect.model_fields))
+    """The effects as a table, one row per quantity and setting; values are text if any is."""
+    table = pd.DataFrame([dict(row) for row in rows], columns=list(Effect.model_fields))
+    for name in ("value", "reference_value"):
+        if any(isinstance(value, str) for value in table[name]):
+            table[name] = table[name].map(str, na_action="ignore")
+    return table
 
 
 def _base(runs: RunsByBed, run: MeasuredRun) -> MeasuredRun:

@@ -28,9 +28,9 @@ from dragchain.drag import drag_peaks, peak_separation_s, read_counted
 from dragchain.errors import TableError
 from dragchain.network.chains import dominant_path, widest_paths
 from dragchain.network.frame import WORKPIECE, NetworkFrame, network_frames
-from dragchain.run.case import load_case
 from dragchain.statistics.estimate import Estimate, Real, Verdict, mean_of
 from dragdeck.documents import Document, Part
+from dragdeck.records.case import load_case
 
 # --- tests by circular shifts ------------------------------------------------------------------
 

@@ -10,10 +10,10 @@ import numpy as np
 from pydantic import JsonValue
 
 from dragchain.errors import SeriesError, TableError
-from dragchain.run.case import Case, load_case
 from dragchain.statistics.estimate import Estimate, mean_of
 from dragchain.tradeoff.compare import Setting, differing_inputs
 from dragchain.tradeoff.measures import FILE, Measures
+from dragdeck.records.case import CaseOfRun, load_case
 
 _FEWEST = 2
 """Packings below which nothing is known of the differences between them."""
@@ -26,14 +26,14 @@ class MeasuredRun:
     Attributes
     ----------
     folder : Path
-    case : Case
+    case : CaseOfRun
     measures : Measures
     changed : mapping
         Dotted names and values of the inputs that differ from the reference's.
     """
 
     folder: Path
-    case: Case
+    case: CaseOfRun
     measures: Measures
     changed: Mapping[str, JsonValue]
 

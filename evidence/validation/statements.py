@@ -23,11 +23,11 @@ from dragchain.drag import (
     within_angle,
 )
 from dragchain.errors import TableError
-from dragchain.run.case import Case
 from dragchain.run.kinematics import motion_of, needed
 from dragchain.statistics.estimate import Estimate, EstimateColumns, Real, Verdict
 from dragchain.tables.by_step import read_groups, read_table
 from dragdeck.documents import Part
+from dragdeck.records.case import CaseOfRun
 from dragdeck.study.paths.circle import CirclePath
 from evidence.validation.runs import MeasuredRun, packing_mean
 
@@ -362,7 +362,7 @@ def _around(azimuth: Floats, force: Floats) -> Floats:
     return np.asarray(sum(halves) / (2.0 * force.sum()))
 
 
-def _outer_over_inner(case: Case, azimuth: Floats, force: Floats) -> float | None:
+def _outer_over_inner(case: CaseOfRun, azimuth: Floats, force: Floats) -> float | None:
     path = motion_of(case).motion.path
     if not isinstance(path, CirclePath):
         return None

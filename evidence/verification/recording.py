@@ -9,10 +9,10 @@ import numpy as np
 
 from dragchain.arrays import Floats
 from dragchain.errors import TableError
-from dragchain.run.case import load_outputs
-from dragchain.run.completeness import read_accepted
 from dragchain.run.run_parts import iter_frames
+from dragdeck.decks.outputs import load_outputs
 from dragdeck.physics.contact_mechanics import effective_modulus, effective_shear, particle_mass
+from dragdeck.records.run import read_accepted
 from evidence.verification.experiment import CollideCase, ContactFacts
 from evidence.verification.law import (
     ContactPair,

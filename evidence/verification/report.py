@@ -1,7 +1,6 @@
 """The command that verifies a study's contact law: runs, tables and page of the suite."""
 
 from collections.abc import Hashable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -17,10 +16,9 @@ from dragchain.figures.panels import legend_below, new_panels
 from dragchain.figures.style import GREY, MARKERS, SERIES
 from dragchain.report.campaign import write_report
 from dragchain.tables.by_step import read_table
-from dragdeck.decks.render import write_run
 from dragdeck.decks.templates import environment
-from dragdeck.engine import run_folder
-from dragdeck.engine.reports import say, silent
+from dragdeck.engine.batch import Batch
+from dragdeck.engine.reports import say
 from dragdeck.errors import RejectedRunError
 from dragdeck.project import find_project, run_path, study_templates
 from evidence.verification.checks import (
@@ -66,16 +64,11 @@ def verify(study: str, fidelity: str | None, out_dir: Path, cores: int) -> None:
     """
     project = find_project(Path.cwd())
     case = project.cases(study, fidelity)[0]
-    templates = environment(project.templates, study_templates(case))
-    folders = []
-    for name, experiment in suite_of(case.study).items():
-        folders.append(project.root / run_path(experiment.case.study, "collide", name))
-        write_run(collide_scene(experiment), folders[-1], templates)
-    with ProcessPoolExecutor(cores) as pool:
-        done = pool.map(partial(run_folder.run, report=silent), folders)
-        for number, (folder, record) in enumerate(zip(folders, done, strict=True), 1):
-            say(f"verification {number} of {len(folders)}: {folder.name}: {record.state}")
-    write_verification(out_dir, folders)
+    folder = project.root / run_path("verification", "collide", "")
+    batch = Batch(folder, environment(project.templates, study_templates(case)))
+    suite = {name: partial(collide_scene, one) for name, one in suite_of(case.study).items()}
+    batch.each(suite, say, cores)
+    write_verification(out_dir, [folder / name for name in suite])
 
 
 def write_verification(out_dir: Path, run_dirs: Sequence[Path]) -> None:

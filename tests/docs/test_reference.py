@@ -19,9 +19,9 @@ from dragchain.scaling.document import ScalingFile
 from dragchain.scaling.fit import read_scalings, said
 from dragdeck.cases.case import Case
 from dragdeck.cli import main
-from dragdeck.engine.record import CheckCode
 from dragdeck.errors import CautionCode
 from dragdeck.project import Project
+from dragdeck.records.run import CheckCode
 from dragdeck.scenes.drop_test import DropDeck
 from dragdeck.scenes.filling import FillingDeck
 from dragdeck.scenes.process import PROCESS, ProcessDeck

@@ -19,7 +19,7 @@ def test_everything_behind_the_renderer_is_found() -> None:
 def test_evidence_depends_on_both_packages() -> None:
     found = source_files("evidence.verification.report")
     assert {"evidence.verification.checks", "evidence.verification.experiment"} <= set(found)
-    assert {"dragchain.run.run_parts", "dragdeck.decks.case_file"} <= set(found)
+    assert {"dragchain.run.run_parts", "dragdeck.records.case"} <= set(found)
 
 
 def test_lazy_imports_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

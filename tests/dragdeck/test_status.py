@@ -7,8 +7,8 @@ import yaml
 
 from dragdeck.cases.case import Case
 from dragdeck.cli import main
-from dragdeck.engine.record import AcceptanceCheck, RunPart, RunRecord
 from dragdeck.project import Project, by_run
+from dragdeck.records.run import AcceptanceCheck, RunPart, RunRecord
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import PROCESS
 from dragdeck.scenes.registry import SCENES

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from run_files import OF_EVERY_RUN
 
 from dragdeck.study.base import flat
 from dragdeck.study.driven import DrivenMotion
@@ -74,6 +75,7 @@ def made_case(scene: str, run: str, **values: Any) -> dict[str, Any]:
         "upstream": {}, "timestep_s": 1e-3, "rayleigh_time_s": 2e-3, "gravity_m_s2": 9.81,
         "inputs": {}, "surface_m": 0.03, "statistics": {"transient_s": 0.1},
         "assumptions": [], "reference": None, "versions": {"dragdeck": "0.1.0"},
+        **OF_EVERY_RUN,
     } | blocks | values  # fmt: skip
     return with_motion(case, **motion)
 
@@ -143,7 +145,8 @@ def output(kind: str, columns: Sequence[str], period: int, first: int, last: int
 def run_json(**more: Any) -> dict[str, Any]:
     """Content of ``run.json`` of an accepted run."""
     return {
-        "schema": 2, "state": "complete", "engine_version": "Engine 3.8", "ranks": 2,
+        "schema": 2, "inputs": "0f", "state": "complete", "engine_version": "Engine 3.8",
+        "ranks": 2,
         "steps": 160000, "steps_per_s": 2100.0, "wall_time_s": 76.0,
         "started": "2026-01-01T00:00:00", "parts": [{"part": 1, "from": None, "from_step": 0}],
         "checks": [particles_kept(1422)],

@@ -110,7 +110,7 @@ def write(folder: Path, contents: Sequence[Mapping[str, Any]]) -> list[Path]:
 def write_drop(folder: Path, fraction: float, ratios: Sequence[float], cpu_time_s: float) -> Path:
     """A drop test with its table of impacts."""
     case = case_json("drop_test", folder.name, restitution=0.9, timestep_s=fraction * 1e-5,
-                     rayleigh_time_s=1e-5)  # fmt: skip
+                     rayleigh_time_s=1e-5, phases=[])  # fmt: skip
     case["inputs"]["drop_test.timestep_fraction"] = fraction
     record = run_json(cpu_time_s=cpu_time_s, wall_time_s=1.0, ranks=1)
     write_documents(folder, case, record=record)

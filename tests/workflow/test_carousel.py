@@ -16,8 +16,8 @@ from snakemake_calls import copy_of_project, jobs, snakemake
 from dragchain import load_case
 from dragchain.figures.style import PAPER_COLOURS, force_map
 from dragchain.report.journal import COLUMN_MM, PAGE_MM, write_journal_figures
-from dragchain.run.case import Case
 from dragchain.run.kinematics import axis_speed, drag_phase
+from dragdeck.records.case import CaseOfRun
 
 pytestmark = [pytest.mark.engine, pytest.mark.slow]
 
@@ -52,7 +52,7 @@ def workpieces(project: Path) -> list[Path]:
     return folders
 
 
-def in_drag(folder: Path) -> tuple[Case, pd.DataFrame]:
+def in_drag(folder: Path) -> tuple[CaseOfRun, pd.DataFrame]:
     case = load_case(folder)
     force = pd.read_parquet(folder / "tables/workpiece_force.parquet")
     return case, force[force["step"] > drag_phase(case).start_step]

@@ -18,7 +18,6 @@ from plate import PLATE
 from dragchain import load_case, write_tables
 from dragchain.loading.contact_events import Thresholds
 from dragchain.loading.write import compute_loading
-from dragchain.run.case import Case
 from dragchain.run.kinematics import (
     axis_speed,
     directions,
@@ -35,6 +34,7 @@ from dragdeck.engine.process import find_engine
 from dragdeck.engine.reports import silent
 from dragdeck.engine.run_folder import run_to_outcome
 from dragdeck.project import Project
+from dragdeck.records.case import CaseOfRun
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import PROCESS
 from dragdeck.scenes.scene import read_bed
@@ -180,7 +180,7 @@ def asked_speed(motion: dict[str, Any]) -> float:
     return float(ways.sum() / np.ptp(points[:, 0]))
 
 
-def analytic(case: Case, motion: dict[str, Any], steps: np.ndarray) -> np.ndarray:
+def analytic(case: CaseOfRun, motion: dict[str, Any], steps: np.ndarray) -> np.ndarray:
     """Where the reference point has to be, its height from that of the immersion."""
     time = (steps - drag_phase(case).start_step) * case.timestep_s
     path, way = motion["path"], axis_speed(case) * time
@@ -377,6 +377,33 @@ def test_a_reversal_reverses_the_torque(runs: Runs) -> None:
     power = -(sampled["drag_n"] * axis_speed(case) + sampled["torque_z_n_m"] * rate)
     work = found.summary.totals["workpiece_work_j"]
     assert work == pytest.approx(power.sum() * interval, rel=0.05)
+
+
+def test_contacts_lie_on_an_inclined_workpiece_that_spins(runs: Runs) -> None:
+    """In its own frame contacts are on their facets, and their work is the power of the motion."""
+    path, tilt, rpm = {"kind": "circle", "radius_m": 0.01, "revolutions": 0.07}, 15, 200
+    deep = {"immersion_depth_m": 0.02, "plunge_speed_m_s": 0.15, "transient_m": 1e-4}
+    folder = runs.rendered(300, path=path, tilt_deg=tilt, spin={"rpm": rpm, "ramp_s": 0.02}, **deep)
+    engine(folder)
+    write_tables(folder)
+    case, found = load_case(folder), compute_loading(folder, Thresholds())
+    assert found.summary.closure.point_off_facet_max_m < 1e-6
+    force = pd.read_parquet(folder / "tables/workpiece_force.parquet").query("in_statistics")
+    world, body = (force[[f"{name}_{axis}_n" for axis in "xyz"]] for name in ("force", "body"))
+    np.testing.assert_allclose(
+        np.linalg.norm(body, axis=1), np.linalg.norm(world, axis=1), atol=1e-12
+    )
+    contacts = pd.read_parquet(folder / "tables/workpiece_contacts.parquet", columns=["step"])
+    sampled = force[force["step"].isin(contacts["step"])]
+    lean, heading = np.radians(tilt), sampled["direction_rad"].to_numpy()
+    across, up = np.sin(lean) * np.ones_like(heading), np.cos(lean) * np.ones_like(heading)
+    axis = np.column_stack([across * np.cos(heading), across * np.sin(heading), up])
+    turning = rpm * 2 * np.pi / 60 * axis
+    turning[:, 2] += axis_speed(case) / path["radius_m"]
+    torque = sampled[[f"torque_{axis}_n_m" for axis in "xyz"]].to_numpy()
+    power = -(sampled["drag_n"] * axis_speed(case) + (torque * turning).sum(axis=1))
+    work = found.summary.totals["workpiece_work_j"]
+    assert work == pytest.approx(power.sum() * found.sampled.interval_s, rel=0.05)
 
 
 # --- a particle on a spinning plate --------------------------------------------------------------

@@ -13,9 +13,9 @@ from paths import SMALL_STUDY
 from snakemake_calls import copy_of_project, jobs, snakemake
 
 from dragchain.report.values import Extrapolated
-from dragchain.run.case import load_case
 from dragchain.run.kinematics import drag_phase
 from dragchain.windows.estimate import Round
+from dragdeck.records.case import load_case
 
 pytestmark = [pytest.mark.engine, pytest.mark.slow]
 

@@ -14,20 +14,17 @@ import jinja2
 from pydantic import ValidationError
 from rich.table import Table
 
-from dragdeck.advice.advise import Advice, advised_settings
+from dragdeck.advice.advise import Advice, advised_settings, with_option
 from dragdeck.advice.forecast import (
-    AdviceFile,
     advice_file,
     advice_tables,
     forecast,
     question,
     roles,
 )
-from dragdeck.advice.options import Speed, with_option
 from dragdeck.campaigns.machine_speed import measure_machine_speed
 from dragdeck.cases.case import Case
 from dragdeck.cases.ranks import check_ranks, cores_here
-from dragdeck.decks.deck import StudyScene
 from dragdeck.decks.render import (
     added_forces,
     deck_text,
@@ -44,7 +41,6 @@ from dragdeck.errors import DragdeckError, InputError, choices, together
 from dragdeck.files import write_bytes, write_text
 from dragdeck.outlook.explain import expected_cost, explanation, measured_speeds, show
 from dragdeck.outlook.explain import scene_lines as page_of_scene
-from dragdeck.outlook.measured import Tradeoff, measured_tradeoff, tradeoff_if_measured
 from dragdeck.outlook.process import (
     bed_notes,
     dimensionless,
@@ -59,9 +55,11 @@ from dragdeck.preview.layout import CaseLayout, layout
 from dragdeck.preview.page import Words, page, picture, small_picture
 from dragdeck.preview.swept import swept_volume
 from dragdeck.project import Project, by_folder, by_run, find_project, study_templates
+from dragdeck.records.advice import AdviceFile, Speed
+from dragdeck.records.tradeoff import TradeoffRecord, measured_tradeoff, tradeoff_if_measured
 from dragdeck.scenes.lead import with_leads
 from dragdeck.scenes.registry import SCENES
-from dragdeck.scenes.scene import SceneType, read_bed
+from dragdeck.scenes.scene import SceneType, StudyScene, read_bed
 from dragdeck.study.check import explained, warnings
 from dragdeck.study.model import RESTITUTION
 from dragdeck.study.yaml import located
@@ -309,7 +307,7 @@ def advise(
     tolerance: float | None,
     quantity: str | None,
     quick: bool,
-    tradeoff: Tradeoff | None = None,
+    tradeoff: TradeoffRecord | None = None,
 ) -> None:
     """Show the settings for a tolerance, with their cost, and keep them."""
     project = find_project(Path.cwd())

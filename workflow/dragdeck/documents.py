@@ -4,7 +4,7 @@ import json
 from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic_core import ErrorDetails
@@ -24,6 +24,11 @@ class Part(BaseModel):
     """A part of a document: values never change, and none is infinite or NaN."""
 
     model_config = ConfigDict(frozen=True, allow_inf_nan=False, populate_by_name=True)
+
+
+def omitted(default: Any) -> Any:
+    """A field of a part that is not written where it has its default."""
+    return Field(default=default, exclude_if=lambda value: value == default)
 
 
 class Document(Part):

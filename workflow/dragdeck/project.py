@@ -8,8 +8,8 @@ from pathlib import Path
 from dragdeck.advice.advise import resolve
 from dragdeck.cases.case import Case, mesh_file, of_each_workpiece
 from dragdeck.errors import InputError, choices
-from dragdeck.outlook.measured import Tradeoff
 from dragdeck.outlook.timestep import check_timestep
+from dragdeck.records.tradeoff import TradeoffRecord
 from dragdeck.scenes.lead import FIRST_WINDOWS, LEAD, with_leads
 from dragdeck.scenes.process import PROCESS
 from dragdeck.scenes.registry import SCENES
@@ -60,7 +60,7 @@ class Project:
         return self.root / "workflow" / "plans"
 
     def cases(
-        self, study: str, fidelity: str | None = None, tradeoff: Tradeoff | None = None
+        self, study: str, fidelity: str | None = None, tradeoff: TradeoffRecord | None = None
     ) -> list[Case]:
         """The cases of a study, by its name.
 

@@ -15,10 +15,11 @@ from scipy.optimize import brentq
 from dragchain.arrays import Floats
 from dragchain.calibration.measured_impacts import IMPACTS
 from dragchain.errors import TableError
-from dragchain.run.case import load_case, load_outputs
 from dragchain.run.run_parts import iter_prints
 from dragchain.tables.impacts import speed_at_plate
+from dragdeck.decks.outputs import load_outputs
 from dragdeck.documents import Document, Part
+from dragdeck.records.case import load_case
 
 Purpose = Literal["production", "reference", "confirm"]
 
@@ -250,6 +251,9 @@ def _parabola_top(three: Floats) -> float:
     left, middle, right = (float(value) for value in three)
     bend = left - 2.0 * middle + right
     return middle if bend == 0.0 else middle - (right - left) ** 2 / (8.0 * bend)
+
+
+# --- sweep ---------------------------------------------------------------------------------------
 
 
 _DEGREE = 4

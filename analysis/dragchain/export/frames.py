@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from dragchain.arrays import Floats, Ints
 from dragchain.errors import ExportError, TableError
 from dragchain.network.frame import KINDS, WORKPIECE, NetworkFrame, frame_of
-from dragchain.run.case import Case
 from dragchain.tables.by_step import RisingSteps, read_groups, read_steps
 from dragchain.tables.columns import CONTACTS, KINEMATICS
 from dragchain.tables.run_folder import WORKPIECE_COLUMNS, Run, workpiece_place
+from dragdeck.records.case import CaseOfRun
 from dragdeck.study.rotation import Rotation
 
 _BODY = {name: body for body, name in KINDS.items()}
@@ -292,7 +292,7 @@ class FrameSeries:
                 rows.finish()
 
 
-def _inside(times_s: Floats, selection: Selection, case: Case) -> np.ndarray:
+def _inside(times_s: Floats, selection: Selection, case: CaseOfRun) -> np.ndarray:
     """Which times are in the interval; half a step is no difference."""
     low = -np.inf if selection.first_s is None else selection.first_s
     high = np.inf if selection.last_s is None else selection.last_s

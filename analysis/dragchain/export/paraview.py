@@ -18,12 +18,11 @@ from dragchain.figures.network_picture import segments
 from dragchain.network.chains import major_stress, particle_stress
 from dragchain.network.frame import PARTICLE, NetworkFrame
 from dragchain.network.statistics import contact_counts
-from dragchain.run.case import Case
-from dragchain.run.kinematics import needed
 from dragchain.run.workpiece import placed, workpiece_mesh
 from dragchain.tables.run_folder import Run
 from dragdeck.documents import Document
 from dragdeck.files import write_text, write_vtp
+from dragdeck.records.case import CaseOfRun
 
 SCRIPT = "view.py"
 DATA = "view.json"
@@ -59,7 +58,7 @@ class View(Document):
 class ViewWriter:
     """Collects the colour scales frame by frame, and writes script and data at the end."""
 
-    def __init__(self, case: Case, *, chains: bool) -> None:
+    def __init__(self, case: CaseOfRun, *, chains: bool) -> None:
         self._case = case
         self._chains = chains
         self._upper: dict[str, list[float]] = {}
@@ -75,7 +74,7 @@ class ViewWriter:
 
     def write(self, folder: Path) -> None:
         """Write ``view.py`` and ``view.json``; a scale ends at the median over the frames."""
-        bowl = needed(self._case.bowl, "bowl")
+        bowl = self._case.bowl
         height_m = self._case.inputs.get("bowl.height_m")
         View(
             chains=self._chains,

@@ -26,11 +26,11 @@ from dragchain.figures.rendering import Camera, Image, new_plotter, photograph
 from dragchain.figures.style import COLOURS, force_map
 from dragchain.network.chains import WidestPath, dominant_path, widest_paths
 from dragchain.network.frame import NetworkFrame, network_frames
-from dragchain.run.case import Case
 from dragchain.run.kinematics import needed, process_time
 from dragchain.run.workpiece import placed, workpiece_mesh
 from dragchain.tables.by_step import read_table
 from dragchain.tables.run_folder import workpiece_places
+from dragdeck.records.case import CaseOfRun
 from dragdeck.study.rotation import Rotation
 
 View = Literal["xy", "xz"]
@@ -110,7 +110,7 @@ def picture_step(steps: Floats, process_time_s: Floats, wanted_s: float = _PICTU
     return int(steps[row])
 
 
-def load_scene(run_dir: Path, case: Case) -> NetworkScene:
+def load_scene(run_dir: Path, case: CaseOfRun) -> NetworkScene:
     """Read what the picture of a process run shows at the frame of `picture_step`.
 
     Raises
@@ -146,13 +146,13 @@ class Window:
     contacts: NDArray[np.bool_] | None = None
 
 
-def window(case: Case, scene: NetworkScene, view: View) -> Window:
+def window(case: CaseOfRun, scene: NetworkScene, view: View) -> Window:
     """The whole bowl, or the workpiece's surroundings if the bowl is much wider than they are.
 
     Only contacts whose point lies in the surroundings are then drawn: `WINDOW_DIAMETERS` to
     either side of the workpiece and, seen from the side, `DEPTH_DIAMETERS` before and behind it.
     """
-    bowl_m = needed(case.bowl, "bowl").radius_m + _MARGIN_M
+    bowl_m = case.bowl.radius_m + _MARGIN_M
     floor = (-_MARGIN_M, 1.25 * needed(case.surface_m, "surface_m"))
     diameter, whole = 2.0 * case.media.radius_mean_m, _shows_all(case)
     middle = np.zeros(2) if whole else scene.workpiece_m[:2]
@@ -168,13 +168,13 @@ def window(case: Case, scene: NetworkScene, view: View) -> Window:
     return Window(low, high, None if whole else near)
 
 
-def _shows_all(case: Case) -> bool:
+def _shows_all(case: CaseOfRun) -> bool:
     """Whether pictures of a case show its whole bowl."""
-    reach = needed(case.bowl, "bowl").radius_m + _MARGIN_M
+    reach = case.bowl.radius_m + _MARGIN_M
     return reach <= WINDOW_DIAMETERS * 2.0 * case.media.radius_mean_m
 
 
-def cut_words(case: Case, view: View) -> str:
+def cut_words(case: CaseOfRun, view: View) -> str:
     """What a picture leaves out, in words; empty if it shows the whole bowl."""
     if _shows_all(case):
         return ""
@@ -184,7 +184,7 @@ def cut_words(case: Case, view: View) -> str:
 
 def render_view(
     run_dir: Path,
-    case: Case,
+    case: CaseOfRun,
     scene: NetworkScene,
     view: View,
     pixels_per_mm: float = _PIXELS_PER_MM,
@@ -214,18 +214,18 @@ def render_view(
     return image, np.array([low[0], high[0], low[1], high[1]]) * 1e3
 
 
-def _camera(middle: Floats, view: View, case: Case) -> Camera:
-    away = max(1.0, 2.0 * needed(case.bowl, "bowl").radius_m)
+def _camera(middle: Floats, view: View, case: CaseOfRun) -> Camera:
+    away = max(1.0, 2.0 * case.bowl.radius_m)
     x, other = middle
     if view == "xy":
         return Camera((x, other, away), (x, other, 0.0), (0.0, 1.0, 0.0))
     return Camera((x, -away, other), (x, 0.0, other))
 
 
-def _add_bowl(plotter: Any, case: Case, view: View) -> None:
+def _add_bowl(plotter: Any, case: CaseOfRun, view: View) -> None:
     import pyvista as pv
 
-    radius, height = needed(case.bowl, "bowl").radius_m, 1.2 * needed(case.surface_m, "surface_m")
+    radius, height = case.bowl.radius_m, 1.2 * needed(case.surface_m, "surface_m")
     wall = pv.Cylinder(
         center=(0, 0, height / 2), direction=(0, 0, 1), radius=radius, height=height,
         resolution=120, capping=False,
@@ -265,6 +265,9 @@ def _tubes(axis: Floats, force: Floats, radius: Floats) -> Any:
     mesh = pv.PolyData(axis.reshape(-1, 3), lines=lines.ravel())
     mesh["force"], mesh["radius"] = np.repeat(force, 2), np.repeat(radius, 2)
     return mesh.tube(scalars="radius", absolute=True, n_sides=_SIDES, capping=True)
+
+
+# --- on axes in mm -------------------------------------------------------------------------------
 
 
 def show_network(axes: Axes, shown: NetworkScene, view: View, image: Image, extent: Floats) -> None:

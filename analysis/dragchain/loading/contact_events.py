@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from dragchain.arrays import Floats, Ints
 from dragchain.contact_law.hertz import Elastic, contact_time, effective_modulus
-from dragchain.run.case import Case, friction_with, input_of, number_of
+from dragchain.run.case import friction_with, input_of, number_of
 from dragchain.run.kinematics import surface_speed
+from dragdeck.records.case import CaseOfRun
 
 IMPACT, SLIDING, ROLLING, RESTING = TYPES = ("impact", "sliding", "rolling", "resting")
 
@@ -74,7 +75,7 @@ class Surfaces:
     contact_time_s: float
 
 
-def surfaces(case: Case) -> Surfaces:
+def surfaces(case: CaseOfRun) -> Surfaces:
     """Return friction and contact time of particle and workpiece from the inputs of ``case.json``.
 
     The time is that of an elastic impact on a plane; see `contact_time`.
@@ -209,7 +210,7 @@ def _paths(rows: pd.DataFrame, event: Ints, interval_s: float) -> dict[str, tupl
 
 
 def event_types(
-    events: pd.DataFrame, case: Case, interval_s: float, limits: Thresholds
+    events: pd.DataFrame, case: CaseOfRun, interval_s: float, limits: Thresholds
 ) -> NDArray[np.str_]:
     """Name the type of each event, (E,).
 

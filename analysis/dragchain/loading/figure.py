@@ -19,9 +19,9 @@ from dragchain.figures.style import GREY, WIDTH_IN, force_map
 from dragchain.loading.document import Loading, Profile
 from dragchain.loading.samples import Sampled, as_polydata
 from dragchain.loading.summary import DEPTH_BINS
-from dragchain.run.case import Case
 from dragchain.run.kinematics import motion_of, needed, spins
 from dragchain.run.workpiece import Surface
+from dragdeck.records.case import CaseOfRun
 
 _QUANTITY = "force_slide_pa"
 _LABEL = "normal force times sliding distance, per area of the workpiece\nand path length (N/m²)"
@@ -43,7 +43,7 @@ _BESIDE_IN, _AROUND_IN, _TALLEST_IN = 1.3, 2.3, 3.5
 
 
 def workpiece_figure(
-    case: Case, sampled: Sampled, surface: Surface, facets: pd.DataFrame, loading: Loading
+    case: CaseOfRun, sampled: Sampled, surface: Surface, facets: pd.DataFrame, loading: Loading
 ) -> Figure:
     """The workpiece by force times sliding distance, averaged over areas of a particle's size.
 
@@ -82,7 +82,7 @@ def workpiece_figure(
     return figure
 
 
-def _height_in(case: Case, fraction: float) -> float:
+def _height_in(case: CaseOfRun, fraction: float) -> float:
     """The figure's height, that a view of this fraction of the width has a workpiece fill it."""
     high, low = _depths(case)
     view_in = fraction * (WIDTH_IN - _BESIDE_IN)
@@ -90,7 +90,7 @@ def _height_in(case: Case, fraction: float) -> float:
     return _AROUND_IN + min(_TALLEST_IN, fits)
 
 
-def _half_width(case: Case) -> float:
+def _half_width(case: CaseOfRun) -> float:
     """Return half of the width that is shown, m."""
     return 1.15 * needed(case.workpiece, "workpiece").radius_m
 
@@ -104,13 +104,13 @@ def _largest(facets: pd.DataFrame) -> float:
     return float(loaded[_QUANTITY].to_numpy()[np.searchsorted(fraction, 0.99)])
 
 
-def _depths(case: Case) -> tuple[float, float]:
+def _depths(case: CaseOfRun) -> tuple[float, float]:
     """The shallowest and the deepest depth that is shown, mm."""
     deepest = needed(case.workpiece, "workpiece").immersion_depth_m * 1e3
     return -0.25 * deepest, 1.06 * deepest
 
 
-def _view(axes: Axes, mesh: Any, name: str, scale: Normalize, case: Case) -> None:
+def _view(axes: Axes, mesh: Any, name: str, scale: Normalize, case: CaseOfRun) -> None:
     """Set a rendered side of the workpiece on axes of width and depth (mm)."""
     eye, motion = _VIEWS[name]
     image, half = _render(mesh, eye, scale, case), 1e3 * _half_width(case)
@@ -124,12 +124,12 @@ def _view(axes: Axes, mesh: Any, name: str, scale: Normalize, case: Case) -> Non
     axes.set(xlabel="width (mm)", title=f"{name}\n{when}")
 
 
-def _keeps_direction(case: Case) -> bool:
+def _keeps_direction(case: CaseOfRun) -> bool:
     """Whether the workpiece's motion has one direction in its own frame."""
     return motion_of(case).keeps_direction
 
 
-def _render(mesh: Any, eye: tuple[float, float], scale: Normalize, case: Case) -> Image:
+def _render(mesh: Any, eye: tuple[float, float], scale: Normalize, case: CaseOfRun) -> Image:
     """A side of the workpiece in parallel projection."""
     high, low = _depths(case)
     height = (low - high) * 1e-3
@@ -140,7 +140,7 @@ def _render(mesh: Any, eye: tuple[float, float], scale: Normalize, case: Case) -
     return photograph(plotter, Camera((*eye, middle), (0.0, 0.0, middle)), height)
 
 
-def averaged_load(surface: Surface, facets: pd.DataFrame, case: Case) -> Floats:
+def averaged_load(surface: Surface, facets: pd.DataFrame, case: CaseOfRun) -> Floats:
     """Load of each facet, (N,) in Pa: the mean over the area of those that lie beside it.
 
     Facets are beside each other in a cube of a particle's radius, if they face the same way.
@@ -168,7 +168,7 @@ class _Bins:
     load_pa: Floats
 
 
-def _unrolled_bins(sampled: Sampled, case: Case) -> _Bins:
+def _unrolled_bins(sampled: Sampled, case: CaseOfRun) -> _Bins:
     workpiece = needed(case.workpiece, "workpiece")
     rows = sampled.rows[sampled.rows["workpiece_z_m"] > 1e-3 * workpiece.length_m]
     azimuths, shallowest = circumference(AZIMUTH_BINS), 1e-3 * _depths(case)[0]
@@ -182,7 +182,7 @@ def _unrolled_bins(sampled: Sampled, case: Case) -> _Bins:
     return _Bins(azimuths, depths, sums / (area * sampled.path_m))
 
 
-def _rolled(bins: _Bins, case: Case) -> Any:
+def _rolled(bins: _Bins, case: CaseOfRun) -> Any:
     """The lateral surface as a mesh in the frame of the workpiece, its tip in the origin."""
     import pyvista as pv
 
@@ -196,7 +196,7 @@ def _rolled(bins: _Bins, case: Case) -> Any:
     return grid.extract_surface(algorithm="dataset_surface")
 
 
-def _unrolled(axes: Axes, bins: _Bins, scale: Normalize, case: Case) -> None:
+def _unrolled(axes: Axes, bins: _Bins, scale: Normalize, case: CaseOfRun) -> None:
     """Draw the lateral surface of a cylinder unrolled: azimuth against depth."""
     workpiece = needed(case.workpiece, "workpiece")
     azimuth, depth = np.degrees(bins.azimuth_rad), 1e3 * bins.depth_m
@@ -216,7 +216,7 @@ def _profile(axes: Axes, profile: Profile) -> None:
     axes.set_xlabel("force times sliding\ndistance per path and\ndepth (N m/(m mm))")
 
 
-def _title(loading: Loading, case: Case) -> str:
+def _title(loading: Loading, case: CaseOfRun) -> str:
     """Say what the picture is of; fractions are unknown where nothing slides."""
     work = loading.per_metre["friction_work_j"]
     front = loading.front_fraction["force_slide_n_m"]

@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike
 from dragchain.arrays import Floats, Ints
 from dragchain.errors import TableError
 from dragchain.loading.contact_events import AMOUNTS, POINT, SLIP, Thresholds, surfaces
-from dragchain.run.case import Case, load_outputs
 from dragchain.run.kinematics import (
     axis_speed,
     bowl_velocity,
@@ -26,6 +25,8 @@ from dragchain.run.kinematics import (
 from dragchain.run.workpiece import Surface, off_facet
 from dragchain.statistics.correlated import slow_waves
 from dragchain.tables.by_step import read_groups
+from dragdeck.decks.outputs import load_outputs
+from dragdeck.records.case import CaseOfRun
 
 WORKPIECE = ("drag_impulse_n_s", "lateral_impulse_n_s", "vertical_impulse_n_s")
 BODY = ("body_x_impulse_n_s", "body_y_impulse_n_s", "body_z_impulse_n_s")
@@ -94,7 +95,7 @@ class Sampled:
 # --- reading ---------------------------------------------------------------------------------
 
 
-def sample(run_dir: Path, case: Case, limits: Thresholds) -> Sampled:
+def sample(run_dir: Path, case: CaseOfRun, limits: Thresholds) -> Sampled:
     """Read the counted contacts of a run, a row group at a time; see `Sampled`."""
     tables = run_dir / "tables"
     steps, interval_s = _counted_steps(run_dir, case)
@@ -146,7 +147,7 @@ def _loaded(contacts: pd.DataFrame) -> pd.Series:
     return contacts["in_statistics"] & (contacts[_FORCE] != 0.0).any(axis=1)
 
 
-def _counted_steps(run_dir: Path, case: Case) -> tuple[Ints, float]:
+def _counted_steps(run_dir: Path, case: CaseOfRun) -> tuple[Ints, float]:
     """The counted steps of ``workpiece_contacts`` and the time between two, s."""
     output = load_outputs(run_dir)["workpiece_contacts"]
     last = needed(output.last_step, "last_step of workpiece_contacts")
@@ -159,7 +160,11 @@ def _counted_steps(run_dir: Path, case: Case) -> tuple[Ints, float]:
 
 
 def _with_amounts(
-    rows: pd.DataFrame, workpiece: pd.DataFrame, case: Case, interval_s: float, limits: Thresholds
+    rows: pd.DataFrame,
+    workpiece: pd.DataFrame,
+    case: CaseOfRun,
+    interval_s: float,
+    limits: Thresholds,
 ) -> pd.DataFrame:
     """Add to each contact its contributions, and its point and slip in the body frame."""
     force, slip, point = (rows[names].to_numpy() for names in (_FORCE, _VELOCITY, _PLACE))
@@ -197,6 +202,9 @@ def _with_amounts(
     return added[[*_KEPT, *in_body]]
 
 
+# --- checks of facets ----------------------------------------------------------------------------
+
+
 _OFF_FACET = 1e-5
 """Largest distance of a contact point from its facet over the workpiece's length: rounding."""
 
@@ -210,7 +218,7 @@ _UNCERTAIN = ("normal_impulse_n_s", "force_slide_n_m", "friction_work_j")
 """Sums of a facet that come with a standard error."""
 
 
-def check_facets(sampled: Sampled, surface: Surface, case: Case) -> float:
+def check_facets(sampled: Sampled, surface: Surface, case: CaseOfRun) -> float:
     """How far contact points lie off their facets at most, m, if that is rounding."""
     facet = sampled.rows["facet_id"].to_numpy()
     if facet.min() < 0 or facet.max() >= len(surface.corners):

@@ -27,9 +27,9 @@ from dragchain.loading.document import (
     Totals,
 )
 from dragchain.loading.samples import WORKPIECE, Sampled
-from dragchain.run.case import Case
 from dragchain.statistics.correlated import estimates
 from dragchain.statistics.estimate import CONFIDENCE, EstimateColumns
+from dragdeck.records.case import CaseOfRun
 
 DEPTH_BINS, AZIMUTH_BINS = 20, 24
 
@@ -51,7 +51,7 @@ def summarise_loading(
     facets: pd.DataFrame,
     events: pd.DataFrame,
     event: Ints,
-    case: Case,
+    case: CaseOfRun,
     limits: Thresholds,
     off_facet_m: float,
 ) -> Loading:
@@ -65,7 +65,7 @@ def summarise_loading(
         Of `facet_table` and `find_events`, the events with their ``type``.
     event : (N,) ndarray
         The event of each contact.
-    case : Case
+    case : CaseOfRun
     limits : Thresholds
     off_facet_m : float
         Largest distance of a contact point from its facet.

@@ -13,10 +13,10 @@ from dragchain.loading.document import Loading
 from dragchain.loading.figure import workpiece_figure
 from dragchain.loading.samples import DRAWN, Sampled, as_polydata, check_facets, facet_table, sample
 from dragchain.loading.summary import summarise_loading
-from dragchain.run.case import Case, load_case
 from dragchain.run.workpiece import Surface, read_surface
 from dragchain.tables.parquet import write_parquet
 from dragdeck.files import write_vtp
+from dragdeck.records.case import CaseOfRun, load_case
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class WorkpieceLoading:
 
     Attributes
     ----------
-    case : Case
+    case : CaseOfRun
     surface : Surface
         The workpiece.
     sampled : Sampled
@@ -36,7 +36,7 @@ class WorkpieceLoading:
         Content of ``loading.json``.
     """
 
-    case: Case
+    case: CaseOfRun
     surface: Surface
     sampled: Sampled
     facets: pd.DataFrame

@@ -177,6 +177,9 @@ def _length(points: Floats) -> Floats:
     return np.asarray(np.linalg.norm(np.diff(points, axis=1), axis=2).sum(axis=1))
 
 
+# --- tables of a run -----------------------------------------------------------------------------
+
+
 def write_chains(run_dir: Path) -> None:
     """Write the tables ``network``, ``clusters`` and ``chains`` of a process run.
 

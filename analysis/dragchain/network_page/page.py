@@ -7,11 +7,11 @@ from typing import Any
 from dragchain.network_page.scene import ROUNDING, PageScene, page_scene
 from dragchain.report.page import NETWORK_PAGE, file_uri, page_environment
 from dragchain.run.basis import changed_settings, effects
-from dragchain.run.case import Case
-from dragchain.run.completeness import read_accepted
 from dragchain.tables.run_folder import Run
 from dragdeck.errors import RejectedRunError
 from dragdeck.files import write_text
+from dragdeck.records.case import CaseOfRun
+from dragdeck.records.run import read_accepted
 
 _PICTURES = ("network_xz", "forces")
 """Figures of a run that stand for scene and curve where these cannot be drawn."""
@@ -37,12 +37,14 @@ def write_page(run_dir: Path) -> str:
     return f"{len(page.encode()) / 1e6:.1f} MB: {file}"
 
 
-def page_html(case: Case, scene: PageScene, pictures: dict[str, str | None], rejection: str) -> str:
+def page_html(
+    case: CaseOfRun, scene: PageScene, pictures: dict[str, str | None], rejection: str
+) -> str:
     """The page as HTML.
 
     Parameters
     ----------
-    case : Case
+    case : CaseOfRun
     scene : PageScene
     pictures : dict of str to str or None
         Data URIs of the static pictures.

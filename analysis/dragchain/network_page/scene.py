@@ -21,12 +21,15 @@ from dragchain.errors import TableError
 from dragchain.export.frames import FrameData, FrameSeries
 from dragchain.figures.style import force_map
 from dragchain.network.frame import KINDS, PARTICLE, NetworkFrame
-from dragchain.run.case import Case
 from dragchain.run.kinematics import drag_phase, needed, process_time
 from dragchain.run.workpiece import read_surface
 from dragchain.tables.by_step import read_table
 from dragchain.tables.columns import CENTRE, POINT, VELOCITY
 from dragchain.tables.run_folder import Run
+from dragdeck.records.case import CaseOfRun
+
+# --- columns as bytes ----------------------------------------------------------------------------
+
 
 Kind = Literal["u8", "u16", "u32", "f24"]
 """Whole numbers of 1, 2 or 4 bytes, or the first 3 bytes of a single-precision number."""
@@ -67,6 +70,9 @@ class PackedColumns:
     def text(self) -> str:
         """All columns, one after another, compressed (zlib) and in base64."""
         return base64.b64encode(zlib.compress(b"".join(self._parts))).decode("ascii")
+
+
+# --- shown frames --------------------------------------------------------------------------------
 
 
 FRAMES = 100
@@ -182,6 +188,9 @@ def _near(frame: NetworkFrame, workpiece_m: Floats) -> NDArray[np.bool_]:
     return np.asarray(away < np.partition(away, MOST_PARTICLES)[MOST_PARTICLES])
 
 
+# --- scene ---------------------------------------------------------------------------------------
+
+
 _LOADS = {
     "force_slide_pa": ("sliding load", "N/m²"),
     "mean_pressure_pa": ("mean pressure", "Pa"),
@@ -221,7 +230,7 @@ def page_scene(run: Run) -> PageScene:
     series = shown_frames(run, peaks.time_s)
     frames = list(read_shown(series))
     times_s = process_time(series.times_s, case)
-    bowl, surface = needed(case.bowl, "bowl"), 1e3 * needed(case.surface_m, "surface_m")
+    bowl, surface = case.bowl, 1e3 * needed(case.surface_m, "surface_m")
     head = {
         "run": case.run,
         "steps": series.steps.tolist(),
@@ -254,7 +263,7 @@ def _colours() -> list[str]:
 # --- frames ----------------------------------------------------------------------------------
 
 
-def _frames(columns: PackedColumns, frames: list[ShownFrame], case: Case) -> dict[str, Any]:
+def _frames(columns: PackedColumns, frames: list[ShownFrame], case: CaseOfRun) -> dict[str, Any]:
     """Add particles and contacts of all frames; where each frame starts, and the box of places."""
     centres = [_vectors(one.data.particles, CENTRE)[one.particles] for one in frames]
     points = [_outer_points(one) for one in frames]
@@ -301,13 +310,13 @@ def _joined(tables: list[pd.DataFrame], name: str) -> Any:
     return np.concatenate([table[name].to_numpy() for table in tables])
 
 
-def _speeds(particles: pd.DataFrame, case: Case) -> Floats:
+def _speeds(particles: pd.DataFrame, case: CaseOfRun) -> Floats:
     """Speeds of particles in process time, m/s."""
     simulated = np.linalg.norm(_vectors(particles, VELOCITY), axis=1)
     return np.asarray(simulated / case.fidelity.speed_factor)
 
 
-def _scales(frames: list[ShownFrame], case: Case) -> dict[str, float]:
+def _scales(frames: list[ShownFrame], case: CaseOfRun) -> dict[str, float]:
     """The tops of the colour scales, and the mean normal force, over all shown frames."""
     forces = [_table(one)["normal_force_n"].to_numpy()[one.contacts] for one in frames]
     largest = [part.max(initial=0.0) for part in forces]
@@ -422,7 +431,7 @@ def _curve(columns: PackedColumns, run: Run) -> dict[str, Any]:
     }
 
 
-def _peaks(peaks: DragPeaks, times_s: Floats, case: Case) -> list[dict[str, Any]]:
+def _peaks(peaks: DragPeaks, times_s: Floats, case: CaseOfRun) -> list[dict[str, Any]]:
     """The highest peaks, each with its nearest frame."""
     return [
         {"time": time, "force": -drag, "frame": int(np.abs(times_s - time).argmin())}

@@ -32,18 +32,23 @@ from dragchain.report.values import (
     values_of,
     values_over_packings,
 )
-from dragchain.run.case import Case, changed_inputs, load_case
-from dragchain.run.completeness import RunRecord, read_accepted
+from dragchain.run.case import changed_inputs
 from dragchain.run.kinematics import axis_speed, drag_phase, motion_of, needed, path_passed
 from dragdeck.errors import DocumentError, RejectedRunError
+from dragdeck.records.case import CaseOfRun, load_case
+from dragdeck.records.run import RunRecord, read_accepted
+
+# --- what was simulated --------------------------------------------------------------------------
 
 
-def set_up(case: Case, packings: int, filling: FillingFindings | None) -> list[tuple[str, str]]:
+def set_up(
+    case: CaseOfRun, packings: int, filling: FillingFindings | None
+) -> list[tuple[str, str]]:
     """Workpiece, path, speed, media, bowl and settings of a case.
 
     Parameters
     ----------
-    case : Case
+    case : CaseOfRun
         A process run.
     packings : int
         Number of packings (seeds) that are averaged.
@@ -65,7 +70,7 @@ def set_up(case: Case, packings: int, filling: FillingFindings | None) -> list[t
     ]
 
 
-def _workpiece(case: Case) -> Iterator[str]:
+def _workpiece(case: CaseOfRun) -> Iterator[str]:
     own, inputs = needed(case.workpiece, "workpiece"), case.inputs
     material = _text(inputs.get("workpiece.material"))
     if inputs.get("workpiece.shape.kind", own.kind) == "cylinder":
@@ -77,7 +82,7 @@ def _workpiece(case: Case) -> Iterator[str]:
         yield f"number {own.number} of {own.count}"
 
 
-def _path(case: Case) -> Iterator[str]:
+def _path(case: CaseOfRun) -> Iterator[str]:
     yield motion_of(case).motion.path.words(number)
     end_s = np.array([drag_phase(case).end_step * case.timestep_s])
     yield f"{_mm(float(path_passed(end_s, case)[0]))} long"
@@ -85,14 +90,14 @@ def _path(case: Case) -> Iterator[str]:
     yield from (f"with {one.kind}" for one in case.superposed)
 
 
-def _speed(case: Case) -> Iterator[str]:
+def _speed(case: CaseOfRun) -> Iterator[str]:
     simulated, factor = axis_speed(case), case.fidelity.speed_factor
     yield f"{number(1e3 * simulated / factor)} mm/s"
     if factor != 1.0:
         yield f"simulated at {number(1e3 * simulated)} mm/s"
 
 
-def _media(case: Case) -> Iterator[str]:
+def _media(case: CaseOfRun) -> Iterator[str]:
     media, material = case.media, _text(case.inputs.get("media.material"))
     yield " ".join(filter(None, (number(media.count), material, "spheres")))
     spread = (
@@ -103,8 +108,8 @@ def _media(case: Case) -> Iterator[str]:
     yield f"diameter {_mm(2 * media.radius_mean_m)}{spread}"
 
 
-def _bowl(case: Case, filling: FillingFindings | None) -> Iterator[str]:
-    bowl, material = needed(case.bowl, "bowl"), _text(case.inputs.get("bowl.material"))
+def _bowl(case: CaseOfRun, filling: FillingFindings | None) -> Iterator[str]:
+    bowl, material = case.bowl, _text(case.inputs.get("bowl.material"))
     yield f"{material} cylinder, radius {_mm(bowl.radius_m)}".strip()
     if filling is not None and "bed_height_m" in filling.bed:
         fraction = filling.bed.get("solid_fraction")
@@ -112,7 +117,7 @@ def _bowl(case: Case, filling: FillingFindings | None) -> Iterator[str]:
         yield f"filled to {_mm(float(filling.bed['bed_height_m']))}{solid}"
 
 
-def _settings(case: Case, packings: int) -> Iterator[str]:
+def _settings(case: CaseOfRun, packings: int) -> Iterator[str]:
     own = case.fidelity
     yield (
         f"{own.name}: Young's modulus {TIMES} {number(own.youngs_modulus_scale)}, time step "
@@ -130,6 +135,9 @@ def _text(value: JsonValue) -> str:
     return value if isinstance(value, str) else ""
 
 
+# --- runs ----------------------------------------------------------------------------------------
+
+
 F = TypeVar("F", bound=Findings, covariant=True)
 
 
@@ -138,7 +146,7 @@ class ReportedRun(Generic[F]):
     """A run that counts: its folder, case, findings and ``run.json``."""
 
     folder: Path
-    case: Case
+    case: CaseOfRun
     findings: F
     record: RunRecord
 
@@ -218,7 +226,7 @@ def read_upstream(run_dir: Path) -> ReportedRun[Findings]:
     return _read(run_dir, Findings)
 
 
-def upstream_folders(run_dir: Path, case: Case) -> dict[str, Path]:
+def upstream_folders(run_dir: Path, case: CaseOfRun) -> dict[str, Path]:
     """Folders of the filling and the drop test that a process run names, by scene."""
     results = run_dir.resolve().parent.parent
     return {scene: results / scene / run for scene, run in case.upstream.items()}
@@ -227,6 +235,9 @@ def upstream_folders(run_dir: Path, case: Case) -> dict[str, Path]:
 def _read(run_dir: Path, findings: type[F]) -> ReportedRun[F]:
     record = read_accepted(run_dir)
     return ReportedRun(run_dir, load_case(run_dir), findings.read(run_dir / FILE), record)
+
+
+# --- cases ---------------------------------------------------------------------------------------
 
 
 _SEED = "seed"

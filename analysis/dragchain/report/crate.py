@@ -14,9 +14,9 @@ from typing import Any
 
 from dragchain.errors import ExportError
 from dragchain.report.cases import read_study_runs
-from dragchain.run.case import Case, load_case
-from dragchain.run.completeness import read_accepted
 from dragdeck.files import write_text
+from dragdeck.records.case import CaseOfRun, load_case
+from dragdeck.records.run import read_accepted
 
 METADATA = "ro-crate-metadata.json"
 LEFT_OUT = "left_out.csv"
@@ -97,7 +97,7 @@ def _below_here(path: Path) -> Path:
 class _Crate:
     """An RO-Crate that grows file by file."""
 
-    def __init__(self, folder: Path, case: Case, licence: str | None) -> None:
+    def __init__(self, folder: Path, case: CaseOfRun, licence: str | None) -> None:
         try:
             from rocrate.rocrate import ROCrate
         except ModuleNotFoundError as error:
@@ -163,7 +163,7 @@ class _Crate:
         }
         self._mention(f"#{case.scene}-{case.run}", about)
 
-    def _measured(self, folder: Path, case: Case) -> list[Any]:
+    def _measured(self, folder: Path, case: CaseOfRun) -> list[Any]:
         """The quantities of a process run, as its report states them."""
         if case.scene != "process":
             return []

@@ -20,8 +20,8 @@ from dragchain.loading.write import compute_loading, figure_of
 from dragchain.report.findings import FILE, ProcessFindings
 from dragchain.report.run_data import RunData
 from dragchain.report.run_figures import DRAW_PROCESS
-from dragchain.run.case import load_case
 from dragdeck.files import write_bytes
+from dragdeck.records.case import load_case
 
 COLUMN_MM, PAGE_MM = 85, 180
 _ONE_COLUMN = ("force_around_workpiece",)

@@ -40,7 +40,6 @@ from dragchain.report.findings import (
     ProcessFindings,
     Wake,
 )
-from dragchain.run.case import Case, load_outputs
 from dragchain.run.kinematics import drag_start_s, needed, path_passed, process_time
 from dragchain.run.reference import reference_drags
 from dragchain.statistics.correlated import estimate_mean
@@ -48,6 +47,8 @@ from dragchain.statistics.estimate import CONFIDENCE, EstimateColumns
 from dragchain.tables.bed import Packing
 from dragchain.tables.by_step import read_table
 from dragchain.tables.impacts import effective_restitution
+from dragdeck.decks.outputs import load_outputs
+from dragdeck.records.case import CaseOfRun
 
 
 class DragTrace(NamedTuple):
@@ -75,11 +76,11 @@ class RunData:
     Attributes
     ----------
     folder : Path
-    case : Case
+    case : CaseOfRun
     """
 
     folder: Path
-    case: Case
+    case: CaseOfRun
 
     def table(self, name: str, columns: list[str] | None = None) -> pd.DataFrame:
         """A table of the run, or some of its columns."""
@@ -126,6 +127,9 @@ def dominant_bottlenecks(network: pd.DataFrame, chains: pd.DataFrame) -> Floats:
     """The dominant workpiece path's bottleneck in each network frame in N, 0 without a path."""
     dominant = chains[chains["dominant"]].set_index("step")["bottleneck_n"]
     return dominant.reindex(network["step"]).fillna(0.0).to_numpy(np.float64)
+
+
+# --- findings ------------------------------------------------------------------------------------
 
 
 def write_findings(run: RunData) -> Findings:
@@ -181,7 +185,7 @@ def process_findings(run: RunData) -> ProcessFindings:
     )
 
 
-def _wake(samples: pd.DataFrame, case: Case) -> Wake | None:
+def _wake(samples: pd.DataFrame, case: CaseOfRun) -> Wake | None:
     workpiece = needed(case.workpiece, "workpiece")
     if workpiece.wake_from_m is None:
         return None

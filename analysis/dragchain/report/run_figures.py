@@ -35,11 +35,15 @@ from dragchain.report.findings import (
     ProcessFindings,
 )
 from dragchain.report.run_data import RunData, write_findings
-from dragchain.run.case import Case, load_case, load_outputs
 from dragchain.run.kinematics import process_time
 from dragchain.run.run_parts import iter_prints
 from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import Estimate
+from dragdeck.decks.outputs import load_outputs
+from dragdeck.records.case import CaseOfRun, load_case
+
+# --- panels --------------------------------------------------------------------------------------
+
 
 _DEPTH = "depth below the surface (mm)"
 
@@ -109,6 +113,9 @@ def load_depth_panel(axes: Axes, found: ProcessFindings) -> None:
     """Sum of the normal forces per depth in bins of depth."""
     depth_bars(axes, found.depth.edges_m, found.depth.line_load_n_per_m, 1e-3)
     axes.set(xlabel="total normal force per depth (N/mm)", ylabel=_DEPTH)
+
+
+# --- process -------------------------------------------------------------------------------------
 
 
 def forces(run: RunData, found: ProcessFindings) -> Figure:
@@ -215,7 +222,7 @@ def _path_words(shown: network_picture.NetworkScene) -> str:
 # --- filling and drop test -----------------------------------------------------------------------
 
 
-def energy_ratio(energy_j: Floats, particles: Floats, case: Case) -> Floats:
+def energy_ratio(energy_j: Floats, particles: Floats, case: CaseOfRun) -> Floats:
     """The mean energy of a particle over m g d, (N,): what the mean particle gains falling by d.
 
     Parameters
@@ -224,7 +231,7 @@ def energy_ratio(energy_j: Floats, particles: Floats, case: Case) -> Floats:
         Kinetic energy of all particles in J, spin included.
     particles : (N,) array
         Number of particles.
-    case : Case
+    case : CaseOfRun
         The filling; mass and diameter are those of its mean particle.
     """
     radius = case.media.radius_mean_m

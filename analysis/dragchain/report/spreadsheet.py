@@ -12,8 +12,8 @@ import pyarrow as pa
 
 from dragchain.report.cases import ReportedCase
 from dragchain.run.basis import Standing
-from dragchain.run.case import Assumption
 from dragchain.tables.columns import descriptions, unit_end, unit_of
+from dragdeck.records.case import AssumptionOfRun
 
 if TYPE_CHECKING:
     from xlsxwriter.format import Format
@@ -96,7 +96,7 @@ def _cells(one: Standing | None) -> list[object]:
 
 def summary_workbook(
     table: pd.DataFrame,
-    assumptions: Mapping[str, Sequence[Assumption]],
+    assumptions: Mapping[str, Sequence[AssumptionOfRun]],
     cases: Sequence[ReportedCase],
 ) -> bytes:
     """The summary as an XLSX file: sheets Overview, Summary, Definitions and Assumptions.
@@ -105,7 +105,7 @@ def summary_workbook(
     ----------
     table : DataFrame
         The summary, one row per run.
-    assumptions : mapping of str to sequence of Assumption
+    assumptions : mapping of str to sequence of AssumptionOfRun
         The assumptions of each run, by its name.
     cases : sequence of ReportedCase
         The cases for the overview.

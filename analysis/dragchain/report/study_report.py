@@ -18,14 +18,7 @@ from dragchain.report.cases import (
     read_upstream,
     upstream_folders,
 )
-from dragchain.report.cost_check import (
-    CostRow,
-    Option,
-    answers,
-    cost_rows,
-    prediction_for,
-    read_advice,
-)
+from dragchain.report.cost_check import CostRow, answers, cost_rows, prediction_for, read_advice
 from dragchain.report.findings import FIGURES, FillingFindings, Findings, ProcessFindings
 from dragchain.report.page import (
     NETWORK_PAGE,
@@ -37,12 +30,16 @@ from dragchain.report.page import (
 )
 from dragchain.report.spreadsheet import summary_workbook
 from dragchain.report.summary import summary
-from dragchain.run.case import Assumption, load_case
-from dragchain.run.completeness import RunRecord
 from dragchain.statistics.correlated import RELIABLE_TIMES
 from dragchain.tables.network_contacts import Corrections
 from dragdeck.errors import DragdeckError
 from dragdeck.files import write_bytes
+from dragdeck.records.advice import OptionEntry
+from dragdeck.records.case import AssumptionOfRun, load_case
+from dragdeck.records.run import RunRecord
+
+# --- runs without a result -----------------------------------------------------------------------
+
 
 _STEPS = ("render", "run", "tables", "chains", "loading", "figures")
 """The steps of a run that have a log, in order: the first that failed is to blame."""
@@ -155,6 +152,9 @@ def _split(message: str) -> tuple[str, str]:
     return " ".join(problem.split()), " ".join(remedy.split()) or "see the logs in its folder"
 
 
+# --- report --------------------------------------------------------------------------------------
+
+
 _SHOWN = 6
 """Cases that the head of the page names; more are in its first table alone."""
 
@@ -181,7 +181,7 @@ class RunSection:
     """What the page shows of one process run; `network` is its page on the contact network."""
 
     study: StudyRuns
-    assumptions: list[Assumption]
+    assumptions: list[AssumptionOfRun]
     pictures: list[ShownFigure]
     network: Path | None
     corrections: Corrections | None
@@ -258,7 +258,7 @@ def _with_upstream(run_dirs: Sequence[Path]) -> list[Path]:
 
 
 def _read(
-    run_dirs: Sequence[Path], options: Sequence[Option]
+    run_dirs: Sequence[Path], options: Sequence[OptionEntry]
 ) -> tuple[list[RunSection], list[MissingRun]]:
     """What the page shows of the process runs, and the runs without a result."""
     sections, missing = [], []
@@ -273,7 +273,7 @@ def _read(
     return sections, missing
 
 
-def _section(study: StudyRuns, options: Sequence[Option]) -> RunSection:
+def _section(study: StudyRuns, options: Sequence[OptionEntry]) -> RunSection:
     process = study.process
     expected = prediction_for(process.case, options)
     records = {str(run.case.scene): run.record for run in study.runs}
@@ -290,9 +290,9 @@ def _section(study: StudyRuns, options: Sequence[Option]) -> RunSection:
     )
 
 
-def _assumptions(study: StudyRuns) -> list[Assumption]:
+def _assumptions(study: StudyRuns) -> list[AssumptionOfRun]:
     """The assumptions of all runs of a study, by field."""
-    known: dict[str, Assumption] = {}
+    known: dict[str, AssumptionOfRun] = {}
     for run in reversed(study.runs):
         known |= {assumption.field: assumption for assumption in run.case.assumptions}
     return [known[field] for field in sorted(known)]

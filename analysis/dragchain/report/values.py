@@ -10,11 +10,11 @@ from typing import NamedTuple
 from dragchain.loading.document import Loading
 from dragchain.report.findings import ProcessFindings
 from dragchain.run.basis import QUANTITIES, Basis, Correction, Standing, judge, notes
-from dragchain.run.case import Case
 from dragchain.run.reference import reference_drags
 from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import Estimate, mean_of
 from dragdeck.documents import Document, Part
+from dragdeck.records.case import CaseOfRun
 
 EXTRAPOLATED = Path("tables") / "extrapolated.json"
 
@@ -144,6 +144,9 @@ class Extrapolated(Document):
         return next((one for one in self.quantities if one.name == name), None)
 
 
+# --- values --------------------------------------------------------------------------------------
+
+
 _FORCES = {"drag_mean": "drag_n", "lateral_mean": "lateral_n", "vertical_mean": "vertical_n"}
 _PER_METRE = {
     "force_slide": "force_slide_n_m",
@@ -172,13 +175,13 @@ class Values:
 
     Attributes
     ----------
-    case : Case
+    case : CaseOfRun
     standings : tuple of Standing
     packings : int
         Number of packings (seeds) that the values are means of.
     """
 
-    case: Case
+    case: CaseOfRun
     standings: tuple[Standing, ...]
     packings: int = 1
 
@@ -223,13 +226,16 @@ class Values:
 
 
 def values_of(
-    case: Case, found: ProcessFindings, loading: Loading | None, extrapolated: Extrapolated | None
+    case: CaseOfRun,
+    found: ProcessFindings,
+    loading: Loading | None,
+    extrapolated: Extrapolated | None,
 ) -> Values:
     """The quantities of a process run.
 
     Parameters
     ----------
-    case : Case
+    case : CaseOfRun
     found : ProcessFindings
     loading : Loading or None
         Content of ``loading.json``, if it was made.
@@ -248,7 +254,10 @@ def values_of(
 
 
 def _own(
-    case: Case, found: ProcessFindings, loading: Loading | None, extrapolated: Extrapolated | None
+    case: CaseOfRun,
+    found: ProcessFindings,
+    loading: Loading | None,
+    extrapolated: Extrapolated | None,
 ) -> Iterator[tuple[str, Estimate]]:
     """The values of the run in simulated time, later ones instead of earlier ones."""
     yield "drag_std", Estimate(found.forces["drag_n"].std, math.nan, math.nan)

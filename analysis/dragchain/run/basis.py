@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import NamedTuple
 
-from dragchain.run.case import Case, Fidelity
 from dragchain.statistics.estimate import Estimate
+from dragdeck.records.case import CaseOfRun, FidelityOfRun
 
 _TIMES = "\N{MULTIPLICATION SIGN}"
 
@@ -138,7 +138,7 @@ class Standing:
 def judge(
     quantity: Quantity,
     own: Estimate,
-    case: Case,
+    case: CaseOfRun,
     correction: Correction | None,
     reliable: bool = True,
 ) -> Standing:
@@ -149,7 +149,7 @@ def judge(
     quantity : Quantity
     own : Estimate
         Value of the run, in simulated time.
-    case : Case
+    case : CaseOfRun
         A process run.
     correction : Correction or None
         What windows make of it; None if they do not give it.
@@ -174,7 +174,7 @@ def judge(
     return Standing(quantity, run, None, Basis.NONE, reason, reliable)
 
 
-def changed_settings(fidelity: Fidelity) -> dict[str, str]:
+def changed_settings(fidelity: FidelityOfRun) -> dict[str, str]:
     """The settings that are not those of the process, and what they were measured to give."""
     found = {}
     if fidelity.youngs_modulus_scale != 1.0:
@@ -186,13 +186,13 @@ def changed_settings(fidelity: Fidelity) -> dict[str, str]:
     return found
 
 
-def effects(fidelity: Fidelity) -> list[str]:
+def effects(fidelity: FidelityOfRun) -> list[str]:
     """A sentence on each of `changed_settings`."""
     changed = changed_settings(fidelity).items()
     return [f"{setting[0].upper()}{setting[1:]} gives {effect}." for setting, effect in changed]
 
 
-def _why_not(case: Case) -> str:
+def _why_not(case: CaseOfRun) -> str:
     if case.fidelity.speed_factor != 1.0:
         return "the effect of a higher speed is not measured"
     if case.marks:
@@ -200,12 +200,12 @@ def _why_not(case: Case) -> str:
     return "fidelity: {tolerance: 0.1} measures it at the physical modulus"
 
 
-def notes(case: Case) -> list[str]:
+def notes(case: CaseOfRun) -> list[str]:
     """What each setting of a process run does to its numbers, one sentence each."""
     return [*_of_modulus_and_speed(case), _of_step(case)]
 
 
-def _of_modulus_and_speed(case: Case) -> Iterator[str]:
+def _of_modulus_and_speed(case: CaseOfRun) -> Iterator[str]:
     scale, factor = case.fidelity.youngs_modulus_scale, case.fidelity.speed_factor
     if scale == 1.0:
         yield "Young's modulus is the physical one."
@@ -227,7 +227,7 @@ def _of_modulus_and_speed(case: Case) -> Iterator[str]:
         )
 
 
-def _of_step(case: Case) -> str:
+def _of_step(case: CaseOfRun) -> str:
     percent = f"{100 * case.fidelity.timestep_fraction:.3g} %"
     text = f"The time step is {percent} of the Rayleigh time"
     if case.unsafe_timestep:

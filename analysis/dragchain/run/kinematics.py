@@ -10,18 +10,19 @@ from pydantic import ValidationError
 
 from dragchain.arrays import Floats, Ints
 from dragchain.errors import TableError
-from dragchain.run.case import Case, Phase
+from dragdeck.records.case import CaseOfRun
+from dragdeck.records.run import Phase
 from dragdeck.study.driven import DrivenMotion
 from dragdeck.study.model import Motion
 from dragdeck.study.rotation import Rotation, about_vertical, rotated, wrap_angle
 
 
-def drag_start_s(case: Case) -> float:
+def drag_start_s(case: CaseOfRun) -> float:
     """The simulated time at which the drag begins, the zero of process time."""
     return drag_phase(case).start_step * case.timestep_s
 
 
-def process_time(simulated_s: Floats, case: Case) -> Floats:
+def process_time(simulated_s: Floats, case: CaseOfRun) -> Floats:
     """Process time of simulated times: from the start of the drag, at the speed of the process.
 
     A workpiece that is f times as fast takes 1/f of the time for the same path.
@@ -30,7 +31,7 @@ def process_time(simulated_s: Floats, case: Case) -> Floats:
     ----------
     simulated_s : (N,) ndarray
         Simulated times, s.
-    case : Case
+    case : CaseOfRun
         The case, of a process.
 
     Returns
@@ -79,14 +80,14 @@ def phase_codes(steps: Ints, phases: Sequence[Phase]) -> NDArray[np.int8]:
     return np.searchsorted(ends, steps, side="left").astype(np.int8)
 
 
-def counted_mask(steps: Ints, case: Case) -> NDArray[np.bool_]:
+def counted_mask(steps: Ints, case: CaseOfRun) -> NDArray[np.bool_]:
     """Mark the samples that statistics use: those of the drag, after the transient.
 
     Parameters
     ----------
     steps : (N,) ndarray of int
         Steps.
-    case : Case
+    case : CaseOfRun
         The case, of a process.
 
     Returns
@@ -101,7 +102,7 @@ def counted_mask(steps: Ints, case: Case) -> NDArray[np.bool_]:
     return (steps > drag.start_step) & (steps <= drag.end_step) & after
 
 
-def drag_phase(case: Case) -> Phase:
+def drag_phase(case: CaseOfRun) -> Phase:
     """The phase named ``drag``."""
     for phase in case.phases:
         if phase.name == "drag":
@@ -116,7 +117,7 @@ def needed(value: T | None, name: str) -> T:
     return value
 
 
-def motion_of(case: Case) -> DrivenMotion:
+def motion_of(case: CaseOfRun) -> DrivenMotion:
     """The motion of the workpiece in the drag, from the study's own fields.
 
     Raises
@@ -145,7 +146,7 @@ def motion_of(case: Case) -> DrivenMotion:
     return driven
 
 
-def _other_version(case: Case, problem: str) -> TableError:
+def _other_version(case: CaseOfRun, problem: str) -> TableError:
     return TableError(
         f"{case.run}: case.json is of another version of dragdeck ({problem}): "
         "render and run it again"
@@ -163,7 +164,7 @@ def _alike(one: Any, other: Any) -> bool:
     return bool(one == other)
 
 
-def directions(steps: Ints, ref_xy_m: Floats, case: Case) -> Floats:
+def directions(steps: Ints, ref_xy_m: Floats, case: CaseOfRun) -> Floats:
     """Direction of the workpiece's motion in the horizontal plane.
 
     In the drag that of its path; before it, the direction with which the drag starts.
@@ -174,7 +175,7 @@ def directions(steps: Ints, ref_xy_m: Floats, case: Case) -> Floats:
         Steps.
     ref_xy_m : (N, 2) ndarray
         Reference point of the workpiece at these steps, m.
-    case : Case
+    case : CaseOfRun
         The case, of a process.
 
     Returns
@@ -187,7 +188,7 @@ def directions(steps: Ints, ref_xy_m: Floats, case: Case) -> Floats:
     return np.where(since > 0, driven.directions(since, ref_xy_m), start)
 
 
-def workpiece_rotation(steps: Ints, direction_rad: Floats, case: Case) -> Rotation:
+def workpiece_rotation(steps: Ints, direction_rad: Floats, case: CaseOfRun) -> Rotation:
     """Orientations of the workpiece's own frame.
 
     Parameters
@@ -196,19 +197,19 @@ def workpiece_rotation(steps: Ints, direction_rad: Floats, case: Case) -> Rotati
         Steps.
     direction_rad : (N,) ndarray
         Direction of motion at these steps, rad.
-    case : Case
+    case : CaseOfRun
         The case, of a process.
     """
     since = steps - drag_phase(case).start_step
     return motion_of(case).rotation_along(since, direction_rad)
 
 
-def axis_speed(case: Case) -> float:
+def axis_speed(case: CaseOfRun) -> float:
     """Speed of the workpiece's axis relative to the bowl, the mean along its path, m/s."""
     return needed(case.motion, "motion").axis_speed_m_s
 
 
-def path_passed(time_s: Floats, case: Case) -> Floats:
+def path_passed(time_s: Floats, case: CaseOfRun) -> Floats:
     """Length of the path up to simulated times, (N,) in m, at the mean speed along it."""
     elapsed, begin = time_s - drag_start_s(case), motion_of(case).drive.begin
     if begin.steps:
@@ -216,17 +217,17 @@ def path_passed(time_s: Floats, case: Case) -> Floats:
     return np.asarray(elapsed * axis_speed(case))
 
 
-def surface_speed(case: Case) -> float:
+def surface_speed(case: CaseOfRun) -> float:
     """Highest speed of the workpiece's surface in the drag, m/s: of its axis, and what is added."""
     return axis_speed(case) * (1.0 + case.numbers.get("superposed_speed", 0.0))
 
 
-def spins(case: Case) -> bool:
+def spins(case: CaseOfRun) -> bool:
     """Whether the workpiece turns in the frame of its path."""
     return motion_of(case).turns
 
 
-def workpiece_velocity(steps: Ints, point_m: Floats, ref_m: Floats, case: Case) -> Floats:
+def workpiece_velocity(steps: Ints, point_m: Floats, ref_m: Floats, case: CaseOfRun) -> Floats:
     """Velocity of points that are fixed to the workpiece, in the drag.
 
     Parameters
@@ -237,7 +238,7 @@ def workpiece_velocity(steps: Ints, point_m: Floats, ref_m: Floats, case: Case) 
         The points at these steps, m.
     ref_m : (N, 3) ndarray
         Reference point of the workpiece at these steps, m.
-    case : Case
+    case : CaseOfRun
         The case, of a process.
 
     Returns
@@ -252,7 +253,7 @@ def workpiece_velocity(steps: Ints, point_m: Floats, ref_m: Floats, case: Case) 
     return np.where(dragged[:, None], velocity, np.nan)
 
 
-def bowl_velocity(point_m: Floats, case: Case) -> Floats:
+def bowl_velocity(point_m: Floats, case: CaseOfRun) -> Floats:
     """Velocity of (N, 3) points that are fixed to the bowl, (N, 3) in m/s."""
     return about_vertical(motion_of(case).bowl_rad_s, point_m)
 

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 from dragchain.errors import TableError
-from dragchain.run.case import Reference
 from dragchain.statistics.estimate import Estimate
+from dragdeck.study.reference import Reference
 
 
 @dataclass(frozen=True)

@@ -11,20 +11,20 @@ from pathlib import Path
 
 import numpy as np
 
-from dragchain.run.case import Output
+from dragdeck.decks.outputs import OutputOfRun
 from dragdeck.dumps.frame import Columns, Frame
 from dragdeck.dumps.reader import read_frames, read_prints
 from dragdeck.errors import DumpError, TruncatedDumpError
 
 
-def part_files(run_dir: Path | str, output: Output) -> list[Path]:
+def part_files(run_dir: Path | str, output: OutputOfRun) -> list[Path]:
     """Files of an output in the order of their part numbers.
 
     Parameters
     ----------
     run_dir : Path or str
         The run folder.
-    output : Output
+    output : OutputOfRun
         The output.
 
     Returns
@@ -50,14 +50,14 @@ def part_files(run_dir: Path | str, output: Output) -> list[Path]:
     return [file for _, file in parts]
 
 
-def iter_frames(run_dir: Path | str, output: Output) -> Iterator[Frame]:
+def iter_frames(run_dir: Path | str, output: OutputOfRun) -> Iterator[Frame]:
     """Read the frames of a ``dump custom`` or ``dump local`` of a run, its parts merged.
 
     Parameters
     ----------
     run_dir : Path or str
         The run folder.
-    output : Output
+    output : OutputOfRun
         The output, of kind ``custom`` or ``local``.
 
     Yields
@@ -81,14 +81,14 @@ def iter_frames(run_dir: Path | str, output: Output) -> Iterator[Frame]:
     return (Frame(piece.first, piece.columns, piece.opening) for piece in pieces)
 
 
-def iter_prints(run_dir: Path | str, output: Output) -> Iterator[Columns]:
+def iter_prints(run_dir: Path | str, output: OutputOfRun) -> Iterator[Columns]:
     """Read blocks of rows of a ``fix print`` output of a run, its parts merged.
 
     Parameters
     ----------
     run_dir : Path or str
         The run folder.
-    output : Output
+    output : OutputOfRun
         The output, of kind ``print``.
 
     Yields
@@ -135,7 +135,7 @@ _Reader = Callable[[Path], Iterator[_Piece]]
 class _Schedule:
     """The steps at which an output must have frames."""
 
-    def __init__(self, run_dir: Path | str, output: Output) -> None:
+    def __init__(self, run_dir: Path | str, output: OutputOfRun) -> None:
         self.output = output
         self.file = Path(run_dir) / output.pattern
         self.next = output.first_step
@@ -174,7 +174,7 @@ class _Schedule:
         )
 
 
-def _merged(run_dir: Path | str, output: Output, read: _Reader) -> Iterator[_Piece]:
+def _merged(run_dir: Path | str, output: OutputOfRun, read: _Reader) -> Iterator[_Piece]:
     files = part_files(run_dir, output)
     limits = _limits([None, *(_first_step(file, read) for file in files[1:])])
     schedule = _Schedule(run_dir, output)

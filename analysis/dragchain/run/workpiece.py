@@ -8,12 +8,12 @@ import numpy as np
 
 from dragchain.arrays import Floats
 from dragchain.errors import TableError
-from dragchain.run.case import Case
 from dragchain.run.kinematics import needed
+from dragdeck.records.case import CaseOfRun
 from dragdeck.study.rotation import Rotation, rotated
 
 
-def workpiece_mesh(run_dir: Path, case: Case) -> Any:
+def workpiece_mesh(run_dir: Path, case: CaseOfRun) -> Any:
     """Read the workpiece's mesh, as it lies in its file.
 
     Raises
@@ -28,7 +28,7 @@ def workpiece_mesh(run_dir: Path, case: Case) -> Any:
     return pv.read(file)
 
 
-def _mesh_file(run_dir: Path, case: Case) -> Path:
+def _mesh_file(run_dir: Path, case: CaseOfRun) -> Path:
     file = run_dir / needed(case.workpiece, "workpiece").mesh
     if not file.is_file():
         raise TableError(
@@ -80,7 +80,7 @@ class Surface:
         return np.asarray(np.cross(second - first, third - first))
 
 
-def read_surface(run_dir: Path, case: Case) -> Surface:
+def read_surface(run_dir: Path, case: CaseOfRun) -> Surface:
     """Read the workpiece's mesh into its own frame.
 
     The STL file of a user's mesh looks along +x as it is; a cylinder is put into

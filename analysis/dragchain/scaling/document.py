@@ -5,10 +5,10 @@ from typing import Literal, NamedTuple
 
 from pydantic import Field
 
-from dragchain.run.case import Fidelity
 from dragchain.statistics.estimate import CONFIDENCE, Estimate, Verdict
 from dragchain.statistics.power_law import TwoTerms
 from dragdeck.documents import Document, Part
+from dragdeck.records.case import FidelityOfRun
 
 Judged = Literal[Verdict, "no expectation"]
 
@@ -244,7 +244,7 @@ class ScalingFile(Document):
     local_exponents: tuple[Estimate, ...]
     runs: tuple[ScaledRun, ...]
     scene: Mapping[str, float]
-    fidelity: Fidelity
+    fidelity: FidelityOfRun
     versions: Mapping[str, str]
     commands: tuple[str, ...]
     started: str | None

@@ -17,8 +17,6 @@ from dragchain.errors import TableError
 from dragchain.figures.panels import legend_below, log_ticks, new_panels
 from dragchain.figures.style import BLUE, GREEN, INK, ORANGE, WIDTH_IN, drawing, png
 from dragchain.report.page import page_environment
-from dragchain.run.case import Case, load_case
-from dragchain.run.completeness import RunRecord
 from dragchain.run.kinematics import motion_of, needed
 from dragchain.scaling.document import (
     BandPoint,
@@ -34,6 +32,8 @@ from dragchain.statistics import power_law
 from dragchain.statistics.estimate import Estimate, flattened
 from dragchain.statistics.power_law import fit_shifted, fit_two_terms
 from dragdeck.files import write_bytes, write_text
+from dragdeck.records.case import CaseOfRun, load_case
+from dragdeck.records.run import RunRecord
 from dragdeck.study.paths.circle import CirclePath
 
 _STORED = Path(__file__).parent / "data"
@@ -58,7 +58,7 @@ class RunOfScaling:
     """One run of a scaling: its row in ``scaling.json``, and its case."""
 
     row: ScaledRun
-    case: Case
+    case: CaseOfRun
 
     @property
     def gap_particles(self) -> float | None:
@@ -115,7 +115,7 @@ def _read_run(folder: Path, field: str) -> RunOfScaling:
     return RunOfScaling(row, case)
 
 
-def _check_alike(cases: Sequence[Case], field: str) -> None:
+def _check_alike(cases: Sequence[CaseOfRun], field: str) -> None:
     first, *others = cases
     wanted = {**first.inputs, "fidelity": first.fidelity}
     for case in others:

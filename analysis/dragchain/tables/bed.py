@@ -4,10 +4,10 @@ import numpy as np
 
 from dragchain.arrays import Floats
 from dragchain.errors import TableError
-from dragchain.run.case import Case
 from dragchain.run.kinematics import needed
 from dragdeck.documents import Document
 from dragdeck.dumps.frame import Frame
+from dragdeck.records.case import CaseOfRun
 
 
 class Packing(Document):
@@ -43,14 +43,14 @@ class Packing(Document):
     kinetic_energy_ratio: float
 
 
-def describe_bed(particles: Frame, case: Case) -> Packing:
+def describe_bed(particles: Frame, case: CaseOfRun) -> Packing:
     """Describe a settled bed.
 
     Parameters
     ----------
     particles : Frame
         The last frame of ``particles``, N particles.
-    case : Case
+    case : CaseOfRun
         The case of the fill.
 
     Raises

@@ -10,12 +10,14 @@ import pandas as pd
 
 from dragchain.arrays import Floats
 from dragchain.errors import TableError
-from dragchain.run.case import Case, Output, friction_with, load_case, load_outputs
+from dragchain.run.case import friction_with
 from dragchain.run.kinematics import needed, workpiece_rotation
 from dragchain.run.run_parts import iter_frames, iter_prints
 from dragchain.tables.by_step import read_table
 from dragchain.tables.workpiece_contacts import Meshes, WorkpieceFrames, join_workpiece_frames
+from dragdeck.decks.outputs import OutputOfRun, load_outputs
 from dragdeck.dumps.frame import Columns, Frame
+from dragdeck.records.case import CaseOfRun, load_case
 from dragdeck.study.rotation import Rotation
 
 _BATCH_ROWS = 8192
@@ -55,15 +57,15 @@ class Run:
     ----------
     folder : Path
         The run folder.
-    case : Case
+    case : CaseOfRun
         What the run models.
-    outputs : mapping of str to Output
+    outputs : mapping of str to OutputOfRun
         The raw outputs that it wrote.
     """
 
     folder: Path
-    case: Case
-    outputs: Mapping[str, Output]
+    case: CaseOfRun
+    outputs: Mapping[str, OutputOfRun]
 
     @classmethod
     def open(cls, run_dir: Path | str) -> "Run":
@@ -125,13 +127,16 @@ class Run:
             yield _joined(batch)
 
 
+# --- place of the workpiece ----------------------------------------------------------------------
+
+
 WorkpiecePlaces = Callable[[int], tuple[Floats, Rotation]]
 
 WORKPIECE_COLUMNS = ("step", "ref_x_m", "ref_y_m", "ref_z_m", "direction_rad")
 """Columns of ``workpiece_force.parquet`` that say where the workpiece is."""
 
 
-def workpiece_places(run_dir: Path, case: Case) -> WorkpiecePlaces:
+def workpiece_places(run_dir: Path, case: CaseOfRun) -> WorkpiecePlaces:
     """A function of a step: the workpiece's reference point in m, and its orientation.
 
     Raises
@@ -143,7 +148,7 @@ def workpiece_places(run_dir: Path, case: Case) -> WorkpiecePlaces:
     return lambda step: workpiece_place(workpiece, step, case)
 
 
-def workpiece_place(workpiece: pd.DataFrame, step: int, case: Case) -> tuple[Floats, Rotation]:
+def workpiece_place(workpiece: pd.DataFrame, step: int, case: CaseOfRun) -> tuple[Floats, Rotation]:
     """The workpiece's reference point at a step in m, (3,), and its orientation.
 
     Parameters
@@ -153,7 +158,7 @@ def workpiece_place(workpiece: pd.DataFrame, step: int, case: Case) -> tuple[Flo
         least.
     step : int
         The step.
-    case : Case
+    case : CaseOfRun
         The case, of a process.
     """
     return _reference_point(workpiece, step), _workpiece_rotation(workpiece, step, case)
@@ -166,7 +171,7 @@ def _reference_point(workpiece: pd.DataFrame, step: int) -> Floats:
     return np.array([np.interp(step, at, column) for column in point.T])
 
 
-def _workpiece_rotation(workpiece: pd.DataFrame, step: int, case: Case) -> Rotation:
+def _workpiece_rotation(workpiece: pd.DataFrame, step: int, case: CaseOfRun) -> Rotation:
     """The workpiece's orientation at a step, its direction of motion that of the nearest sample."""
     nearest = [int(np.abs(workpiece["step"].to_numpy(np.int64) - step).argmin())]
     direction = workpiece["direction_rad"].to_numpy(np.float64)[nearest]

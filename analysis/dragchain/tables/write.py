@@ -11,7 +11,7 @@ import pyarrow as pa
 
 from dragchain.arrays import Floats, Ints
 from dragchain.errors import TableError
-from dragchain.run.case import Case, Scene, friction_with
+from dragchain.run.case import friction_with
 from dragchain.run.kinematics import (
     counted_mask,
     directions,
@@ -49,6 +49,7 @@ from dragchain.tables.run_folder import Run
 from dragchain.tables.workpiece_contacts import WallContacts
 from dragdeck.dumps.frame import Columns
 from dragdeck.errors import RejectedRunError
+from dragdeck.records.case import CaseOfRun
 from dragdeck.study.rotation import wrap_angle
 
 
@@ -119,7 +120,7 @@ def _write_workpiece_force(run: Run, file: Path) -> None:
     _write_all(file, WORKPIECE_FORCE + (BODY if spins(run.case) else ()), rows)
 
 
-def workpiece_force_rows(rows: Columns, case: Case) -> Rows:
+def workpiece_force_rows(rows: Columns, case: CaseOfRun) -> Rows:
     """Add phase, path frame, body frame and ``in_statistics`` to raw samples of the force."""
     steps = np.asarray(rows["step"], dtype=np.int64)
     heading = directions(steps, np.column_stack([rows["ref_x_m"], rows["ref_y_m"]]), case)
@@ -141,7 +142,7 @@ def workpiece_force_rows(rows: Columns, case: Case) -> Rows:
     }
 
 
-def _phases(steps: Ints, case: Case) -> pa.Array:
+def _phases(steps: Ints, case: CaseOfRun) -> pa.Array:
     return category(phase_codes(steps, case.phases), tuple(phase.name for phase in case.phases))
 
 
@@ -207,7 +208,7 @@ class WorkpieceSamples:
 
 
 def _write_workpiece_contacts(run: Run, file: Path) -> None:
-    shared = needed(run.case.bowl, "bowl").walls == "mesh"
+    shared = run.case.bowl.walls == "mesh"
     closure = Closure(limit=SHARED_LIMIT if shared else LIMIT)
     samples = WorkpieceSamples(run.prints("workpiece_force"))
     with table_writer(file, WORKPIECE_CONTACTS) as table:
@@ -227,7 +228,7 @@ def _write_workpiece_contacts(run: Run, file: Path) -> None:
 
 
 def workpiece_contact_rows(
-    steps: Ints, contacts: WallContacts, references: Floats, case: Case
+    steps: Ints, contacts: WallContacts, references: Floats, case: CaseOfRun
 ) -> dict[str, Any]:
     """Rows of ``workpiece_contacts.parquet``.
 
@@ -239,7 +240,7 @@ def workpiece_contact_rows(
         N contacts on the workpiece.
     references : (N, 3) ndarray
         Place of the workpiece's reference point at each contact's step, m.
-    case : Case
+    case : CaseOfRun
         The case, of a process.
 
     Returns
@@ -288,7 +289,7 @@ def _write_particles(run: Run, file: Path) -> None:
 
 
 def _write_contacts(run: Run, file: Path) -> None:
-    bowl_radius = needed(run.case.bowl, "bowl").radius_m
+    bowl_radius = run.case.bowl.radius_m
     particles, pairs = run.frames("particles"), run.workpiece_pairs()
     friction, corrected = friction_with(run.case, "media"), np.zeros(8)
     with table_writer(file, CONTACTS) as table:
@@ -321,7 +322,7 @@ def _frame_at(frames: Iterator[F], step: int, name: str) -> F:
     return frame
 
 
-def _contact_columns(step: int, rows: ContactRows, case: Case) -> Rows:
+def _contact_columns(step: int, rows: ContactRows, case: CaseOfRun) -> Rows:
     steps = np.full(len(rows.kind), step)
     return {
         "step": steps,
@@ -360,7 +361,7 @@ _THERMO = Table("thermo.parquet", ("thermo",), _write_thermo)
 _PARTICLES = Table("particles.parquet", ("particles",), _write_particles)
 _ON_WORKPIECE = ("workpiece_particles", "workpiece_contacts")
 
-_TABLES: Mapping[Scene, tuple[Table, ...]] = {
+_TABLES: Mapping[str, tuple[Table, ...]] = {
     "drop_test": (_THERMO, Table("impacts.parquet", ("impacts",), _write_impacts)),
     "filling": (_THERMO, _PARTICLES, Table("packing.json", ("particles",), _write_packing)),
     "process": (

@@ -13,8 +13,7 @@ from dragchain.statistics.estimate import Estimate, finite, student_quantile
 from dragchain.tradeoff.compare import OTHER, Error, QuantityComparison, Setting
 from dragchain.tradeoff.measures import MAIN
 from dragchain.tradeoff.outcome import StepCosts, Tradeoff
-from dragchain.tradeoff.tradeoff_document import CostEntry
-from dragdeck.documents import Document, Part
+from dragdeck.records.tradeoff import CostEntry, CostsFile
 
 RUINED = 0.1
 """A significant error above this ruins a quantity; a bound below it keeps it."""
@@ -209,25 +208,11 @@ def _gain(
     return Gain(setting, base, factors, speed_up(tradeoff, setting, base), errors, product)
 
 
+# --- what is left out ----------------------------------------------------------------------------
+
+
 _PLAIN = ("plain_full", "plain")
 """Names of the cost of the plain deck, that at full stiffness first."""
-
-
-class StandardFidelity(Part):
-    """Settings of the deck that the process entries were compared with."""
-
-    youngs_modulus_scale: float
-    timestep_fraction: float
-    speed_factor: float = 1.0
-
-
-class CostsFile(Document):
-    """What is read of ``costs.json``."""
-
-    remedy = "make it with: python benchmarks/costs"
-
-    fidelity: StandardFidelity | None = None
-    costs: tuple[CostEntry, ...]
 
 
 @dataclass(frozen=True)

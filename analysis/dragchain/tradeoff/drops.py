@@ -9,9 +9,10 @@ from pydantic import JsonValue
 
 from dragchain.arrays import Floats
 from dragchain.errors import TableError
-from dragchain.run.case import changed_inputs, load_case
-from dragchain.run.completeness import RunRecord
+from dragchain.run.case import changed_inputs
 from dragchain.tables.by_step import read_table
+from dragdeck.records.case import load_case
+from dragdeck.records.run import RunRecord
 
 
 @dataclass(frozen=True)

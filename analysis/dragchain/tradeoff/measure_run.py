@@ -14,27 +14,28 @@ from dragchain.errors import TableError
 from dragchain.loading.contact_events import Thresholds
 from dragchain.loading.samples import Sampled, sample
 from dragchain.network.write import write_chains
-from dragchain.run.case import Case, load_case, load_outputs
-from dragchain.run.completeness import RunRecord
 from dragchain.run.kinematics import drag_phase, needed
 from dragchain.statistics.estimate import finite
 from dragchain.tables.bed import Packing
 from dragchain.tables.by_step import read_groups, read_table
 from dragchain.tables.write import write_tables
 from dragchain.tradeoff.measures import FILE, Measures, PathQuantities, RunCost
+from dragdeck.decks.outputs import load_outputs
+from dragdeck.records.case import CaseOfRun, load_case
+from dragdeck.records.run import RunRecord
 
 MAP_DEPTHS, MAP_AZIMUTHS = 4, 12
 """Bins of a load map: equal parts of the immersion depth, and of the circumference."""
 
 
-def loading_along(run_dir: Path, case: Case, blocks: int) -> tuple[dict[str, Floats], Floats]:
+def loading_along(run_dir: Path, case: CaseOfRun, blocks: int) -> tuple[dict[str, Floats], Floats]:
     """Quantities of loading in each block of the path, and the load map.
 
     Parameters
     ----------
     run_dir : Path
         With the tables of a complete run.
-    case : Case
+    case : CaseOfRun
     blocks : int
         Number of equal blocks B of the counted path.
 
@@ -84,6 +85,10 @@ def _load_map(counted: Sampled, depth_m: float) -> Floats:
 LONG_WAVE, SHORT_WAVE = 2.0, 0.25
 """Wave lengths in mean particle diameters that part the spectrum of the drag in three bands."""
 
+
+# --- blocks of the path --------------------------------------------------------------------------
+
+
 FORCE_BINS = np.logspace(-5.0, 2.0, 71)
 """Edges of the histogram of normal forces on the workpiece, N."""
 
@@ -103,7 +108,7 @@ class CountedPath:
     blocks: int
 
     @classmethod
-    def of(cls, case: Case, counted_steps: Ints) -> "CountedPath":
+    def of(cls, case: CaseOfRun, counted_steps: Ints) -> "CountedPath":
         """The path of a process, from the steps at which its force is counted, (N,)."""
         motion = case.motion
         assert motion is not None
@@ -151,7 +156,7 @@ class CountedPath:
             yield last, np.concatenate(held)
 
 
-def quantities_along(run_dir: Path, case: Case) -> PathQuantities:
+def quantities_along(run_dir: Path, case: CaseOfRun) -> PathQuantities:
     """The quantities of a complete run with tables and chains."""
     force = read_counted(run_dir, ("step", "drag_n", "lateral_n", "vertical_n"))
     path = CountedPath.of(case, force["step"].to_numpy(np.int64))
@@ -321,6 +326,9 @@ def _of_chains(chains: pd.DataFrame, frames: Ints, path: CountedPath) -> dict[st
     }
 
 
+# --- measures ------------------------------------------------------------------------------------
+
+
 def write_measures(run_dir: Path, packing_table: Path) -> Measures:
     """Measure a run of a trade-off and write ``measures.json``.
 
@@ -366,13 +374,13 @@ def write_measures(run_dir: Path, packing_table: Path) -> Measures:
     return measures
 
 
-def with_quantities(measures: Measures, run_dir: Path, case: Case, bed: Packing) -> Measures:
+def with_quantities(measures: Measures, run_dir: Path, case: CaseOfRun, bed: Packing) -> Measures:
     """The measures of a complete run with its quantities, from its tables."""
     single = {"bed_height": bed.bed_height_m, "solid_fraction": bed.solid_fraction}
     return measures.model_copy(update={**dict(quantities_along(run_dir, case)), "single": single})
 
 
-def _cost(case: Case, outcome: RunRecord) -> RunCost:
+def _cost(case: CaseOfRun, outcome: RunRecord) -> RunCost:
     """What a run cost; a run without its processor time counts its wall time on every rank."""
     assert case.motion is not None
     speed = case.motion.axis_speed_m_s

@@ -12,9 +12,9 @@ import numpy as np
 from pydantic import JsonValue
 
 from dragchain.arrays import Floats
-from dragchain.run.case import Fidelity
-from dragchain.run.completeness import AcceptanceCheck
 from dragdeck.documents import Document, Part
+from dragdeck.records.case import FidelityOfRun
+from dragdeck.records.run import AcceptanceCheck
 
 
 @dataclass(frozen=True)
@@ -124,6 +124,9 @@ MAIN = tuple(quantity.name for quantity in QUANTITIES if quantity.short)
 """The quantities that figures and the tables of settings show."""
 
 
+# --- measures of a run ---------------------------------------------------------------------------
+
+
 FILE = "measures.json"
 
 _TELLING_CHECKS = ("within_limits", "no_engine_error")
@@ -219,7 +222,7 @@ class Measures(PathQuantities, Document):
     run: str
     bed: str | None
     inputs: Mapping[str, JsonValue]
-    fidelity: Fidelity
+    fidelity: FidelityOfRun
     numbers: Mapping[str, float] = {}
     complete: bool
     cost: RunCost

@@ -11,7 +11,7 @@ from dragchain.tradeoff.changes import Costs
 from dragchain.tradeoff.compare import Setting
 from dragchain.tradeoff.drops import ComparedDrop
 from dragchain.tradeoff.outcome import Tradeoff, breaks
-from dragchain.tradeoff.tradeoff_document import (
+from dragdeck.records.tradeoff import (
     DropEntry,
     ErrorEntry,
     FidelityParameters,

@@ -11,11 +11,11 @@ from dragchain.report.values import (
     Need,
     Reached,
 )
-from dragchain.run.case import Case, load_case
 from dragchain.statistics.estimate import Estimate
 from dragchain.tradeoff.measure_run import quantities_along
 from dragchain.tradeoff.measures import QUANTITIES
 from dragchain.windows.estimate import UNKNOWN, Round, WindowsRecord, of_one_run
+from dragdeck.records.case import CaseOfRun, load_case
 
 
 def extrapolate_run(run_dir: Path, record: Path, round_file: Path | None = None) -> None:
@@ -44,7 +44,7 @@ def extrapolate_run(run_dir: Path, record: Path, round_file: Path | None = None)
     found.write(run_dir / EXTRAPOLATED)
 
 
-def _alone(run_dir: Path, case: Case, record: WindowsRecord) -> Extrapolated:
+def _alone(run_dir: Path, case: CaseOfRun, record: WindowsRecord) -> Extrapolated:
     """The quantities of a run without windows."""
     quantities = tuple(_quantities(run_dir, case, record))
     asked = case.asked
@@ -68,7 +68,9 @@ def _alone(run_dir: Path, case: Case, record: WindowsRecord) -> Extrapolated:
     )
 
 
-def _quantities(run_dir: Path, case: Case, record: WindowsRecord) -> Iterator[ExtrapolatedQuantity]:
+def _quantities(
+    run_dir: Path, case: CaseOfRun, record: WindowsRecord
+) -> Iterator[ExtrapolatedQuantity]:
     along = quantities_along(run_dir, case)
     values = along.values()
     for one in QUANTITIES:

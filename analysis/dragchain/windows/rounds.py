@@ -10,8 +10,6 @@ from dragchain.arrays import Floats
 from dragchain.errors import TableError
 from dragchain.network.write import write_chains
 from dragchain.report.values import LoadMap, Need
-from dragchain.run.case import load_case
-from dragchain.run.completeness import RunRecord
 from dragchain.statistics.estimate import Estimate
 from dragchain.tables.by_step import read_table
 from dragchain.tables.write import write_tables
@@ -24,10 +22,12 @@ from dragchain.windows.estimate import (
     WindowedQuantity,
     WindowOfRun,
     WindowsRecord,
+    corrected_map,
     joined,
     windows_needed,
 )
-from dragchain.windows.load_map import corrected
+from dragdeck.records.case import load_case
+from dragdeck.records.run import RunRecord
 
 _FEWEST = 2
 """Windows of which one alone says nothing of its scatter."""
@@ -134,7 +134,7 @@ def _load_map(
 ) -> LoadMap | None:
     total = next((one.value for one in rows if one.name == "normal_load"), _NONE)
     runs = soft.arc_m / windows[0].arc_m if windows else math.nan
-    return corrected(soft.load_map, [one.load_map for one in windows], total, runs)
+    return corrected_map(soft.load_map, [one.load_map for one in windows], total, runs)
 
 
 def _joined(

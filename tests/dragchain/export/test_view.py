@@ -23,8 +23,8 @@ from tiny_run_files import BOWL_RADIUS_M, LAST, TIMESTEP_S, workpiece_x_m
 from dragchain.export import paraview as paraview_export
 from dragchain.export.paraview import View
 from dragchain.export.write import write_export
-from dragchain.run.case import load_case
 from dragchain.run.workpiece import read_surface
+from dragdeck.records.case import load_case
 
 PACKAGED = Path(paraview_export.__file__).with_name("view.py")
 HOSTILE = "'\"}}; import os; os._exit(7) #\\"

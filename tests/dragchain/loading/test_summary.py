@@ -34,11 +34,11 @@ from dragchain.loading.document import FILE, Loading
 from dragchain.loading.figure import averaged_load
 from dragchain.loading.samples import sample
 from dragchain.loading.write import compute_loading, write_loading
-from dragchain.run.case import load_case
 from dragchain.run.kinematics import workpiece_velocity
 from dragchain.run.workpiece import Surface, off_facet, read_surface
 from dragchain.tables.workpiece_contacts import WallContacts
 from dragchain.tables.write import workpiece_contact_rows
+from dragdeck.records.case import load_case
 from dragdeck.study.rotation import rotated
 
 

@@ -43,9 +43,10 @@ from dragchain.report.run_figures import (
     forces,
     write_figures,
 )
-from dragchain.run.case import Case, PublishedDrag, Reference, load_case
 from dragchain.run.reference import reference_drags
 from dragchain.statistics.estimate import Estimate
+from dragdeck.records.case import CaseOfRun, load_case
+from dragdeck.study.reference import Drag, Reference
 from dragdeck.study.rotation import Rotation
 
 pytestmark = pytest.mark.slow  # its data take seconds to make
@@ -94,7 +95,7 @@ def test_a_frame_without_a_path_has_no_bottleneck() -> None:
 
 
 def reference(**drag: float) -> Reference:
-    return Reference(source="x", experiment=PublishedDrag(**drag))
+    return Reference(source="x", experiment=Drag(**drag))
 
 
 def test_comparison_is_relative_to_the_reference() -> None:
@@ -187,7 +188,7 @@ def test_times_of_a_faster_run_are_those_of_the_process(process: Path) -> None:
     case = load_case(process)
     fidelity = case.fidelity.model_copy(update={"speed_factor": 5.0})
     data = case.model_copy(update={"fidelity": fidelity}).model_dump()
-    fast = Case.model_validate(with_motion(data, **line(0.1, start_m=[-0.01, 0.0])))
+    fast = CaseOfRun.model_validate(with_motion(data, **line(0.1, start_m=[-0.01, 0.0])))
     slow, quick = (process_findings(RunData(process, one)) for one in (case, fast))
     for name in ("process_time_s", "separation_s"):
         ours, theirs = (np.array(getattr(found.peaks, name)) for found in (quick, slow))
@@ -239,7 +240,7 @@ def test_a_rendered_contact_is_where_its_axes_say(
     assert min(pixel(image, extent, 5.0, level_mm + 1.5)) > 200
 
 
-def widened(case: Case, radius_m: float) -> Case:
+def widened(case: CaseOfRun, radius_m: float) -> CaseOfRun:
     assert case.bowl is not None
     return changed(case, bowl=changed(case.bowl, radius_m=radius_m))
 
@@ -334,7 +335,7 @@ def test_a_filling_is_drawn_from_its_thermo_table(filling: Path) -> None:
 
 
 def test_energy_ratio_of_particles_that_fell_their_diameter_is_one(filling: Path) -> None:
-    case: Case = load_case(filling)
+    case: CaseOfRun = load_case(filling)
     mass = 2500.0 * 4 / 3 * math.pi * R**3
     ratio = energy_ratio(np.array([2 * mass * 10.0 * 2 * R]), np.array([2.0]), case)
     assert ratio == pytest.approx([1.0])

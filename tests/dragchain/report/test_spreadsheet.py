@@ -11,7 +11,7 @@ from report_files import PICTURES, case_json, make_run, process_findings, write_
 
 from dragchain.report.cases import cases_of, read_study_runs
 from dragchain.report.spreadsheet import definitions, summary_workbook, workbook
-from dragchain.run.case import Assumption
+from dragdeck.records.case import AssumptionOfRun
 
 FORMULAE = ["=1+1", "+1", "-1", "@SUM(A1)", "{=1}", "https://example.org", "=cmd|' /C calc'!A0"]
 
@@ -69,7 +69,7 @@ def test_a_column_that_nobody_describes_has_no_meaning() -> None:
 
 def test_the_sheets_say_what_there_is(tmp_path: Path) -> None:
     table = pd.DataFrame({"case": ["=a", "b"], "drag_mean_n": [-2.5, math.nan]})
-    assumed = {"run-1": [Assumption(field="bowl.radius_m", value=0.04, why="+plausible")]}
+    assumed = {"run-1": [AssumptionOfRun(field="bowl.radius_m", value=0.04, why="+plausible")]}
     folder = make_run(
         tmp_path, case_json("process", "workpiece-1"), process_findings(-2.5), PICTURES
     )

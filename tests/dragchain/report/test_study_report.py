@@ -31,8 +31,8 @@ from dragchain.report.findings import FIGURES, FILE
 from dragchain.report.study_report import write_study_report
 from dragchain.report.summary import input_column, main_numbers
 from dragchain.report.values import Need
-from dragchain.run.completeness import RunRecord, refusal
 from dragchain.tables.network_contacts import Corrections
+from dragdeck.records.run import RunRecord, refusal
 
 
 @pytest.fixture

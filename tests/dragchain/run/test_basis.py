@@ -7,8 +7,8 @@ import pytest
 from report_files import case_json
 
 from dragchain.run.basis import QUANTITIES, Basis, Correction, Quantity, judge, notes
-from dragchain.run.case import Case
 from dragchain.statistics.estimate import Estimate
+from dragdeck.records.case import CaseOfRun
 
 OWN = Estimate(10.0, 8.0, 12.0)
 WINDOWS = Correction(Estimate(0.8, 0.6, 1.0), 5)
@@ -18,10 +18,10 @@ IMPULSE = Quantity("impulse", "impulse", "N s", time=1, robust=True)
 RATE = Quantity("rate", "rate", "1/s", time=-1, robust=True)
 
 
-def case(scale: float = 1.0, factor: float = 1.0, **more: Any) -> Case:
+def case(scale: float = 1.0, factor: float = 1.0, **more: Any) -> CaseOfRun:
     data = case_json("process", "run-1", **more)
     data["fidelity"] |= {"youngs_modulus_scale": scale, "speed_factor": factor}
-    return Case.model_validate(data)
+    return CaseOfRun.model_validate(data)
 
 
 @pytest.mark.parametrize(

@@ -6,8 +6,9 @@ import pytest
 from made_run import with_motion
 
 from dragchain import DocumentError, TableError, load_case, load_outputs
-from dragchain.run.case import Statistics, changed_inputs
+from dragchain.run.case import changed_inputs
 from dragchain.run.kinematics import motion_of
+from dragdeck.records.case import StatisticsOfRun
 from dragdeck.study.paths.circle import CirclePath
 
 
@@ -16,9 +17,8 @@ def test_reads_a_process(tiny_run: Path) -> None:
     assert (case.scene, case.case, case.statistics) == (
         "process",
         "tiny",
-        Statistics(transient_s=0.02),
+        StatisticsOfRun(transient_s=0.02),
     )
-    assert case.bowl is not None
     assert case.bowl.radius_m == 0.04
     assert case.motion is not None
     assert (case.motion.kind, case.motion.start_direction_rad) == ("line", 0.0)
@@ -48,15 +48,15 @@ def test_a_motion_that_this_version_makes_otherwise_is_refused(tiny_run: Path, e
         motion_of(load_case(tiny_run))
 
 
-def test_a_drop_needs_neither_bowl_nor_workpiece(tiny_run: Path, edit_json) -> None:
+def test_a_drop_has_no_workpiece(tiny_run: Path, edit_json) -> None:
     def to_drop(case):
-        for key in ("case", "bowl", "workpiece", "motion", "surface_m", "statistics"):
+        for key in ("case", "workpiece", "motion", "surface_m", "statistics"):
             del case[key]
         case.update(scene="drop_test", restitution=0.68)
 
     edit_json(tiny_run / "case.json", to_drop)
     case = load_case(tiny_run)
-    assert (case.bowl, case.workpiece, case.restitution) == (None, None, 0.68)
+    assert (case.workpiece, case.restitution) == (None, 0.68)
 
 
 @pytest.mark.parametrize(
@@ -68,7 +68,7 @@ def test_a_drop_needs_neither_bowl_nor_workpiece(tiny_run: Path, edit_json) -> N
         ),
         (
             lambda c: c.update(scene="stir"),
-            r"scene: Input should be 'drop_test', 'filling'",
+            r"scene: the scene is not one of a study\n  value:  stir",
         ),
         (
             lambda c: c["bowl"].pop("radius_m"),
@@ -90,7 +90,7 @@ def test_a_drop_needs_neither_bowl_nor_workpiece(tiny_run: Path, edit_json) -> N
             lambda c: c["media"].update(count=4.5),
             r"media\.count: Input should be a valid integer",
         ),
-        (lambda c: c.update(workpiece=None), "workpiece is missing, which a process has"),
+        (lambda c: c.update(workpiece=None), "workpiece: Input should be an object"),
         (lambda c: c["phases"][1].update(start_step=30), "drag does not start where plunge ends"),
         (lambda c: c["phases"][1].pop("name"), r"phases\[1\]\.name: a required key is missing"),
         (lambda c: c.update(gravity_m_s2=float("nan")), "is not a JSON object|finite number"),

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from made_run import with_motion
 
 from dragchain import TableError, load_case
-from dragchain.run.case import Case, Phase, Statistics
 from dragchain.run.kinematics import (
     bowl_velocity,
     counted_mask,
@@ -22,6 +21,8 @@ from dragchain.run.kinematics import (
     workpiece_rotation,
     workpiece_velocity,
 )
+from dragdeck.records.case import CaseOfRun, StatisticsOfRun
+from dragdeck.records.run import Phase
 from dragdeck.study.rotation import wrap_angle
 
 DT = 1e-3
@@ -34,20 +35,24 @@ PHASES = (
 
 
 @pytest.fixture
-def case(tiny_run: Path) -> Case:
-    return changed(load_case(tiny_run), phases=PHASES, statistics=Statistics(transient_s=0.005))
+def case(tiny_run: Path) -> CaseOfRun:
+    return changed(
+        load_case(tiny_run), phases=PHASES, statistics=StatisticsOfRun(transient_s=0.005)
+    )
 
 
-def moving(case: Case, path: Any = CIRCLE, speed_m_s: float | None = 0.01, **motion: Any) -> Case:
+def moving(
+    case: CaseOfRun, path: Any = CIRCLE, speed_m_s: float | None = 0.01, **motion: Any
+) -> CaseOfRun:
     """The case with a workpiece on a path, which it follows."""
     data = with_motion(
         case.model_dump(), path, speed_m_s, **{"orientation": "follow_path", **motion}
     )
-    return Case.model_validate(data)
+    return CaseOfRun.model_validate(data)
 
 
 @pytest.fixture
-def circling(case: Case) -> Case:
+def circling(case: CaseOfRun) -> CaseOfRun:
     return moving(case)
 
 
@@ -62,21 +67,23 @@ def test_a_step_without_a_phase_is_an_error(steps, phases) -> None:
         phase_codes(np.array(steps), phases)
 
 
-def test_samples_count_from_the_end_of_the_run_in(case: Case) -> None:
+def test_samples_count_from_the_end_of_the_run_in(case: CaseOfRun) -> None:
     steps = np.array([20, 24, 25, 26, 40])
     assert counted_mask(steps, case).tolist() == [False, False, True, True, True]
 
 
-def test_without_run_in_the_step_that_starts_the_drag_does_not_count(case: Case) -> None:
+def test_without_run_in_the_step_that_starts_the_drag_does_not_count(case: CaseOfRun) -> None:
     steps = np.array([19, 20, 21])
-    assert counted_mask(steps, changed(case, statistics=Statistics(transient_s=0.0))).tolist() == [
+    assert counted_mask(
+        steps, changed(case, statistics=StatisticsOfRun(transient_s=0.0))
+    ).tolist() == [
         False,
         False,
         True,
     ]
 
 
-def test_a_case_without_drag_is_an_error(case: Case) -> None:
+def test_a_case_without_drag_is_an_error(case: CaseOfRun) -> None:
     with pytest.raises(TableError, match="no phase named drag"):
         counted_mask(np.array([1]), changed(case, phases=PHASES[:2]))
 
@@ -96,12 +103,12 @@ def test_on_a_circle_the_workpiece_heads_along_the_tangent(circling, sense, plac
     assert directions(np.array([30]), np.array([place]), turned) == pytest.approx(heading)
 
 
-def test_before_the_drag_the_heading_is_the_one_it_starts_with(circling: Case) -> None:
+def test_before_the_drag_the_heading_is_the_one_it_starts_with(circling: CaseOfRun) -> None:
     places = np.array([[0.0, 0.0], [0.01, 0.0], [0.0, 0.02]])
     np.testing.assert_allclose(directions(np.array([5, 15, 20]), places, circling), [pi / 2] * 3)
 
 
-def test_on_a_line_the_heading_is_the_lines(case: Case) -> None:
+def test_on_a_line_the_heading_is_the_lines(case: CaseOfRun) -> None:
     case = moving(case, {"kind": "line", "start_m": [0.0, 0.0], "direction_deg": 270})
     np.testing.assert_allclose(directions(np.array([0, 30]), np.ones((2, 2)), case), [-pi / 2] * 2)
 
@@ -129,7 +136,7 @@ def test_half_a_turn_wraps_to_plus_pi() -> None:
     np.testing.assert_array_equal(wrap_angle([pi, -pi]), [pi, pi])
 
 
-def test_a_workpiece_at_rest_has_no_velocity_and_one_direction(case: Case) -> None:
+def test_a_workpiece_at_rest_has_no_velocity_and_one_direction(case: CaseOfRun) -> None:
     """Relative to a bowl that rotates counter-clockwise it moves along -y."""
     rpm = 2.0 * 30 / pi
     rest = {"kind": "rest", "radius_m": 0.01, "bowl_rpm": rpm, "revolutions": 20 * DT / pi}
@@ -156,7 +163,7 @@ STAGES = (
 
 
 @pytest.fixture
-def on_waypoints(case: Case) -> Case:
+def on_waypoints(case: CaseOfRun) -> CaseOfRun:
     times = np.cumsum([0, *(steps for steps, _ in STAGES)]) * DT
     moved = [np.array(velocity) * steps * DT for steps, velocity in STAGES]
     places = np.vstack([np.zeros(3), np.cumsum(moved, axis=0)])
@@ -164,14 +171,14 @@ def on_waypoints(case: Case) -> Case:
     return moving(case, {"kind": "waypoints", "points": points}, None)
 
 
-def test_a_stretch_without_a_direction_keeps_the_last_one(on_waypoints: Case) -> None:
+def test_a_stretch_without_a_direction_keeps_the_last_one(on_waypoints: CaseOfRun) -> None:
     """The first one has that of the next; a stage owns its last step."""
     steps = np.array([0, 20, 21, 23, 24, 27, 28, 29, 30, 31, 32, 40])
     found = directions(steps, np.zeros((12, 2)), on_waypoints)
     np.testing.assert_allclose(found, [-pi / 2] * 10 + [pi] * 2)
 
 
-def test_the_workpiece_does_not_turn_on_waypoints(on_waypoints: Case) -> None:
+def test_the_workpiece_does_not_turn_on_waypoints(on_waypoints: CaseOfRun) -> None:
     steps = np.array([0, 21, 40])
     heading = directions(steps, np.zeros((3, 2)), on_waypoints)
     turn = workpiece_rotation(steps, heading, on_waypoints).turn_rad
@@ -181,7 +188,7 @@ def test_the_workpiece_does_not_turn_on_waypoints(on_waypoints: Case) -> None:
 
 @pytest.mark.parametrize("superposed", [False, True])
 def test_on_waypoints_the_velocity_is_that_of_the_stage(
-    on_waypoints: Case, superposed: bool
+    on_waypoints: CaseOfRun, superposed: bool
 ) -> None:
     steps = np.arange(21, 41)
     path = on_waypoints.inputs["motion.path.points"]
@@ -210,11 +217,11 @@ SPIN = {
 OSCILLATION = {"amplitude_m": 1e-3, "frequency_hz": 20.0 / pi, "ramp_s": 0}
 
 
-def with_all(case: Case, **motion: Any) -> Case:
+def with_all(case: CaseOfRun, **motion: Any) -> CaseOfRun:
     return moving(case, spin=SPIN, oscillation=OSCILLATION, **motion)
 
 
-def test_the_turn_adds_up_the_stages(circling: Case) -> None:
+def test_the_turn_adds_up_the_stages(circling: CaseOfRun) -> None:
     """In the drag, from step 20 to 40; the path's own turn beside it."""
     steps = np.array([0, 20, 24, 28, 30, 40, 50])
     turn = workpiece_rotation(steps, np.zeros(7), with_all(circling)).turn_rad / DT
@@ -223,7 +230,7 @@ def test_the_turn_adds_up_the_stages(circling: Case) -> None:
     assert not spins(circling)
 
 
-def place(case: Case, steps: np.ndarray, own_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def place(case: CaseOfRun, steps: np.ndarray, own_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """A point that is fixed to the workpiece and the reference point, from angles alone."""
     time = (steps - 20) * case.timestep_s
     angle = 0.01 / 0.02 * time
@@ -234,7 +241,7 @@ def place(case: Case, steps: np.ndarray, own_m: np.ndarray) -> tuple[np.ndarray,
 
 
 @pytest.mark.parametrize("orientation", ["follow_path", "fixed"])
-def test_the_velocity_is_the_change_of_the_place(circling: Case, orientation: str) -> None:
+def test_the_velocity_is_the_change_of_the_place(circling: CaseOfRun, orientation: str) -> None:
     """Of a point beside and above the reference point, apart from steps where the spin changes."""
     case = with_all(changed(circling, timestep_s=1e-5), orientation=orientation)
     steps = np.array([22, 25, 31, 38])
@@ -246,7 +253,7 @@ def test_the_velocity_is_the_change_of_the_place(circling: Case, orientation: st
     )
 
 
-def test_a_stage_owns_its_last_step(circling: Case) -> None:
+def test_a_stage_owns_its_last_step(circling: CaseOfRun) -> None:
     case = with_all(circling)
     steps = np.array([28, 29])
     reference = np.tile([0.02, 0.0, 0.0], (2, 1))

@@ -8,12 +8,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from dragchain.run.case import Output
 from dragchain.run.run_parts import iter_frames, iter_prints, part_files
+from dragdeck.decks.outputs import OutputOfRun
 from dragdeck.dumps.reader import read_frames, read_prints
 from dragdeck.errors import DumpError, TruncatedDumpError
 
-PARTICLES = Output(
+PARTICLES = OutputOfRun(
     name="particles",
     kind="custom",
     binary=True,
@@ -24,7 +24,7 @@ PARTICLES = Output(
     first_step=0,
     last_step=20,
 )
-CONTACTS = Output(
+CONTACTS = OutputOfRun(
     name="contacts",
     kind="local",
     binary=False,
@@ -35,7 +35,7 @@ CONTACTS = Output(
     first_step=0,
     last_step=20,
 )
-FORCE = Output(
+FORCE = OutputOfRun(
     name="force",
     kind="print",
     binary=False,
@@ -339,7 +339,7 @@ frames = st.lists(
     min_size=1,
     max_size=5,
 )
-ANY = Output(
+ANY = OutputOfRun(
     name="any",
     kind="custom",
     binary=True,

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from dragchain.errors import TableError
-from dragchain.run.completeness import AcceptanceCheck
 from dragchain.tables.bed import Packing
 from dragchain.tradeoff.measure_run import CountedPath, band_pass, write_measures
 from dragchain.tradeoff.measures import QUANTITIES, Measures
+from dragdeck.records.run import AcceptanceCheck
 
 SPACING, COUNT = 0.1, 600
 BED = Packing(
@@ -93,7 +93,8 @@ def test_squares_are_rooted_after_their_mean() -> None:
 
 
 OUTCOME = {
-    "schema": 2, "state": "complete", "checks": [], "steps": 50, "wall_time_s": 2.0, "ranks": 2,
+    "schema": 2, "inputs": "0f", "state": "complete", "checks": [],
+    "steps": 50, "wall_time_s": 2.0, "ranks": 2,
     "engine_version": "3.8.0", "started": "2026-01-01T00:00:00+00:00",
 }  # fmt: skip
 

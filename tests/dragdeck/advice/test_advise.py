@@ -14,14 +14,20 @@ from made_tradeoff import made_tradeoff
 from paths import ROOT
 
 from dragdeck import commands
-from dragdeck.advice.advise import advised_settings, resolve
+from dragdeck.advice.advise import (
+    Work,
+    advised_settings,
+    consistent,
+    plain_option,
+    resolve,
+    with_option,
+)
 from dragdeck.advice.forecast import question
-from dragdeck.advice.options import Work, consistent, plain_option, with_option
 from dragdeck.cases.bed import full_stiffness_number
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
-from dragdeck.outlook.measured import Tradeoff, measured_tradeoff
 from dragdeck.project import Project
+from dragdeck.records.tradeoff import TradeoffRecord, measured_tradeoff
 from dragdeck.scenes.drop_test import drop_scene
 from dragdeck.scenes.filling import filling_scene
 from dragdeck.scenes.lead import FIRST_WINDOWS, with_leads
@@ -36,7 +42,7 @@ SEVERAL = ["drag_mean", "workpiece_contacts"]
 
 
 @pytest.fixture
-def tradeoff() -> Tradeoff:
+def tradeoff() -> TradeoffRecord:
     return made_tradeoff()
 
 
@@ -67,7 +73,7 @@ def moved(case: Case, **motion: float) -> Case:
 
 
 def test_a_soft_run_with_windows_costs_less_than_the_plain_run(
-    paper: Case, tradeoff: Tradeoff
+    paper: Case, tradeoff: TradeoffRecord
 ) -> None:
     found = advised_settings(paper, asked(0.07, quantity=SEVERAL), tradeoff)
     chosen = found.chosen.fidelity
@@ -82,7 +88,7 @@ def test_a_soft_run_with_windows_costs_less_than_the_plain_run(
 
 
 def test_the_tolerance_changes_when_windows_stop_and_nothing_else(
-    paper: Case, tradeoff: Tradeoff
+    paper: Case, tradeoff: TradeoffRecord
 ) -> None:
     first, second = (advised_settings(paper, asked(one), tradeoff).chosen for one in (0.02, 0.5))
     assert first.relative_cost == second.relative_cost
@@ -92,7 +98,7 @@ def test_the_tolerance_changes_when_windows_stop_and_nothing_else(
 
 
 def test_where_windows_would_take_the_path_the_whole_drag_is_stiff(
-    paper: Case, tradeoff: Tradeoff
+    paper: Case, tradeoff: TradeoffRecord
 ) -> None:
     found = advised_settings(moved(paper, speed_m_s=0.3), asked(), tradeoff).chosen
     assert found.fidelity.windows is None and found.fidelity.youngs_modulus_scale == 1
@@ -101,13 +107,17 @@ def test_where_windows_would_take_the_path_the_whole_drag_is_stiff(
     assert found.relative_cost == found.largest_cost < 1
 
 
-def test_where_the_material_is_soft_nothing_is_softened(paper: Case, tradeoff: Tradeoff) -> None:
+def test_where_the_material_is_soft_nothing_is_softened(
+    paper: Case, tradeoff: TradeoffRecord
+) -> None:
     found = advised_settings(changed(paper, youngs_modulus_pa=2e7), asked(), tradeoff).chosen
     assert (found.fidelity.youngs_modulus_scale, found.fidelity.soft_start) == (1, None)
     assert found.fidelity.windows is None
 
 
-def test_stiffer_and_lighter_particles_are_softened_more(paper: Case, tradeoff: Tradeoff) -> None:
+def test_stiffer_and_lighter_particles_are_softened_more(
+    paper: Case, tradeoff: TradeoffRecord
+) -> None:
     for values in (
         [{"youngs_modulus_pa": one} for one in (20e9, 77e9, 300e9)],
         [{"density_kg_m3": one} for one in (8000, 2656, 1000)],
@@ -140,7 +150,7 @@ def test_the_work_that_is_compared_is_that_of_the_runs(paper: Case, speed: float
 
 
 def test_strong_damping_shortens_the_steps_of_the_filling(
-    small: dict[str, Any], tradeoff: Tradeoff, made: Made
+    small: dict[str, Any], tradeoff: TradeoffRecord, made: Made
 ) -> None:
     for pair in small["pairs"].values():
         pair["restitution"] = 0.3
@@ -159,7 +169,9 @@ def test_strong_damping_shortens_the_steps_of_the_filling(
 # --- the drop test -------------------------------------------------------------------------------
 
 
-def test_a_tolerance_about_restitution_sets_the_drop_alone(case: Case, tradeoff: Tradeoff) -> None:
+def test_a_tolerance_about_restitution_sets_the_drop_alone(
+    case: Case, tradeoff: TradeoffRecord
+) -> None:
     found = resolve(case, asked(0.005, quantity="restitution"), tradeoff)
     assert found.study.drop_test.timestep_fraction == 0.1
     assert found.study.fidelity == BUILT_IN_FIDELITIES["standard"]
@@ -174,7 +186,9 @@ def test_a_tolerance_about_restitution_sets_the_drop_alone(case: Case, tradeoff:
     assert "0.2 %" in beyond.fallback
 
 
-def test_restitution_goes_with_no_quantity_of_the_process(case: Case, tradeoff: Tradeoff) -> None:
+def test_restitution_goes_with_no_quantity_of_the_process(
+    case: Case, tradeoff: TradeoffRecord
+) -> None:
     with pytest.raises(InputError, match="restitution alone, or quantities of the process"):
         advised_settings(case, asked(quantity=["drag_mean", "restitution"]), tradeoff)
 
@@ -183,7 +197,7 @@ def test_restitution_goes_with_no_quantity_of_the_process(case: Case, tradeoff: 
 
 
 @pytest.fixture
-def asking(small: dict[str, Any], write_study: Write, tradeoff: Tradeoff) -> Case:
+def asking(small: dict[str, Any], write_study: Write, tradeoff: TradeoffRecord) -> Case:
     (found,) = load_cases(
         write_study(small | {"fidelity": {"tolerance": 0.05, "quantity": SEVERAL}}),
         resolve=partial(resolve, tradeoff=tradeoff),
@@ -197,7 +211,7 @@ def test_a_study_that_asks_gets_settings_and_remembers(asking: Case) -> None:
     said = process_scene(asking).case
     assert said.fidelity.name == asking.fidelity_name
     assert said.asked is not None
-    assert (said.asked.tolerance, said.asked.quantities) == (0.05, SEVERAL)
+    assert (said.asked.tolerance, said.asked.quantities) == (0.05, tuple(SEVERAL))
     assert 0 < said.asked.relative_cost <= said.asked.largest_cost and said.asked.fallback is None
     others = filling_scene(asking).case, drop_scene(asking).case
     assert not any("asked" in json.loads(other.as_text()) for other in others)
@@ -213,7 +227,7 @@ def test_the_question_is_part_of_the_process_alone(asking: Case) -> None:
 
 
 def test_tolerances_of_a_sweep_are_resolved_each(
-    small: dict[str, Any], write_study: Write, tradeoff: Tradeoff
+    small: dict[str, Any], write_study: Write, tradeoff: TradeoffRecord
 ) -> None:
     small["fidelity"] = {"tolerance": 0.05, "quantity": "restitution"}
     small["sweep"] = {"fidelity.tolerance": [0.05, 0.001]}
@@ -243,7 +257,7 @@ def test_the_packages_own_tradeoff_knows_costs_and_drop_tests(case: Case) -> Non
 def test_advise_prints_and_keeps_what_it_says(
     case: Case,
     project: Project,
-    tradeoff: Tradeoff,
+    tradeoff: TradeoffRecord,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -264,7 +278,7 @@ def test_advise_prints_and_keeps_what_it_says(
 
 
 def test_the_kept_advice_names_the_run_of_a_study_that_asks(
-    asking: Case, tradeoff: Tradeoff, project: Project, monkeypatch: pytest.MonkeyPatch
+    asking: Case, tradeoff: TradeoffRecord, project: Project, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(project.root)
     commands.advise("small", None, None, None, quick=True, tradeoff=tradeoff)
@@ -276,7 +290,7 @@ def test_the_kept_advice_names_the_run_of_a_study_that_asks(
 def test_an_advice_that_cannot_be_kept_is_still_shown(
     case: Case,
     project: Project,
-    tradeoff: Tradeoff,
+    tradeoff: TradeoffRecord,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -297,7 +311,7 @@ def test_the_command_line_goes_before_the_study(case: Case, asking: Case) -> Non
 def test_a_wrong_question_is_explained(
     case: Case,
     project: Project,
-    tradeoff: Tradeoff,
+    tradeoff: TradeoffRecord,
     monkeypatch: pytest.MonkeyPatch,
     tolerance: float | None,
     quantity: str | None,

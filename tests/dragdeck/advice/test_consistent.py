@@ -8,8 +8,7 @@ import pytest
 from hypothesis import given, settings
 from random_scenes import random_scenes
 
-from dragdeck.advice.advise import resolve
-from dragdeck.advice.options import consistent
+from dragdeck.advice.advise import consistent, resolve
 from dragdeck.cases.bed import bed_timestep, skin
 from dragdeck.cases.case import Case
 from dragdeck.errors import Caution

@@ -4,11 +4,10 @@ from dataclasses import replace
 
 import pytest
 
-from dragdeck.advice.advise import advised_settings
-from dragdeck.advice.options import with_option
+from dragdeck.advice.advise import advised_settings, with_option
 from dragdeck.cases.case import Case
 from dragdeck.cases.ranks import CORES_VARIABLE
-from dragdeck.outlook.measured import measured_tradeoff
+from dragdeck.records.tradeoff import measured_tradeoff
 from dragdeck.study.model import Fidelity, Tolerance
 
 

@@ -7,17 +7,17 @@ from pathlib import Path
 import pytest
 from made_run import Raw
 
-from dragdeck.decks.case_file import (
-    CountOfRun,
-    RanksOfRun,
-    RunInputs,
-    SettlingCriterion,
-    SteadyCriterion,
-)
 from dragdeck.decks.outputs import Kind, OutputOfRun
 from dragdeck.dumps.grammar import whole_frames
 from dragdeck.engine.acceptance import check_run
-from dragdeck.engine.record import RunPart
+from dragdeck.records.run import (
+    CaseFile,
+    CountOfRun,
+    RanksOfRun,
+    RunPart,
+    SettlingCriterion,
+    SteadyCriterion,
+)
 
 
 def written(kind: Kind, name: str, columns: Sequence[str], last_step: int | None) -> OutputOfRun:
@@ -80,9 +80,14 @@ def test_the_last_frame_counts_only_if_whole(
     assert (frames.steps[-1] if frames.steps and not frames.problem else None) == step
 
 
-INPUTS = RunInputs(
+INPUTS = CaseFile(
+    study="any",
+    title="",
     scene="process",
     run="a",
+    timestep_s=1e-6,
+    rayleigh_time_s=1e-5,
+    versions={},
     fidelity=RanksOfRun(ranks=1),
     media=CountOfRun(count=2),
     files={},
@@ -96,7 +101,7 @@ GOOD = HEAD + "10 0.1 2 1e-9 0 0.1\n20 0.2 2 1e-9 0 0.1\n"
 
 
 def failed(
-    folder: Path, inputs: RunInputs, status: int = 0, begins: Sequence[int] = (0,)
+    folder: Path, inputs: CaseFile, status: int = 0, begins: Sequence[int] = (0,)
 ) -> set[str]:
     """Codes of the checks that did not pass, of parts that begin at some steps."""
     parts = [RunPart(part=k + 1, checkpoint=None, from_step=step) for k, step in enumerate(begins)]

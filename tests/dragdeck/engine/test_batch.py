@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from dragdeck.engine.record import RunRecord
 
 from dragdeck.cases.case import Case
 from dragdeck.decks.deck import AnyScene
@@ -23,7 +24,7 @@ def batch(project: Project, tmp_path: Path) -> Batch:
 
 
 def test_a_run_has_the_name_of_its_folder_and_is_not_repeated(case: Case, batch: Batch) -> None:
-    first, again = (batch.run("one", drop_scene(case)) for _ in range(2))
+    first, again = (batch.result("one", drop_scene(case)) for _ in range(2))
     assert first == again and first.state == "complete"
     assert json.loads((batch.folder / "one" / "case.json").read_text())["run"] == "one"
     assert "Run:         one\n" in (batch.folder / "one" / "in.liggghts").read_text()
@@ -34,8 +35,10 @@ def test_a_rejected_run_has_a_record_but_is_no_result(case: Case, batch: Batch) 
     many = scene.case.model_copy(update={"fidelity": scene.case.fidelity.model_copy(
         update={"ranks": 2})})  # fmt: skip
     wrong = replace(scene, case=many, deck=replace(scene.deck, processors="1 1 1"))
-    record = batch.run("two", wrong)
-    assert record.state == "failed"
+    lines: list[str] = []
+    assert batch.each({"two": lambda: wrong, "three": lambda: scene}, lines.append, cores=2) == {}
+    assert lines == ["runs 1 of 2: two: failed", "runs 2 of 2: three: complete"]
+    assert RunRecord.read(batch.folder / "two" / "state.json").state == "failed"
     with pytest.raises(RejectedRunError):
         batch.result("two", wrong)
     assert not (batch.folder / "two" / "run.json").exists()

@@ -21,8 +21,8 @@ from dragdeck.engine.completeness import (
     first_gap,
     some_frames,
 )
-from dragdeck.engine.record import RunPart
 from dragdeck.errors import DumpError
+from dragdeck.records.run import RunPart
 
 FORCE = OutputOfRun(
     kind="print",
@@ -103,14 +103,14 @@ def dump(name: str) -> OutputOfRun:
     return OutputOfRun(
         kind="custom",
         binary=name.endswith(".bin"),
-        pattern=name,
+        pattern="{part}",
         columns=NAMES,
         engine_columns=NAMES,
         period_steps=7,
         first_step=0,
         last_step=21,
         rows_per_particle=1.0,
-    )
+    ).model_copy(update={"pattern": name})
 
 
 NUMBERS = re.compile(r"row \d+: |(id|x|c_f\[1\]) is |as numbers|are not text|names the columns")

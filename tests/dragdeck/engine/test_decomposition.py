@@ -13,12 +13,12 @@ from dragdeck.decks.render import deck_text
 from dragdeck.decks.templates import environment
 from dragdeck.engine.acceptance import ranks_check
 from dragdeck.engine.log import decomposition
-from dragdeck.engine.record import Decomposition, ParticlesPerRank
 from dragdeck.errors import InputError
 from dragdeck.outlook.process import bed_notes
 from dragdeck.physics.domain_split import FilledBowl, split, warnings
 from dragdeck.physics.packing import pour, radii
 from dragdeck.project import Project
+from dragdeck.records.run import Decomposition, ParticlesPerRank
 from dragdeck.scenes.filling import filling_scene
 from dragdeck.scenes.process import PROCESS
 from dragdeck.sweep.cases import load_cases

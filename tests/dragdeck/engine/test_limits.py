@@ -11,12 +11,12 @@ from dragdeck.cases.case import Case
 from dragdeck.decks.render import write_run
 from dragdeck.decks.templates import environment
 from dragdeck.engine.log import Sample, breach, read_samples, within
-from dragdeck.engine.record import RunRecord
 from dragdeck.engine.run_folder import run
 from dragdeck.errors import RejectedRunError
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.run_limits import ENERGY_FACTOR, SPEED_FACTOR, run_limits
 from dragdeck.project import Project
+from dragdeck.records.run import RunRecord
 from dragdeck.scenes.filling import FILLING, filling_scene
 from dragdeck.scenes.process import process_scene
 

@@ -17,16 +17,15 @@ from made_study import Made
 from run_files import rewrite
 
 from dragdeck.cases.case import Case
-from dragdeck.decks.case_file import RunInputs
 from dragdeck.decks.render import write_run
 from dragdeck.decks.templates import environment
 from dragdeck.engine.checkpoints import checkpoint_files, checkpoint_step
-from dragdeck.engine.record import RunRecord
 from dragdeck.engine.reports import silent
 from dragdeck.engine.run_folder import fingerprint, run
 from dragdeck.engine.watch import EngineEnded, Watcher, cut_screen
 from dragdeck.errors import EngineError, InputError, RejectedRunError
 from dragdeck.project import Project
+from dragdeck.records.run import CaseFile, RunRecord
 from dragdeck.scenes.drop_test import DROP_TEST, drop_scene
 from dragdeck.scenes.filling import FILLING, filling_scene
 
@@ -75,7 +74,7 @@ def test_a_disk_that_is_full_is_named_with_what_is_free_and_needed(filling: Path
 
 
 def test_a_comment_in_the_deck_changes_nothing(filling: Path) -> None:
-    inputs = RunInputs.read(filling / "case.json")
+    inputs = CaseFile.read(filling / "case.json")
     before = fingerprint(filling, inputs)
     deck = filling / "in.liggghts"
     deck.write_text("# another title\n" + deck.read_text())

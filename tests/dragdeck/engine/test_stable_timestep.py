@@ -11,16 +11,15 @@ import pytest
 from made_study import Made
 
 from dragdeck.cases.case import Case
-from dragdeck.decks.case_file import RunInputs
 from dragdeck.decks.outputs import particles
 from dragdeck.decks.render import write_run
 from dragdeck.decks.templates import environment
 from dragdeck.engine.acceptance import check_run
-from dragdeck.engine.record import AcceptanceCheck, RunPart, RunRecord
 from dragdeck.engine.reports import silent
 from dragdeck.engine.run_folder import run_to_outcome
 from dragdeck.physics.packing import Bed
 from dragdeck.project import Project
+from dragdeck.records.run import AcceptanceCheck, CaseFile, RunPart, RunRecord
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import PROCESS
 
@@ -68,7 +67,7 @@ def checked(
     parts = [RunPart(part=part, checkpoint=None, from_step=20 * part - 20) for part in (1, 2)]
     checks = check_run(
         folder,
-        RunInputs.read(folder / "case.json"),
+        CaseFile.read(folder / "case.json"),
         {"particles": OUTPUT.as_part()},
         0,
         parts,

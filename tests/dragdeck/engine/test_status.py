@@ -9,10 +9,10 @@ from dragdeck.cases.case import Case
 from dragdeck.decks.render import write_run
 from dragdeck.decks.templates import environment
 from dragdeck.engine.process import only_runner
-from dragdeck.engine.record import AcceptanceCheck, RunPart, RunRecord, State
 from dragdeck.engine.reports import printable, shown_time, silent
 from dragdeck.engine.status import run_status
 from dragdeck.project import Project
+from dragdeck.records.run import AcceptanceCheck, RunPart, RunRecord, State
 from dragdeck.scenes.filling import FILLING, filling_scene
 from dragdeck.scenes.process import PROCESS, process_scene
 

@@ -12,12 +12,6 @@ from dragdeck.cases.bed import particle_material, smallest_radius
 from dragdeck.cases.case import Case
 from dragdeck.cli import main
 from dragdeck.errors import InputError
-from dragdeck.outlook.measured import (
-    RestitutionErrors,
-    StableStepLaw,
-    stability_map,
-    stable_step_law,
-)
 from dragdeck.outlook.timestep import (
     check_timestep,
     expected_error,
@@ -29,6 +23,12 @@ from dragdeck.outlook.timestep import (
 )
 from dragdeck.physics.contact_mechanics import effective_modulus, rayleigh_time
 from dragdeck.project import Project
+from dragdeck.records.stability import (
+    RestitutionErrors,
+    StableStepLaw,
+    stability_map,
+    stable_step_law,
+)
 from dragdeck.scenes.dimensionless import describe
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import PROCESS

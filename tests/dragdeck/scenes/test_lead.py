@@ -21,8 +21,10 @@ from dragdeck.scenes.lead import RAMP_STAGES, covered, led, step_at, windows_of
 from dragdeck.scenes.motion import course
 from dragdeck.scenes.process import PROCESS, process_scene
 from dragdeck.scenes.scene import StudyScene
+from dragdeck.scenes.workpiece import reference_height
 from dragdeck.study.base import Json
 from dragdeck.study.drive import Drive
+from dragdeck.study.rotation import by_vector, rotated
 from dragdeck.sweep.cases import load_cases
 
 BED = Bed(surface_m=0.038, top_m=0.0446)
@@ -75,6 +77,20 @@ def test_a_run_begins_where_its_course_is(path: str, more: Json, made: Make) -> 
     assert scene.steps == way.drag.end - entry
 
 
+def test_a_run_begins_with_an_inclined_workpiece_as_far_as_it_has_spun(made: Make) -> None:
+    """The mesh is turned about its axis first, and then with the path."""
+    case = led(made(STIFF, path=PATHS["circle"], tilt_deg=20, spin={"rpm": 100}))
+    scene = process_scene(case, BED)
+    way = course(case.study, BED, reference_height(case))
+    (body,), entry = scene.deck.workpieces, scene.deck.entry_step
+    place, rotation = way.poses(way.legs[-1], np.array([entry - way.drag.start]))
+    *axis, angle = body.own_turn
+    own = by_vector(math.radians(angle) * np.array(axis))
+    turned = np.column_stack([rotated(own[:, k], math.radians(body.turn_deg)) for k in range(3)])
+    np.testing.assert_allclose(turned, rotation.matrices[0], atol=1e-12)
+    assert body.start_m == pytest.approx(place[0], abs=1e-12)
+
+
 def test_the_moduli_are_raised_to_those_of_the_run(made: Make, project: Project) -> None:
     case = made(STIFF)
     scene = process_scene(case, BED)
@@ -99,7 +115,7 @@ def test_a_lead_is_soft_and_ends_where_the_run_goes_on(made: Make, project: Proj
     assert lead is not None
     scene = process_scene(lead, BED)
     assert scene.deck.materials.youngs_modulus_scale == 0.01
-    assert scene.case.marks == ["state.1.restart"]
+    assert scene.case.marks == ("state.1.restart",)
     text = script(scene, project)
     last = scene.case.phases[-1].end_step
     assert f'"run {last} upto" "write_restart state.1.restart"' in text
@@ -154,7 +170,7 @@ def test_windows_lie_beside_each_other_on_the_counted_path(made: Make) -> None:
 
 
 def test_a_fraction_of_the_drag_has_its_step() -> None:
-    drag = Drive(100, 500, 1e-5, 0.01)
+    drag = Drive(100, 500, 1e-5, length_m=1.0)
     assert [step_at(fraction, drag) for fraction in (0, 0.25, 1)] == [100, 200, 500]
 
 

@@ -8,8 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dragchain.run.case import Case as ReadCase
-from dragchain.run.case import load_case, load_outputs
 from dragchain.run.kinematics import (
     axis_speed,
     counted_mask,
@@ -20,10 +18,12 @@ from dragchain.run.kinematics import (
 )
 from dragdeck.cases.case import Case
 from dragdeck.decks.deck import AnyScene
-from dragdeck.decks.outputs import ColumnsFile
+from dragdeck.decks.outputs import ColumnsFile, load_outputs
 from dragdeck.errors import InputError
 from dragdeck.physics.packing import Bed
 from dragdeck.preview.layout import layout
+from dragdeck.records.case import CaseOfRun as ReadCase
+from dragdeck.records.case import load_case
 from dragdeck.scenes.fit import clearances
 from dragdeck.scenes.legs import farthest_reach, path_heights
 from dragdeck.scenes.motion import course

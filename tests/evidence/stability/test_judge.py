@@ -6,8 +6,8 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from dragchain.run.completeness import AcceptanceCheck, CheckCode, CheckReason
 from dragchain.statistics.estimate import Estimate
+from dragdeck.records.run import AcceptanceCheck, CheckCode, CheckReason
 from evidence.stability.judge import (
     ENERGY,
     ENERGY_LIMITS,

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from dragchain.contact_law.hertz import sphere_mass
-from dragdeck.decks.case_file import CaseOfStudy, MediaOfRun
 from dragdeck.physics.contact_network import ContactConstants
+from dragdeck.records.case import CaseOfRun, MediaOfRun
 from evidence.stability.measures import (
     BOWL,
     PARTICLE,
@@ -127,7 +127,7 @@ def test_each_contact_has_the_moduli_of_its_partner(partner: int, modulus: float
         for name, own in (("particle", 7e9), ("bowl", 1e9), ("workpiece", 4e9))
     }
     media = MediaOfRun(count=1, radius_mean_m=1e-3, radius_std_m=0.0, density_kg_m3=2500.0)
-    case = CaseOfStudy.model_construct(contact_moduli=moduli, media=media)
+    case = CaseOfRun.model_construct(contact_moduli=moduli, media=media)
     plane = Contacts(
         a=np.array([0]),
         b=np.array([-1]),

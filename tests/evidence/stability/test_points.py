@@ -145,7 +145,7 @@ def ended(run: PointRun, state: str, *failed: str) -> PointRun:
     (run.folder / "state.json").write_text(
         json.dumps(
             {"schema": 2, "state": state, "started": "2026-11-21", "engine_version": "3.8.0",
-             "ranks": 1, "parts": [], "checks": checks}
+             "ranks": 1, "parts": [], "checks": checks, "inputs": "0f"}
         )
     )  # fmt: skip
     return PointRun(run.point, run.folder)

@@ -11,7 +11,7 @@ from pages import stands_alone
 from paths import DATA, ROOT
 
 from dragchain.cli import main as dragchain
-from dragdeck.outlook.measured import StabilityMap
+from dragdeck.records.stability import StabilityFile
 from evidence.__main__ import main as evidence
 from evidence.stability.judge import (
     ENERGY,
@@ -96,7 +96,7 @@ def test_fewer_steps_in_a_contact_make_a_larger_error(coarse: Path) -> None:
 
 def test_the_report_stands_alone(coarse: Path) -> None:
     assert stands_alone((coarse / "report.html").read_text()).images
-    document = StabilityMap.read(coarse / "stability.json")
+    document = StabilityFile.read(coarse / "stability.json")
     safe = document.regimes["settle"].safe_fraction
     assert document.engine_versions and safe is not None and safe >= 0.8
 

@@ -13,11 +13,12 @@ from scipy import stats
 
 from dragchain.errors import SeriesError
 from dragchain.report.page import MINUS, page_environment
-from dragchain.run.case import PublishedDrag, Reference, load_case
 from dragchain.scaling.fit import read_scalings
 from dragchain.statistics.estimate import Estimate
 from dragchain.tradeoff.measures import Measures, RunCost
 from dragdeck.errors import DocumentError
+from dragdeck.records.case import load_case
+from dragdeck.study.reference import Drag, Reference
 from evidence.validation import force
 from evidence.validation.force import effect_table, setting_effects
 from evidence.validation.runs import MeasuredRun, RunsByBed, packing_mean, read_validation_runs
@@ -47,8 +48,8 @@ def made_run(
         run=folder.name,
         reference=Reference(
             source="a paper",
-            experiment=PublishedDrag(drag_mean_n=-2.5, drag_std_n=0.5),
-            simulation=PublishedDrag(drag_mean_n=-2.0),
+            experiment=Drag(drag_mean_n=-2.5, drag_std_n=0.5),
+            simulation=Drag(drag_mean_n=-2.0),
         ),
     )
     modulus, step = parameters
@@ -181,6 +182,14 @@ def test_effects_are_found_against_what_they_change(runs: RunsByBed) -> None:
     )  # half the drag at twice the radius
     spread = table[table["quantity"] == "drag_std"]
     assert (spread.ci95_low < spread.change).all() and (spread.change < spread.ci95_high).all()
+
+
+def test_an_input_may_be_text(runs: RunsByBed, tmp_path: Path) -> None:
+    *others, last = runs.others
+    steel = dataclasses.replace(last, changed={"workpiece.material": "steel"})
+    table = effect_table(setting_effects(RunsByBed(runs.packings, [*others, steel])))
+    table.to_parquet(tmp_path / "effects.parquet")
+    assert {"0.08", "steel"} <= set(table["value"])
 
 
 def test_a_shorter_run_counts_less(runs: RunsByBed) -> None:

@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
 from made_run import Raw
 
-from dragchain.run.case import Output
+from dragdeck.decks.outputs import OutputOfRun
 from dragdeck.dumps.reader import read_dump, read_prints
 from dragdeck.errors import DragdeckError
 from dragdeck.mesh.checks import findings
@@ -186,7 +186,7 @@ def _printed() -> list[bytes]:
 def _try_print_file(folder: Path, content: bytes) -> None:
     file = folder / "a.1.txt"
     file.write_bytes(content)
-    layout = Output(kind="print", binary=False, pattern="a.{part}.txt", columns=_PRINTED,
+    layout = OutputOfRun(kind="print", binary=False, pattern="a.{part}.txt", columns=_PRINTED,
                     engine_columns=None, period_steps=10, first_step=0, last_step=70)  # fmt: skip
     steps: list[float] = []
     values: list[float] = []

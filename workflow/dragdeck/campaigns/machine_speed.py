@@ -11,15 +11,16 @@ from pathlib import Path
 
 import jinja2
 
-from dragdeck.advice.options import SCALE, Speed, consistent
+from dragdeck.advice.advise import SCALE, consistent
 from dragdeck.cases.bed import bed_timestep
 from dragdeck.cases.case import Case
 from dragdeck.engine.batch import Batch
 from dragdeck.engine.log import loops
-from dragdeck.engine.record import RunRecord
 from dragdeck.engine.reports import Report
 from dragdeck.errors import EngineError, RejectedRunError
 from dragdeck.physics.packing import Bed
+from dragdeck.records.advice import Speed
+from dragdeck.records.run import RunRecord
 from dragdeck.scenes.filling import FILLING, expected_surface
 from dragdeck.scenes.legs import plunge_point
 from dragdeck.scenes.process import PROCESS

@@ -11,8 +11,8 @@ from typing import Any
 from pydantic import JsonValue
 
 from dragdeck.cases.ranks import auto_ranks, cores_here, ranks_within
-from dragdeck.decks.advised import AdvisedSettings
 from dragdeck.errors import InputError
+from dragdeck.records.advised import AdvisedSettings
 from dragdeck.study.base import Json
 from dragdeck.study.model import Study, Tolerance
 from dragdeck.study.workpiece import MeshShape

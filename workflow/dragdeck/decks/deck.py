@@ -5,11 +5,11 @@ from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
 from dragdeck import __version__
-from dragdeck.decks.case_file import CaseFile, CaseOfStudy
 from dragdeck.decks.outputs import Output
 from dragdeck.errors import Caution
 from dragdeck.physics.domain_split import ENGINE_CHOOSES
 from dragdeck.physics.engine_limits import ENGINE_HARD_PA, ENGINE_NEIGHBOURS
+from dragdeck.records.run import CaseFile
 from dragdeck.study.contact_law import Pair, contact_model, contact_settings, present
 
 
@@ -188,9 +188,6 @@ class Scene(Generic[K]):
         """The text of each of `files`."""
         return {name: text() for name, text in self.files.items()}
 
-
-StudyScene = Scene[CaseOfStudy]
-"""A run of a study's case."""
 
 AnyScene = Scene[CaseFile]
 """A run of any scene."""

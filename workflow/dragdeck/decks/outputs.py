@@ -6,9 +6,11 @@ definitions, so that no reader has to guess a column.
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from pathlib import Path
+from typing import Literal, Self
 
 from markupsafe import Markup
+from pydantic import Field, PositiveInt, field_validator, model_validator
 
 from dragdeck.documents import Document, Part
 
@@ -18,13 +20,19 @@ Kind = Literal["print", "custom", "local"]
 class OutputOfRun(Part):
     """A raw output file and its columns.
 
+    Frames are expected at `first_step` and every `period_steps` after it up to `last_step`. If
+    that is None, LIGGGHTS decides during the run: any of these steps may be absent, and the last
+    one is not known beforehand.
+
     Attributes
     ----------
+    name : str
+        Its key in the document.
     kind : str
         ``print``, ``custom`` or ``local``: the LIGGGHTS command that writes it.
     pattern : str
         File name, with ``{part}`` for the part number.
-    columns, engine_columns : sequence of str
+    columns, engine_columns : tuple of str
         Name of each column in dragdeck, and in LIGGGHTS where the header of the file contains it.
     period_steps, first_step, last_step : int
         Interval, first and last step of the frames; `last_step` is None if LIGGGHTS decides.
@@ -34,28 +42,49 @@ class OutputOfRun(Part):
         Whether it is a binary dump.
     """
 
+    name: str = Field(default="", exclude=True)
     kind: Kind
     binary: bool
     pattern: str
-    columns: Sequence[str]
-    engine_columns: Sequence[str] | None
-    period_steps: int
+    columns: tuple[str, ...]
+    engine_columns: tuple[str, ...] | None
+    period_steps: PositiveInt
     first_step: int
     last_step: int | None
-    rows_per_particle: float
+    rows_per_particle: float = 0.0
 
     @property
-    def header(self) -> Sequence[str]:
+    def header(self) -> tuple[str, ...]:
         """What LIGGGHTS writes in the header of a text file."""
         return self.columns if self.engine_columns is None else self.engine_columns
 
+    @model_validator(mode="after")
+    def _can_be(self) -> Self:
+        assert self.pattern.count("{part}") == 1, (
+            f"pattern is {self.pattern!r}, without {{part}} once"
+        )
+        assert self.kind == "custom" or not self.binary, f"a {self.kind} output is always text"
+        assert self.columns and len(set(self.columns)) == len(self.columns), (
+            "columns is empty or names a column twice"
+        )
+        assert len(self.header) == len(self.columns), "engine_columns has another length"
+        assert self.kind != "print" or self.columns[0] == "step", (
+            "columns does not start with step, which a print output requires"
+        )
+        return self
+
 
 class ColumnsFile(Document):
-    """``columns.json``: the raw output files of a run."""
+    """The content of ``columns.json``: the raw output files of a run by name."""
 
     remedy = "write it with: dragdeck step render"
 
     outputs: Mapping[str, OutputOfRun]
+
+    @field_validator("outputs")
+    @classmethod
+    def _named(cls, outputs: Mapping[str, OutputOfRun]) -> Mapping[str, OutputOfRun]:
+        return {name: one.model_copy(update={"name": name}) for name, one in outputs.items()}
 
 
 @dataclass(frozen=True)
@@ -131,7 +160,7 @@ class Output:
             kind=self.kind,
             binary=self.binary,
             pattern=self.pattern,
-            columns=[column.name for column in self.columns],
+            columns=tuple(column.name for column in self.columns),
             engine_columns=[column.engine for column in self.columns] if named else None,
             period_steps=self.period_steps,
             first_step=self.first_step,
@@ -301,3 +330,25 @@ def particles_and_forces(period: int, last: int) -> Output:
     columns = (_ID, *_POSITION, *_VELOCITY, *_SPIN, _RADIUS, *force)
     purpose = "all particles with their total force, for the stability map"
     return Output("particles", "custom", columns, period, 0, last, True, 1.0, purpose)
+
+
+def load_outputs(run_dir: Path | str) -> Mapping[str, OutputOfRun]:
+    """Read ``columns.json`` of a run folder.
+
+    Parameters
+    ----------
+    run_dir : Path or str
+        The run folder.
+
+    Returns
+    -------
+    mapping of str to OutputOfRun
+        The raw outputs by name. An output that is not in it was not written.
+
+    Raises
+    ------
+    DocumentError
+        If the file is absent, is not JSON, has another schema number, or lacks
+        a key or has a value of the wrong type.
+    """
+    return ColumnsFile.read(Path(run_dir) / "columns.json").outputs

@@ -127,12 +127,12 @@ def added_forces(text: str) -> list[str]:
     return list(dict.fromkeys(force for each in found for force in each))
 
 
-def _of_its_law(scene: AnyScene, templates: jinja2.Environment) -> dict[str, list[str]]:
+def _of_its_law(scene: AnyScene, templates: jinja2.Environment) -> dict[str, tuple[str, ...]]:
     """What ``case.json`` says of the contact law in the deck of a scene."""
     text, original = _rendered(scene, templates), _rendered(scene, without(templates))
     known = law_commands(original)
-    changed = [command for command in law_commands(text) if command not in known]
-    return {"added_forces": added_forces(text), "changed_law": changed}
+    changed = tuple(command for command in law_commands(text) if command not in known)
+    return {"added_forces": tuple(added_forces(text)), "changed_law": changed}
 
 
 def write_workpiece(

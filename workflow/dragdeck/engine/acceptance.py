@@ -7,19 +7,21 @@ from pathlib import Path
 import numpy as np
 
 from dragdeck.decks import CASE_FILE, PACKING_FILE
-from dragdeck.decks.case_file import CaseOfStudy, RunInputs, SteadyCriterion
 from dragdeck.decks.outputs import OutputOfRun
 from dragdeck.engine import log
 from dragdeck.engine.checkpoints import is_whole
 from dragdeck.engine.completeness import coverage, part_files, some_frames
-from dragdeck.engine.record import (
+from dragdeck.physics.contact_network import Floats, stability_number
+from dragdeck.records.case import CaseOfRun
+from dragdeck.records.run import (
     AcceptanceCheck,
+    CaseFile,
     CheckCode,
     CheckReason,
     Decomposition,
     RunPart,
+    SteadyCriterion,
 )
-from dragdeck.physics.contact_network import Floats, stability_number
 
 _FRAMES = 20
 """Frames whose contacts are evaluated. An assumption: the median of so many frames scatters little
@@ -28,7 +30,7 @@ _FRAMES = 20
 
 def check_run(
     folder: Path,
-    inputs: RunInputs,
+    inputs: CaseFile,
     outputs: Mapping[str, OutputOfRun],
     exit_status: int,
     parts: Sequence[RunPart],
@@ -40,7 +42,7 @@ def check_run(
     ----------
     folder : Path
         The run's folder.
-    inputs : RunInputs
+    inputs : CaseFile
         From ``case.json``.
     outputs : mapping of str to OutputOfRun
         From ``columns.json``.
@@ -203,7 +205,7 @@ def _stable_timestep(
     folder: Path, particles: OutputOfRun, parts: Sequence[RunPart]
 ) -> AcceptanceCheck:
     """Whether the median `stability_number` of the frames is 1 at most."""
-    case = CaseOfStudy.read(folder / CASE_FILE)
+    case = CaseOfRun.read(folder / CASE_FILE)
     wanted = [particles.columns.index(name) for name in ("x_m", "y_m", "z_m", "radius_m")]
     frames = some_frames(folder, particles, parts, _FRAMES)
     found = [_stability_number(case, rows[:, wanted]) for rows in frames]
@@ -219,7 +221,7 @@ def _stable_timestep(
     )  # fmt: skip
 
 
-def _stability_number(case: CaseOfStudy, rows: Floats) -> float:
+def _stability_number(case: CaseOfRun, rows: Floats) -> float:
     """That of centres and radii; infinite for those of no packing."""
     if not (rows.size and np.isfinite(rows).all()):
         return math.inf

@@ -1,6 +1,7 @@
 """Many runs in one folder: written, run, and not run again."""
 
 from collections.abc import Callable, Mapping
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -9,10 +10,10 @@ import jinja2
 from dragdeck.decks.deck import AnyScene
 from dragdeck.decks.render import write_run
 from dragdeck.engine.part import STATE_FILE
-from dragdeck.engine.record import RunRecord
 from dragdeck.engine.reports import Report, silent
 from dragdeck.engine.run_folder import run
 from dragdeck.errors import InputError, RejectedRunError
+from dragdeck.records.run import RunRecord
 
 
 @dataclass(frozen=True)
@@ -34,13 +35,8 @@ class Batch:
     templates: jinja2.Environment
     report: Report = silent
 
-    def run(self, name: str, scene: AnyScene) -> RunRecord:
-        """Write a run and bring it to its end, good or bad.
-
-        Returns
-        -------
-        RunRecord
-            Its `state` is ``failed`` if an acceptance check did not pass.
+    def result(self, name: str, scene: AnyScene) -> RunRecord:
+        """Write a run and bring it to a result.
 
         Raises
         ------
@@ -48,28 +44,14 @@ class Batch:
             The scene's template cannot be used.
         EngineError
             No LIGGGHTS, or it was interrupted.
-        """
-        try:
-            return self.result(name, scene)
-        except RejectedRunError:
-            return RunRecord.read(self.folder / name / STATE_FILE)
-
-    def result(self, name: str, scene: AnyScene) -> RunRecord:
-        """Write a run and bring it to a result.
-
-        Raises
-        ------
-        InputError, EngineError
-            As `run`.
         RejectedRunError
             An acceptance check did not pass.
         """
-        deck = replace(scene.deck, run=name)
-        case = scene.case.model_copy(update={"run": name})
-        write_run(replace(scene, deck=deck, case=case), self.folder / name, self.templates)
-        return run(self.folder / name, self.report)
+        return run(self._written(name, scene), self.report)
 
-    def each(self, scenes: Mapping[str, Callable[[], AnyScene]], report: Report) -> dict[str, str]:
+    def each(
+        self, scenes: Mapping[str, Callable[[], AnyScene]], report: Report, cores: int = 1
+    ) -> dict[str, str]:
         """Bring many runs to their ends; a run that fails or cannot be written is a finding.
 
         Parameters
@@ -78,6 +60,8 @@ class Batch:
             Name of a run: what makes its scene.
         report : callable
             Gets a line for each run.
+        cores : int
+            So many run at the same time; nothing but the line of each is said of them.
 
         Returns
         -------
@@ -89,13 +73,32 @@ class Batch:
         EngineError
             No LIGGGHTS, or it was interrupted.
         """
-        refused = {}
-        for number, (name, make) in enumerate(scenes.items(), 1):
+        folders, refused = {}, {}
+        for name, make in scenes.items():
             try:
                 scene = make()
             except InputError as error:
-                state, refused[name] = "refused", str(error)
+                refused[name] = str(error)
             else:
-                state = self.run(name, scene).state
-            report(f"{self.folder.name} {number} of {len(scenes)}: {name}: {state}")
+                folders[name] = self._written(name, scene)
+        with ProcessPoolExecutor(cores) as pool:
+            records = pool.map(_ended, folders.values())
+            for number, name in enumerate(scenes, 1):
+                state = "refused" if name in refused else next(records).state
+                report(f"{self.folder.name} {number} of {len(scenes)}: {name}: {state}")
         return refused
+
+    def _written(self, name: str, scene: AnyScene) -> Path:
+        """Write the input files of a run; its folder."""
+        deck = replace(scene.deck, run=name)
+        case = scene.case.model_copy(update={"run": name})
+        write_run(replace(scene, deck=deck, case=case), self.folder / name, self.templates)
+        return self.folder / name
+
+
+def _ended(folder: Path) -> RunRecord:
+    """Bring a run to its end, good or bad: its `state` is ``failed`` if a check did not pass."""
+    try:
+        return run(folder, silent)
+    except RejectedRunError:
+        return RunRecord.read(folder / STATE_FILE)

@@ -11,8 +11,8 @@ import numpy as np
 from dragdeck.decks.outputs import OutputOfRun
 from dragdeck.dumps.content import Cursor
 from dragdeck.dumps.grammar import WholeFrames, frame_cells, whole_frames
-from dragdeck.engine.record import RunPart
 from dragdeck.physics.contact_network import Floats
+from dragdeck.records.run import RunPart
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from dragdeck.decks import END
-from dragdeck.engine.record import AcceptanceCheck, CheckReason, Decomposition, ParticlesPerRank
 from dragdeck.physics.run_limits import SPEED_FACTOR, RunLimits
+from dragdeck.records.run import AcceptanceCheck, CheckReason, Decomposition, ParticlesPerRank
 
 
 def engine_errors(screen: str) -> list[str]:

@@ -6,7 +6,6 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from dragdeck.decks import DECK_FILE
-from dragdeck.decks.case_file import RunInputs
 from dragdeck.decks.outputs import ColumnsFile
 from dragdeck.engine import log
 from dragdeck.engine.acceptance import check_run
@@ -18,17 +17,18 @@ from dragdeck.engine.checkpoints import (
 )
 from dragdeck.engine.completeness import cut_outputs, first_gap, part_files
 from dragdeck.engine.process import Ending, Engine, command, execute
-from dragdeck.engine.record import (
-    REMEDIES,
-    AcceptanceCheck,
-    CheckCode,
-    RunPart,
-    RunRecord,
-)
 from dragdeck.engine.reports import Report
 from dragdeck.engine.space import SPARE_BYTES, check_space, free_bytes, space_left
 from dragdeck.engine.watch import EngineEnded, LimitMet, Watcher, cut_screen
 from dragdeck.errors import EngineError, RejectedRunError
+from dragdeck.records.run import (
+    REMEDIES,
+    AcceptanceCheck,
+    CaseFile,
+    CheckCode,
+    RunPart,
+    RunRecord,
+)
 
 STATE_FILE = "state.json"
 _WRITTEN: set[CheckCode] = {"output_complete", "packing_whole"}
@@ -42,7 +42,7 @@ class PartOfRun:
     Attributes
     ----------
     folder : Path
-    inputs : RunInputs
+    inputs : CaseFile
     columns : ColumnsFile
     record : RunRecord or None
         Of the parts before; None for a first start.
@@ -50,7 +50,7 @@ class PartOfRun:
     """
 
     folder: Path
-    inputs: RunInputs
+    inputs: CaseFile
     columns: ColumnsFile
     record: RunRecord | None
     report: Report

@@ -10,16 +10,15 @@ import shutil
 from pathlib import Path
 
 from dragdeck.decks import CASE_FILE, COLUMNS_FILE, DECK_FILE, RUN_FILE
-from dragdeck.decks.case_file import RunInputs
 from dragdeck.decks.outputs import ColumnsFile
 from dragdeck.engine.checkpoints import take_forced_restarts
 from dragdeck.engine.part import STATE_FILE, PartOfRun, why_rejected
 from dragdeck.engine.process import LOCK_FILE, find_engine, only_runner
-from dragdeck.engine.record import RunRecord
 from dragdeck.engine.reports import Report, say
 from dragdeck.engine.space import full_disk_named
 from dragdeck.errors import InputError, RejectedRunError
 from dragdeck.files import file_checksum
+from dragdeck.records.run import CaseFile, RunRecord
 
 _ARCHIVE = "archive"
 _OF_THE_WORKFLOW = ("logs", "benchmarks")
@@ -67,7 +66,7 @@ def run(
     RejectedRunError
         The run ended but an acceptance check did not pass.
     """
-    inputs = RunInputs.read(folder / CASE_FILE)
+    inputs = CaseFile.read(folder / CASE_FILE)
     columns = ColumnsFile.read(folder / COLUMNS_FILE)
     full_disk = full_disk_named(folder, columns.outputs, inputs.media.count)
     with full_disk, only_runner(folder, report):
@@ -124,7 +123,7 @@ def run_command(folder: Path, outcome: Path | None, again: bool, patience_s: flo
         run(folder, say, again=again, patience_s=patience_s)
 
 
-def fingerprint(folder: Path, inputs: RunInputs) -> str:
+def fingerprint(folder: Path, inputs: CaseFile) -> str:
     """Hash of all that a run depends on: deck, data, meshes and the file it starts from.
 
     Comments in the deck do not count.
@@ -138,7 +137,7 @@ def fingerprint(folder: Path, inputs: RunInputs) -> str:
     return total.hexdigest()
 
 
-def _check_files(folder: Path, inputs: RunInputs) -> None:
+def _check_files(folder: Path, inputs: CaseFile) -> None:
     """Refuse to start from files that are not those that were written.
 
     Raises

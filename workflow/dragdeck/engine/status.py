@@ -6,16 +6,16 @@ from pathlib import Path
 from typing import Literal
 
 from dragdeck.decks import CASE_FILE, COLUMNS_FILE
-from dragdeck.decks.case_file import FillingCase, RunInputs
 from dragdeck.decks.outputs import ColumnsFile
 from dragdeck.engine.completeness import part_files
 from dragdeck.engine.log import Sample, last_step, read_samples
 from dragdeck.engine.part import STATE_FILE, why_rejected
 from dragdeck.engine.process import is_held
-from dragdeck.engine.record import RunRecord
 from dragdeck.engine.reports import printable
 from dragdeck.errors import InputError
 from dragdeck.physics.contact_mechanics import fall_energy
+from dragdeck.records.case import FillingCase
+from dragdeck.records.run import CaseFile, RunRecord
 
 RunState = Literal["waiting", "running", "interrupted", "failed", "complete"]
 
@@ -87,7 +87,7 @@ def _status(folder: Path) -> RunStatus:
 
 def _unfinished(folder: Path, record: RunRecord, held: bool) -> RunStatus:
     """The status of a run that runs, or was interrupted."""
-    inputs = RunInputs.read(folder / CASE_FILE)
+    inputs = CaseFile.read(folder / CASE_FILE)
     sample, seconds = _newest(folder, record)
     first = record.last_part.from_step
     step = max(first, sample.step if sample else _shown_step(folder, record))
@@ -124,7 +124,7 @@ def _shown_step(folder: Path, record: RunRecord) -> int:
 
 
 def _rest(
-    folder: Path, inputs: RunInputs, sample: Sample | None
+    folder: Path, inputs: CaseFile, sample: Sample | None
 ) -> tuple[float | None, float | None]:
     if inputs.settled is None or sample is None:
         return None, None

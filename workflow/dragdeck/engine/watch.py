@@ -6,10 +6,10 @@ from pathlib import Path
 
 from dragdeck.engine.checkpoints import drop_old_checkpoints, name_whole_checkpoints
 from dragdeck.engine.log import Sample, breach, read_samples
-from dragdeck.engine.record import AcceptanceCheck
 from dragdeck.engine.reports import shown_bytes
 from dragdeck.engine.space import SPARE_BYTES, free_bytes, size_of
 from dragdeck.physics.run_limits import RunLimits
+from dragdeck.records.run import AcceptanceCheck
 
 SCREEN_BYTES = 16_000_000
 """No run prints as much, unless it repeats one message without end."""

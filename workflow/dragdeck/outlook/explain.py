@@ -10,10 +10,9 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from dragdeck.decks.deck import StudyScene
 from dragdeck.engine.reports import shown_time
-from dragdeck.outlook.measured import MeasuredCost, Tradeoff
-from dragdeck.scenes.scene import SceneType
+from dragdeck.records.tradeoff import CostEntry, TradeoffRecord
+from dragdeck.scenes.scene import SceneType, StudyScene
 from dragdeck.scenes.workpiece import FACET_STEP_S
 
 
@@ -65,14 +64,14 @@ def measured_speeds(results: Path) -> list[tuple[int, float]]:
     return found
 
 
-def price_of(name: str, tradeoff: Tradeoff | None) -> str:
+def price_of(name: str, tradeoff: TradeoffRecord | None) -> str:
     """What putting a thing back costs, as measured.
 
     Parameters
     ----------
     name : str
         A variant of ``benchmarks/costs/variants.yaml``.
-    tradeoff : Tradeoff or None
+    tradeoff : TradeoffRecord or None
         Its costs give for each variant the ratio of processor times, with a
         95 % interval if there were rounds enough for one.
     """
@@ -82,7 +81,7 @@ def price_of(name: str, tradeoff: Tradeoff | None) -> str:
     return f"enabling it costs {_ratio(cost, tradeoff)}"
 
 
-def _cheaper_choices(scene: str, tradeoff: Tradeoff) -> Iterable[tuple[str, str]]:
+def _cheaper_choices(scene: str, tradeoff: TradeoffRecord) -> Iterable[tuple[str, str]]:
     """What was measured to make a scene cheaper, beyond doubt, by a simulated second."""
     for cost in tradeoff.costs:
         sure = cost.ci95_high is not None and cost.ci95_high < 1
@@ -93,9 +92,9 @@ def _cheaper_choices(scene: str, tradeoff: Tradeoff) -> Iterable[tuple[str, str]
             )
 
 
-def _ratio(cost: MeasuredCost, tradeoff: Tradeoff) -> str:
+def _ratio(cost: CostEntry, tradeoff: TradeoffRecord) -> str:
     interval = "" if cost.ci95_low is None else f" ({cost.ci95_low:.3g} to {cost.ci95_high:.3g})"
-    engine, date = tradeoff.versions.engine, tradeoff.measured
+    engine, date = tradeoff.versions["engine"], tradeoff.measured
     return f"{cost.ratio:.3g}x{interval}, LIGGGHTS {engine}, {date}"
 
 
@@ -138,7 +137,7 @@ def explanation(
     scene: StudyScene,
     cost: Cost,
     notes: Iterable[tuple[str, str]],
-    tradeoff: Tradeoff | None,
+    tradeoff: TradeoffRecord | None,
 ) -> Table:
     """The table of one scene.
 
@@ -148,7 +147,7 @@ def explanation(
     cost : Cost
     notes : iterable of (str, str)
         What its time step means for each pair of bodies.
-    tradeoff : Tradeoff or None
+    tradeoff : TradeoffRecord or None
         Measured costs, if there are any.
     """
     deck = scene.deck

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from dragdeck.cases.case import Case
-from dragdeck.decks.deck import StudyScene
 from dragdeck.engine.reports import shown_bytes, shown_time
 from dragdeck.engine.space import expected_bytes
 from dragdeck.engine.status import RunStatus, run_status
@@ -13,7 +12,7 @@ from dragdeck.errors import InputError
 from dragdeck.outlook.explain import Cost, expected_cost, measured_speeds
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.lead import led
-from dragdeck.scenes.scene import SceneType
+from dragdeck.scenes.scene import SceneType, StudyScene
 
 WAITING = RunStatus("waiting")
 

@@ -12,9 +12,7 @@ from dataclasses import dataclass
 
 from dragdeck.cases.bed import full_stiffness_number, particle_material, smallest_radius
 from dragdeck.cases.case import Case
-from dragdeck.decks.deck import StudyScene
 from dragdeck.errors import Caution, InputError
-from dragdeck.outlook.measured import RestitutionErrors, stability_map, stable_step_law
 from dragdeck.physics.contact_mechanics import (
     effective_modulus,
     hertz_contact_time,
@@ -22,7 +20,8 @@ from dragdeck.physics.contact_mechanics import (
     rayleigh_time,
 )
 from dragdeck.physics.rounding import rounded
-from dragdeck.scenes.scene import Regime, SceneType
+from dragdeck.records.stability import RestitutionErrors, stability_map, stable_step_law
+from dragdeck.scenes.scene import Regime, SceneType, StudyScene
 from dragdeck.study.model import Study
 
 ORDINARY_RESTITUTION = 0.5
@@ -206,6 +205,9 @@ def timestep_notes(case: Case, kind: SceneType, scene: StudyScene) -> list[tuple
     if kind.needs_bed:
         text += "; of a drag, the stable step decides"
     return [*found, ("safe step", text)]
+
+
+# --- stability of contacts -----------------------------------------------------------------------
 
 
 _DOUBT = 2.0

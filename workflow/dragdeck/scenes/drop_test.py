@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from dragdeck.cases.bed import impact_time, particle_material
 from dragdeck.cases.case import Case, materials_content
 from dragdeck.decks import outputs
-from dragdeck.decks.case_file import DropTestCase
 from dragdeck.decks.data_file import Body, data_file
 from dragdeck.decks.deck import Deck, LeftOut, Scene
 from dragdeck.physics.contact_mechanics import fall_speed, rayleigh_time
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import timestep
+from dragdeck.records.case import DropTestCase
 from dragdeck.scenes.scene import SceneType, case_of_study, material_table
 from dragdeck.study.base import Json
 from dragdeck.study.model import Study

@@ -19,7 +19,6 @@ from dragdeck.cases.bed import (
 )
 from dragdeck.cases.case import Case, materials_content
 from dragdeck.decks import outputs
-from dragdeck.decks.case_file import FillingCase, SettlingCriterion
 from dragdeck.decks.data_file import Body, data_file
 from dragdeck.decks.deck import Deck, LeftOut, Scene
 from dragdeck.errors import Caution, InputError
@@ -39,6 +38,8 @@ from dragdeck.physics.domain_split import warnings as rank_warnings
 from dragdeck.physics.packing import Bed, Particles, pour
 from dragdeck.physics.rounding import rounded
 from dragdeck.physics.run_limits import RunLimits, run_limits
+from dragdeck.records.case import FillingCase
+from dragdeck.records.run import SettlingCriterion
 from dragdeck.scenes.scene import SceneType, case_of_study, material_table
 from dragdeck.study.base import Json
 from dragdeck.study.model import Media, Study

@@ -8,14 +8,8 @@ from functools import partial
 from dragdeck.cases.bed import bed_radii, bed_rayleigh_time, bed_timestep, skin
 from dragdeck.cases.case import Case, Stretch, materials_content, mesh_file, of_each_workpiece
 from dragdeck.decks import PACKING_FILE, WORKPIECE_MESH, outputs
-from dragdeck.decks.case_file import Phase, SteadyCriterion
 from dragdeck.decks.deck import LeftOut, Scene
 from dragdeck.decks.outputs import Output
-from dragdeck.decks.process_case import (
-    ProcessCase,
-    StatisticsOfRun,
-    WorkpieceOfRun,
-)
 from dragdeck.errors import Caution
 from dragdeck.files import file_checksum
 from dragdeck.mesh import bowl, stl_text
@@ -24,6 +18,8 @@ from dragdeck.physics.engine_limits import ENGINE_NEIGHBOURS
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import round_to
 from dragdeck.physics.run_limits import RunLimits
+from dragdeck.records.case import ProcessCase, StatisticsOfRun, WorkpieceOfRun
+from dragdeck.records.run import Phase, SteadyCriterion
 from dragdeck.scenes.dimensionless import describe
 from dragdeck.scenes.drop_test import DROP_TEST
 from dragdeck.scenes.filling import (

@@ -8,14 +8,7 @@ from typing import Any, Literal, TypeVar
 from dragdeck import __version__
 from dragdeck.cases.bed import particle_material, skin
 from dragdeck.cases.case import Case, digest, slug
-from dragdeck.decks.case_file import (
-    AssumptionOfRun,
-    BowlOfRun,
-    CaseOfStudy,
-    FidelityOfRun,
-    MediaOfRun,
-)
-from dragdeck.decks.deck import Materials, StudyScene, contact_law
+from dragdeck.decks.deck import Materials, Scene, contact_law
 from dragdeck.documents import Document
 from dragdeck.errors import InputError
 from dragdeck.physics.contact_mechanics import effective_modulus, effective_shear
@@ -23,10 +16,14 @@ from dragdeck.physics.contact_network import ContactConstants
 from dragdeck.physics.engine_limits import ENGINE_SOFTEST_PA
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import round_to
+from dragdeck.records.case import AssumptionOfRun, BowlOfRun, CaseOfRun, FidelityOfRun, MediaOfRun
 from dragdeck.study.base import Json, flat
 from dragdeck.study.model import Study
 
-C = TypeVar("C", bound=CaseOfStudy)
+C = TypeVar("C", bound=CaseOfRun)
+
+StudyScene = Scene[CaseOfRun]
+"""A run of a study's case."""
 
 _LONGEST_SLUG = 160
 """Characters of a run id's readable part: a folder's name has 255 bytes at most."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from dragdeck.cases.bed import bed_timestep
 from dragdeck.cases.case import Case, mesh_file
 from dragdeck.errors import Caution
 from dragdeck.mesh import (
@@ -29,7 +30,7 @@ from dragdeck.mesh import (
 )
 from dragdeck.physics.rounding import round_to, rounded
 from dragdeck.scenes.legs import deepest, farthest_reach, plunge_point, surface_speed
-from dragdeck.scenes.motion import driven
+from dragdeck.study.driven import DrivenMotion
 from dragdeck.study.rotation import by_vector
 from dragdeck.study.workpiece import CylinderShape, MeshShape
 
@@ -99,10 +100,11 @@ def dip(case: Case) -> float:
 
 def _postures(case: Case) -> Iterator[NDArray[np.float64]]:
     """Corners of the workpiece, (N, 3), as it leans and spins, its front along +x, m."""
-    mesh, way = workpiece_mesh(case), driven(case.study)
+    mesh, motion = workpiece_mesh(case), case.study.motion
+    way = DrivenMotion.of(motion, bed_timestep(case.study, "timestep_fraction"), 1.0)
     since = np.linspace(0.0, way.drive.steps, _LOOKS)
-    own = way.motion.path.own(way.drive, since)
-    if way.motion.turns_about_inclined_axis:
+    own = motion.path.own(way.drive, since)
+    if motion.turns_about_inclined_axis:
         tilt, angle = math.radians(way.drive.tilt_deg), np.linspace(0.0, math.tau, 25)[:, None]
         own = by_vector(angle * [math.sin(tilt), 0.0, math.cos(tilt)])
     for rotation in np.eye(3)[None] if own is None else own:

@@ -8,11 +8,10 @@ from typing import Any, Literal
 
 import numpy as np
 from markupsafe import Markup
-from numpy.typing import ArrayLike
-
-from dragdeck.study.rotation import Floats
+from numpy.typing import ArrayLike, NDArray
 
 Orientation = Literal["follow_path", "fixed"]
+_Array = NDArray[np.float64]
 
 LIVE_REFERENCE = Markup("${reference_x} ${reference_y} ${reference_z}")
 """The reference point where the engine has it when the drag begins or is resumed."""
@@ -27,13 +26,13 @@ class SmoothStart:
 
     steps: int = 0
 
-    def advance(self, since: ArrayLike) -> Floats:
+    def advance(self, since: ArrayLike) -> _Array:
         """Steps at full speed that get the motion as far as so many from its start."""
         since, ramp = np.asarray(since, dtype=np.float64), max(self.steps, 1)
         begun = np.minimum(since, self.steps)
         return np.asarray(begun**3 / ramp**2 * (1.0 - begun / (2.0 * ramp)) + (since - begun))
 
-    def pace(self, since: ArrayLike) -> Floats:
+    def pace(self, since: ArrayLike) -> _Array:
         """Speed after so many steps over the full one."""
         since = np.asarray(since)
         x = np.minimum(since / max(self.steps, 1), 1.0) if self.steps else np.ones(1)
@@ -109,11 +108,11 @@ class Drive:
         """Time after which the workpiece is so far along its path, and no longer starts, s."""
         return path_m / self.speed_m_s + self.begin.steps / 2 * self.timestep_s
 
-    def time_s(self, since: ArrayLike) -> Floats:
+    def time_s(self, since: ArrayLike) -> _Array:
         """Time that the way of so many steps takes at full speed."""
         return np.asarray(self.begin.advance(since) * self.full_duration_s / self.full_steps)
 
-    def share(self, since: ArrayLike) -> Floats:
+    def share(self, since: ArrayLike) -> _Array:
         """Part of the path's time that has passed after so many steps."""
         return np.asarray(self.begin.advance(since) / self.full_steps)
 
@@ -234,7 +233,7 @@ def rotating_by(names: Sequence[str]) -> dict[str, str]:
     return {part: rotating(name, axis) for (part, axis), name in turns}
 
 
-def rates_about_axes(matrix: Floats, drive: Drive) -> tuple[float, float, float]:
+def rates_about_axes(matrix: _Array, drive: Drive) -> tuple[float, float, float]:
     """Angular speeds about x, y and z that make a rotation, (3, 3), in a step, rad/s."""
     x = math.atan2(-matrix[1, 2], matrix[2, 2])
     y, z = math.asin(matrix[0, 2]), math.atan2(-matrix[0, 1], matrix[0, 0])

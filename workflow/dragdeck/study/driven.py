@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, JsonValue
 
 from dragdeck.study.drive import Drive, EngineMotion, Orientation, SmoothStart
 from dragdeck.study.model import Motion
-from dragdeck.study.rotation import Floats, Rotation, Steps
+from dragdeck.study.rotation import Floats, Rotation, StepCounts
 from dragdeck.study.superposed.motion import SuperposedMotion
 
 
@@ -109,39 +109,39 @@ class DrivenMotion:
         """Whether the direction of motion is always the same in the workpiece's own frame."""
         return not self.turns and self.motion.path.keeps_direction(self.drive.orientation)
 
-    def places(self, since: Steps, begun: Floats) -> Floats:
+    def places(self, since: StepCounts, begun: Floats) -> Floats:
         """Places of the reference point, (N, 3), after (N,) steps from where it begins, m."""
         place = self.motion.path.places(self.drive, since, begun)
         for one in self.superposed.values():
             place = place + one.shift(self.drive, since)
         return place
 
-    def rotation(self, since: Steps, start_rad: float) -> Rotation:
+    def rotation(self, since: StepCounts, start_rad: float) -> Rotation:
         """Orientations after (N,) steps of a workpiece whose front begins in a direction."""
         path = self.motion.path
         turn = start_rad + path.turn(self.drive, since)
         return self._rotated(since, Rotation(turn, path.own(self.drive, since)))
 
-    def rotation_along(self, since: Steps, direction_rad: Floats) -> Rotation:
+    def rotation_along(self, since: StepCounts, direction_rad: Floats) -> Rotation:
         """Orientations after (N,) steps, at (N,) directions of motion."""
         return self._rotated(since, self._by_path(since, direction_rad))
 
-    def _by_path(self, since: Steps, direction_rad: Floats) -> Rotation:
+    def _by_path(self, since: StepCounts, direction_rad: Floats) -> Rotation:
         path = self.motion.path
         first = np.full_like(direction_rad, path.direction_rad)
         turn = direction_rad if path.turns(self.drive.orientation) else first
         return Rotation(turn, path.own(self.drive, since))
 
-    def _rotated(self, since: Steps, rotation: Rotation) -> Rotation:
+    def _rotated(self, since: StepCounts, rotation: Rotation) -> Rotation:
         for one in self.superposed.values():
             rotation = one.rotated(self.drive, since, rotation)
         return rotation
 
-    def directions(self, since: Steps, ref_xy_m: Floats) -> Floats:
+    def directions(self, since: StepCounts, ref_xy_m: Floats) -> Floats:
         """Direction of motion along the path, (N,), after (N,) steps and at (N, 2) places, rad."""
         return self.motion.path.directions(self.drive, since, ref_xy_m)
 
-    def velocity(self, since: Steps, point_m: Floats, ref_m: Floats) -> Floats:
+    def velocity(self, since: StepCounts, point_m: Floats, ref_m: Floats) -> Floats:
         """Velocities of points that are fixed to the workpiece, (N, 3) in m/s.
 
         Parameters

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
-Steps = NDArray[np.float64] | NDArray[np.int64]
+StepCounts = NDArray[np.float64] | NDArray[np.int64]
 
 
 def wrap_angle(angle_rad: ArrayLike) -> Floats:

@@ -7,7 +7,7 @@ from itertools import takewhile
 import numpy as np
 from numpy.typing import NDArray
 
-from dragdeck.study.rotation import Steps
+from dragdeck.study.rotation import StepCounts
 
 
 def chain(
@@ -22,7 +22,7 @@ def chain(
     start : int
         The step at which the first stage begins.
     stages : iterable
-        Steps of each stage, and its value.
+        StepCounts of each stage, and its value.
     per_formula : int
         Stages that one formula adds: many would be too long a line, and few are slower.
     """
@@ -88,7 +88,7 @@ def integral(stages: Sequence[tuple[float, float]], time_s: float) -> float:
     return total
 
 
-def stage_at(steps: Steps, lengths: Sequence[int]) -> NDArray[np.int64]:
+def stage_at(steps: StepCounts, lengths: Sequence[int]) -> NDArray[np.int64]:
     """Index of the stage of each step, (N,); a stage owns its last step.
 
     Parameters
@@ -97,7 +97,7 @@ def stage_at(steps: Steps, lengths: Sequence[int]) -> NDArray[np.int64]:
         Counted from the start of the drag. Those before it belong to the first stage, those
         after it to the last one.
     lengths : sequence of int
-        Steps of each stage.
+        StepCounts of each stage.
     """
     stage = np.searchsorted(np.cumsum(lengths), steps, side="left")
     return np.minimum(stage, len(lengths) - 1)

@@ -10,7 +10,7 @@ from pydantic import Field
 from dragdeck.study.base import Json, Number, Positive
 from dragdeck.study.drive import Drive, EngineMotion, Orientation
 from dragdeck.study.paths.path import AroundBowl, Point
-from dragdeck.study.rotation import Floats, Steps, about_vertical, rotated, wrap_angle
+from dragdeck.study.rotation import Floats, StepCounts, about_vertical, rotated, wrap_angle
 
 
 class CirclePath(AroundBowl):
@@ -68,27 +68,27 @@ class CirclePath(AroundBowl):
     def _whole_rad(self) -> float:
         return self.sign * 2 * math.pi * self.revolutions
 
-    def places(self, drive: Drive, since: Steps, begun: Floats) -> Floats:
+    def places(self, drive: Drive, since: StepCounts, begun: Floats) -> Floats:
         """About the bowl's axis, from wherever it begins."""
         return rotated(np.tile(begun, (len(since), 1)), self._angle(drive, since))
 
-    def turn(self, drive: Drive, since: Steps) -> Floats:
+    def turn(self, drive: Drive, since: StepCounts) -> Floats:
         """As far as it has gone round."""
         angle = self._angle(drive, since)
         return angle if self.turns(drive.orientation) else np.zeros_like(angle)
 
-    def _angle(self, drive: Drive, since: Steps) -> Floats:
+    def _angle(self, drive: Drive, since: StepCounts) -> Floats:
         return np.asarray(self._engine_rad_s(drive) * drive.time_s(since))
 
     def _engine_rad_s(self, drive: Drive) -> float:
         return self.sign * drive.full_speed_m_s / self.radius_m
 
-    def directions(self, drive: Drive, since: Steps, ref_xy_m: Floats) -> Floats:
+    def directions(self, drive: Drive, since: StepCounts, ref_xy_m: Floats) -> Floats:
         """Across the radius to the reference point, where it is."""
         radial = np.arctan2(ref_xy_m[:, 1], ref_xy_m[:, 0])
         return wrap_angle(radial + self.sign * np.pi / 2.0)
 
-    def velocity(self, drive: Drive, since: Steps, point_m: Floats, ref_m: Floats) -> Floats:
+    def velocity(self, drive: Drive, since: StepCounts, point_m: Floats, ref_m: Floats) -> Floats:
         """``w x r`` with ``w = sign speed / radius`` if the workpiece turns with its path."""
         if not self.turns(drive.orientation):
             return self.straight_on(drive, since, self.directions(drive, since, ref_m[:, :2]))

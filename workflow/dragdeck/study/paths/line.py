@@ -9,8 +9,8 @@ from pydantic import Field
 
 from dragdeck.study.base import Json, Number, Positive
 from dragdeck.study.drive import Drive, EngineMotion, Orientation
-from dragdeck.study.paths.path import Point, WorkpiecePath, columns, turned
-from dragdeck.study.rotation import Floats, Steps, wrap_angle
+from dragdeck.study.paths.path import Point, WorkpiecePath, as_rows, turned
+from dragdeck.study.rotation import Floats, StepCounts, wrap_angle
 
 
 class LinePath(WorkpiecePath):
@@ -54,7 +54,7 @@ class LinePath(WorkpiecePath):
     @property
     def corners(self) -> Floats:
         """Its ends."""
-        return columns(self.place(np.array([0.0, 1.0])))
+        return as_rows(self.place(np.array([0.0, 1.0])))
 
     def place(self, share: Any) -> tuple[Any, Any, Any]:
         """Straight on."""
@@ -87,16 +87,16 @@ class LinePath(WorkpiecePath):
         """It has one direction."""
         return True
 
-    def places(self, drive: Drive, since: Steps, begun: Floats) -> Floats:
+    def places(self, drive: Drive, since: StepCounts, begun: Floats) -> Floats:
         """As far as its velocity takes it."""
         moved = drive.time_s(since)[:, None] * np.array(self.first_velocity(drive))
         return np.asarray(begun + moved)
 
-    def directions(self, drive: Drive, since: Steps, ref_xy_m: Floats) -> Floats:
+    def directions(self, drive: Drive, since: StepCounts, ref_xy_m: Floats) -> Floats:
         """The line's direction everywhere."""
         return np.full(len(ref_xy_m), wrap_angle(self.direction_rad))
 
-    def velocity(self, drive: Drive, since: Steps, point_m: Floats, ref_m: Floats) -> Floats:
+    def velocity(self, drive: Drive, since: StepCounts, point_m: Floats, ref_m: Floats) -> Floats:
         """The same everywhere."""
         return self.straight_on(drive, since, self.directions(drive, since, ref_m[:, :2]))
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from dragdeck.study.base import Json, Model
 from dragdeck.study.drive import Drive, EngineMotion, Formula, Orientation, formula, rotating
-from dragdeck.study.rotation import Floats, Steps, about_vertical, wrap_angle
+from dragdeck.study.rotation import Floats, StepCounts, about_vertical, wrap_angle
 
 Point = tuple[float, float]
 Vector = tuple[float, float, float]
@@ -118,7 +118,7 @@ class WorkpiecePath(Model):
     @property
     def corners(self) -> Floats:
         """Places, (N, 3), beyond which the path never is."""
-        return columns(self.place(np.linspace(0.0, 1.0, 8 * _PANELS + 1)))
+        return as_rows(self.place(np.linspace(0.0, 1.0, 8 * _PANELS + 1)))
 
     @property
     def turning(self) -> Sequence[tuple[float, float]]:
@@ -184,36 +184,36 @@ class WorkpiecePath(Model):
         heading, speed = self.direction_rad, drive.full_speed_m_s
         return speed * math.cos(heading), speed * math.sin(heading), 0.0
 
-    def places(self, drive: Drive, since: Steps, begun: Floats) -> Floats:
+    def places(self, drive: Drive, since: StepCounts, begun: Floats) -> Floats:
         """Places of the reference point, (N, 3), after (N,) steps from where it begins, m."""
-        moved = columns(self.place(drive.share(since))) - columns(self.place(np.zeros(1)))
+        moved = as_rows(self.place(drive.share(since))) - as_rows(self.place(np.zeros(1)))
         return np.asarray(begun + moved)
 
-    def turn(self, drive: Drive, since: Steps) -> Floats:
+    def turn(self, drive: Drive, since: StepCounts) -> Floats:
         """By which angle the path has turned the workpiece after (N,) steps, rad."""
         if not self.turns(drive.orientation):
             return np.zeros(len(since))
         return np.asarray(self._heading(drive.share(since)) - self.direction_rad)
 
-    def own(self, drive: Drive, since: Steps) -> Floats | None:
+    def own(self, drive: Drive, since: StepCounts) -> Floats | None:
         """Rotations in the workpiece's own frame, (N, 3, 3), by the path; None if there are none.
 
         They go before the turn about the vertical.
         """
         return None
 
-    def directions(self, drive: Drive, since: Steps, ref_xy_m: Floats) -> Floats:
+    def directions(self, drive: Drive, since: StepCounts, ref_xy_m: Floats) -> Floats:
         """Direction of motion, (N,) in rad, after (N,) steps and at (N, 2) places of the axis."""
         return wrap_angle(self._heading(drive.share(since)))
 
-    def velocity(self, drive: Drive, since: Steps, point_m: Floats, ref_m: Floats) -> Floats:
+    def velocity(self, drive: Drive, since: StepCounts, point_m: Floats, ref_m: Floats) -> Floats:
         """Velocity of points that are fixed to the workpiece.
 
         Parameters
         ----------
         drive : Drive
         since : (N,) ndarray of int
-            Steps from the start of the drag.
+            StepCounts from the start of the drag.
         point_m, ref_m : (N, 3) ndarray
             The points, and the reference point, at these steps.
 
@@ -224,14 +224,14 @@ class WorkpiecePath(Model):
         """
         share = drive.share(since)
         rate = drive.begin.pace(since) / (drive.full_steps * drive.timestep_s)
-        moved = rate[:, None] * columns(self.tangent(share))
+        moved = rate[:, None] * as_rows(self.tangent(share))
         if not self.turns(drive.orientation):
             return moved
         after, before = (self._heading(share + one * _NEAR) for one in (1, -1))
         turning = wrap_angle(after - before) / (2 * _NEAR) * rate
         return moved + about_vertical(turning, point_m - ref_m)
 
-    def straight_on(self, drive: Drive, since: Steps, direction_rad: Floats) -> Floats:
+    def straight_on(self, drive: Drive, since: StepCounts, direction_rad: Floats) -> Floats:
         """Velocity, (N, 3), at the mean speed in given directions."""
         ahead = np.cos(direction_rad), np.sin(direction_rad), np.zeros_like(direction_rad)
         speed = drive.speed_m_s * drive.begin.pace(since)
@@ -274,7 +274,7 @@ class WorkpiecePath(Model):
         return np.broadcast_to(np.arctan2(y, x), np.shape(share))
 
 
-def columns(vector: tuple[Any, Any, Any]) -> Floats:
+def as_rows(vector: tuple[Any, Any, Any]) -> Floats:
     """Three components, numbers or (N,) arrays, as an (N, 3) array."""
     return np.stack(np.broadcast_arrays(*vector), axis=-1).astype(np.float64)
 
@@ -282,7 +282,7 @@ def columns(vector: tuple[Any, Any, Any]) -> Floats:
 def _measured(path: WorkpiecePath) -> tuple[float, float]:
     """Length of a path, m, and its highest speed over the mean one."""
     middle = (np.arange(_PANELS) + 0.5)[:, None]
-    speed = np.linalg.norm(columns(path.tangent((middle + _NODES / 2) / _PANELS)), axis=-1)
+    speed = np.linalg.norm(as_rows(path.tangent((middle + _NODES / 2) / _PANELS)), axis=-1)
     length = float((speed * _WEIGHTS).sum() / 2 / _PANELS)
     return length, float(speed.max()) / length
 

@@ -10,7 +10,7 @@ from pydantic import Field, field_validator
 from dragdeck.study.base import Json, Number, Positive
 from dragdeck.study.drive import Drive, EngineMotion, Orientation
 from dragdeck.study.paths.path import AroundBowl
-from dragdeck.study.rotation import Floats, Steps
+from dragdeck.study.rotation import Floats, StepCounts
 
 
 class RestPath(AroundBowl):
@@ -90,15 +90,15 @@ class RestPath(AroundBowl):
         """It has one direction."""
         return True
 
-    def places(self, drive: Drive, since: Steps, begun: Floats) -> Floats:
+    def places(self, drive: Drive, since: StepCounts, begun: Floats) -> Floats:
         """Where it begins."""
         return np.tile(begun, (len(since), 1))
 
-    def directions(self, drive: Drive, since: Steps, ref_xy_m: Floats) -> Floats:
+    def directions(self, drive: Drive, since: StepCounts, ref_xy_m: Floats) -> Floats:
         """The same at all times."""
         return np.full(len(ref_xy_m), self.direction_rad)
 
-    def velocity(self, drive: Drive, since: Steps, point_m: Floats, ref_m: Floats) -> Floats:
+    def velocity(self, drive: Drive, since: StepCounts, point_m: Floats, ref_m: Floats) -> Floats:
         """None."""
         return np.zeros_like(point_m)
 

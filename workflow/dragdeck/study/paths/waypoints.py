@@ -13,10 +13,10 @@ from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from dragdeck.study.base import Json, Line, Number
 from dragdeck.study.drive import Drive, EngineMotion, Orientation, rates_about_axes, rotating_by
-from dragdeck.study.paths.path import Point, Vector, WorkpiecePath, columns, turned
+from dragdeck.study.paths.path import Point, Vector, WorkpiecePath, as_rows, turned
 from dragdeck.study.rotation import (
     Floats,
-    Steps,
+    StepCounts,
     by_vector,
     rotated,
     rotation_vector,
@@ -43,7 +43,7 @@ class Waypoint(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Stage:
+class DrivenStage:
     """A stage of constant velocity.
 
     Attributes
@@ -230,9 +230,9 @@ class WaypointsPath(WorkpiecePath):
     def corners(self) -> Floats:
         """The waypoints that it reaches, and its end."""
         at, points = self._passed()
-        return np.concatenate([points[at < 1.0, 1:4], columns(self.place(np.ones(1)))])
+        return np.concatenate([points[at < 1.0, 1:4], as_rows(self.place(np.ones(1)))])
 
-    def stages(self, drive: Drive) -> Sequence[Stage]:
+    def stages(self, drive: Drive) -> Sequence[DrivenStage]:
         """The stretches in whole steps; each ends where it should."""
         pace = drive.full_speed_m_s / self.own_speed_m_s
         ends = [(point.time_s - self.points[0].time_s) / pace for point in self.points[1:]]
@@ -244,7 +244,9 @@ class WaypointsPath(WorkpiecePath):
         for count, begin, end in in_steps(ends, drive.steps, drive.timestep_s):
             moved = (integral(rate, end) - integral(rate, begin) for rate in rates)
             x, y, z = (shift / (count * drive.timestep_s) for shift in moved)
-            found.append(Stage(count, (x, y, z), self._turned(begin * pace, end * pace, drive)))
+            found.append(
+                DrivenStage(count, (x, y, z), self._turned(begin * pace, end * pace, drive))
+            )
         return found
 
     def _turned(self, begin_s: float, end_s: float, drive: Drive) -> Vector:
@@ -279,7 +281,7 @@ class WaypointsPath(WorkpiecePath):
         """The fastest stage."""
         return max(math.hypot(*stage.velocity_m_s) for stage in self.stages(drive))
 
-    def places(self, drive: Drive, since: Steps, begun: Floats) -> Floats:
+    def places(self, drive: Drive, since: StepCounts, begun: Floats) -> Floats:
         """As far as its stages take it."""
         timestep, stages = drive.full_duration_s / drive.steps, self.stages(drive)
         ends = [end * timestep for end in accumulate(stage.steps for stage in stages)]
@@ -292,7 +294,7 @@ class WaypointsPath(WorkpiecePath):
         )
         return np.asarray(begun + np.array(list(moved)).reshape(-1, 3))
 
-    def own(self, drive: Drive, since: Steps) -> Floats | None:
+    def own(self, drive: Drive, since: StepCounts) -> Floats | None:
         """The rotations of its stages, one after another."""
         if not self._inclined(drive):
             return None
@@ -307,7 +309,7 @@ class WaypointsPath(WorkpiecePath):
         done = np.clip((since - np.array(before)[number]) / lengths, 0.0, 1.0)
         return np.asarray(by_vector(done[:, None] * vectors) @ np.array(begun)[number])
 
-    def directions(self, drive: Drive, since: Steps, ref_xy_m: Floats) -> Floats:
+    def directions(self, drive: Drive, since: StepCounts, ref_xy_m: Floats) -> Floats:
         """That of the stage; in a vertical one or a pause, the last direction before."""
         found, last, stages = [], self.direction_rad, self.stages(drive)
         for x, y, _ in (stage.velocity_m_s for stage in stages):
@@ -315,7 +317,7 @@ class WaypointsPath(WorkpiecePath):
             found.append(last)
         return wrap_angle(np.array(found)[_at(stages, since)])
 
-    def velocity(self, drive: Drive, since: Steps, point_m: Floats, ref_m: Floats) -> Floats:
+    def velocity(self, drive: Drive, since: StepCounts, point_m: Floats, ref_m: Floats) -> Floats:
         """That of the stage."""
         stages = self.stages(drive)
         number = _at(stages, since)
@@ -338,7 +340,7 @@ class WaypointsPath(WorkpiecePath):
         comment = "velocity along the path, as nested conditions on the step"
         return EngineMotion(movers, variables, comment)
 
-    def _per_step(self, stage: Stage) -> Floats:
+    def _per_step(self, stage: DrivenStage) -> Floats:
         """Rotation of a step in the frame of the bowl, (3, 3)."""
         vector = np.array(stage.rotation_rad) / stage.steps
         return by_vector(rotated(vector, self.direction_rad))
@@ -348,7 +350,7 @@ class WaypointsPath(WorkpiecePath):
         stages: list[JsonValue] = [self._entry_of(stage, drive) for stage in self.stages(drive)]
         return {"orientation": "fixed", "stages": stages}
 
-    def _entry_of(self, stage: Stage, drive: Drive) -> dict[str, JsonValue]:
+    def _entry_of(self, stage: DrivenStage, drive: Drive) -> dict[str, JsonValue]:
         rotation = list[JsonValue](stage.rotation_rad)
         return {
             "steps": stage.steps,
@@ -357,7 +359,7 @@ class WaypointsPath(WorkpiecePath):
         }
 
 
-def _at(stages: Sequence[Stage], since: Steps) -> NDArray[np.int64]:
+def _at(stages: Sequence[DrivenStage], since: StepCounts) -> NDArray[np.int64]:
     return stage_at(since, [stage.steps for stage in stages])
 
 

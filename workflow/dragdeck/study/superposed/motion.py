@@ -4,14 +4,11 @@ from abc import abstractmethod
 from typing import ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, JsonValue
 
 from dragdeck.study.base import Model, NonNegative
 from dragdeck.study.drive import Drive, EngineMotion, SmoothStart
-from dragdeck.study.rotation import Floats, Rotation, Steps
-
-Ints = NDArray[np.int64]
+from dragdeck.study.rotation import Floats, Rotation, StepCounts
 
 
 class SuperposedMotion(Model):
@@ -60,19 +57,19 @@ class SuperposedMotion(Model):
         """How it starts from rest."""
         return SmoothStart(round(self.ramp_s / drive.timestep_s))
 
-    def shift(self, drive: Drive, since: Steps) -> Floats:
+    def shift(self, drive: Drive, since: StepCounts) -> Floats:
         """How far it has taken the workpiece from its path after (N,) steps, (N, 3) in m."""
         return np.zeros((len(since), 3))
 
-    def turn(self, drive: Drive, since: Steps) -> Floats:
+    def turn(self, drive: Drive, since: StepCounts) -> Floats:
         """By which angle it has turned the workpiece about its axis after (N,) steps, rad."""
         return np.zeros(len(since))
 
-    def rotated(self, drive: Drive, since: Steps, before: Rotation) -> Rotation:
+    def rotated(self, drive: Drive, since: StepCounts, before: Rotation) -> Rotation:
         """The orientation after (N,) steps, with that which the workpiece has without it."""
         return before
 
-    def velocity(self, drive: Drive, since: Steps, arm_m: Floats, before: Rotation) -> Floats:
+    def velocity(self, drive: Drive, since: StepCounts, arm_m: Floats, before: Rotation) -> Floats:
         """What it adds to the velocity of points that are fixed to the workpiece.
 
         Parameters

@@ -8,7 +8,7 @@ from pydantic import Field, JsonValue
 
 from dragdeck.study.base import Positive
 from dragdeck.study.drive import Drive, EngineMotion
-from dragdeck.study.rotation import Floats, Rotation, Steps
+from dragdeck.study.rotation import Floats, Rotation, StepCounts
 from dragdeck.study.superposed.motion import SuperposedMotion
 
 
@@ -40,19 +40,19 @@ class Oscillation(SuperposedMotion):
         """The amplitude."""
         return self.amplitude_m
 
-    def shift(self, drive: Drive, since: Steps) -> Floats:
+    def shift(self, drive: Drive, since: StepCounts) -> Floats:
         """The sine."""
         height = self.amplitude_m * np.sin(self._angle(drive, since))
         return np.column_stack([np.zeros((len(since), 2)), height])
 
-    def velocity(self, drive: Drive, since: Steps, arm_m: Floats, before: Rotation) -> Floats:
+    def velocity(self, drive: Drive, since: StepCounts, arm_m: Floats, before: Rotation) -> Floats:
         """Of the whole workpiece, up and down."""
         velocity, pace = np.zeros_like(arm_m), self.begin(drive).pace(since)
         most = self.amplitude_m * self._rate_rad_s
         velocity[:, 2] = most * np.cos(self._angle(drive, since)) * pace
         return velocity
 
-    def _angle(self, drive: Drive, since: Steps) -> Floats:
+    def _angle(self, drive: Drive, since: StepCounts) -> Floats:
         return self._rate_rad_s * drive.timestep_s * self.begin(drive).advance(since)
 
     def on_engine(self, drive: Drive, heading: str | float) -> EngineMotion:

@@ -10,7 +10,7 @@ from pydantic import Field, JsonValue, model_validator
 
 from dragdeck.study.base import Model, Number, Positive
 from dragdeck.study.drive import Drive, EngineMotion, rotating, rotating_by
-from dragdeck.study.rotation import Floats, Rotation, Steps, about_vertical, by_vector
+from dragdeck.study.rotation import Floats, Rotation, StepCounts, about_vertical, by_vector
 from dragdeck.study.stages import chain, in_steps, integral, stage_at
 from dragdeck.study.superposed.motion import SuperposedMotion
 
@@ -87,7 +87,7 @@ class Spin(SuperposedMotion):
             stages.append((steps, turned / (steps * drive.timestep_s)))
         return stages
 
-    def turn(self, drive: Drive, since: Steps) -> Floats:
+    def turn(self, drive: Drive, since: StepCounts) -> Floats:
         """The angle about the axis after (N,) steps, rad."""
         stages, begin = self.stages(drive), self.begin(drive)
         ends = np.cumsum([steps for steps, _ in stages])
@@ -96,14 +96,14 @@ class Spin(SuperposedMotion):
         within = begin.advance(np.clip(done, begun, ends)) - begin.advance(begun)
         return np.asarray(within @ np.array([rate for _, rate in stages]) * drive.timestep_s)
 
-    def rotated(self, drive: Drive, since: Steps, before: Rotation) -> Rotation:
+    def rotated(self, drive: Drive, since: StepCounts, before: Rotation) -> Rotation:
         """About the vertical, or the axis of a tilted workpiece."""
         angle = self.turn(drive, since)
         if not drive.tilt_deg:
             return Rotation(before.turn_rad + angle, before.own)
         return Rotation(before.turn_rad, by_vector(angle[:, None] * _axis(drive)))
 
-    def velocity(self, drive: Drive, since: Steps, arm_m: Floats, before: Rotation) -> Floats:
+    def velocity(self, drive: Drive, since: StepCounts, arm_m: Floats, before: Rotation) -> Floats:
         """The rate of the stage that a step belongs to, cross the arm."""
         stages = self.stages(drive)
         rates = np.array([rate for _, rate in stages])

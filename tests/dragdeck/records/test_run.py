@@ -1,15 +1,14 @@
-"""How a run ended, read from what dragdeck writes."""
+"""How a run ended, and whether it counts."""
 
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import pytest
 
-from dragchain.run.completeness import CheckCode, CheckReason, RunRecord, State, read_accepted
-from dragdeck.engine import record as written
 from dragdeck.errors import DocumentError, RejectedRunError
+from dragdeck.records.run import AcceptanceCheck, RunPart, RunRecord, read_accepted
 
-KEPT = written.AcceptanceCheck(
+KEPT = AcceptanceCheck(
     code="particles_kept", name="no particle lost", passed=True, seen="4", limit="4"
 )
 
@@ -17,15 +16,15 @@ KEPT = written.AcceptanceCheck(
 def write(folder: Path, **changes: Any) -> Path:
     """A ``run.json`` of dragdeck in a folder."""
     parts = [
-        written.RunPart(part=1, checkpoint=None, from_step=0, to_step=40),
-        written.RunPart(part=2, checkpoint="restart.40", from_step=40, to_step=90),
+        RunPart(part=1, checkpoint=None, from_step=0, to_step=40),
+        RunPart(part=2, checkpoint="restart.40", from_step=40, to_step=90),
     ]
     content: dict[str, Any] = {
         "state": "complete", "inputs": "0f", "started": "2026-01-01T00:00:00", "ranks": 2,
         "engine_version": "3.8.0", "parts": parts, "checks": [KEPT], "steps": 90,
         "wall_time_s": 3.0, **changes,
     }  # fmt: skip
-    written.RunRecord(**content).write(folder / "run.json")
+    RunRecord(**content).write(folder / "run.json")
     return folder
 
 
@@ -68,9 +67,3 @@ def test_a_check_without_code_is_named(tmp_path: Path) -> None:
     file.write_text(file.read_text().replace('"code"', '"kode"'))
     with pytest.raises(DocumentError, match=r"checks\[0\]\.code: a required key is missing"):
         RunRecord.read(file)
-
-
-def test_both_packages_know_the_same_words() -> None:
-    assert get_args(CheckCode) == get_args(written.CheckCode)
-    assert get_args(CheckReason) == get_args(written.CheckReason)
-    assert get_args(State) == get_args(written.State)

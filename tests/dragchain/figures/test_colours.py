@@ -9,7 +9,7 @@ from dragchain.figures.style import COLOURS
 
 
 def test_the_copy_is_the_dictionary_of_the_figures(request: pytest.FixtureRequest) -> None:
-    """`pytest tests/contract --update` writes it anew."""
+    """`pytest tests/dragchain/figures --update` writes it anew."""
     file = ROOT / "workflow/dragdeck/data/colours.json"
     text = json.dumps(COLOURS, indent=1) + "\n"
     if request.config.getoption("--update"):

@@ -1,7 +1,5 @@
 """What ``case.json`` keeps of the advice that a run's settings came from."""
 
-from collections.abc import Sequence
-
 from dragdeck.documents import Part
 
 
@@ -12,7 +10,7 @@ class AdvisedSettings(Part):
     ----------
     tolerance : float
         Requested relative half-width of the 95 % CI, or error of a drop test.
-    quantities : sequence of str
+    quantities : tuple of str
         Quantities to which the tolerance applies.
     error : float or None
         Largest measured error of a drop test; None for a process, whose windows measure it.
@@ -24,7 +22,7 @@ class AdvisedSettings(Part):
     """
 
     tolerance: float
-    quantities: Sequence[str]
+    quantities: tuple[str, ...]
     error: float | None
     relative_cost: float
     largest_cost: float

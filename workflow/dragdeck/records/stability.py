@@ -1,56 +1,19 @@
-"""What was measured on the engine: the records in ``data/``, as read."""
+"""What evidence measured of stable time steps: ``stability.json`` and ``stable_step.json``."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import cache
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import BeforeValidator
 
 from dragdeck.documents import Document, Part
-from dragdeck.errors import InputError
 from dragdeck.physics.damping import damping_ratio
 
 _DATA = Path(str(resources.files("dragdeck"))) / "data"
-_TRADEOFF_FILE = _DATA / "tradeoff.json"
-"""The trade-off that was measured with this version."""
-
-
-class MeasuredDrop(Part):
-    """A time step of the drop test: largest relative error of an impact, and relative cost."""
-
-    timestep_fraction: float
-    restitution_error: float
-    relative_cost: float
-
-
-class MeasuredCost(Part):
-    """CPU time with one change, relative to that without it.
-
-    Attributes
-    ----------
-    name, what : str
-        Of the variant, and for readers.
-    unit : str
-        Unit to which `ratio` refers; `per_step` is the ratio of the CPU times per step.
-    ci95_low, ci95_high : float or None
-        None after a single round.
-    parameter, level
-        The fidelity parameter that was changed and its value, if it is about one.
-    """
-
-    name: str
-    scene: str
-    what: str
-    unit: Literal["per_step", "per_second"] = "per_second"
-    ratio: float
-    ci95_low: float | None
-    ci95_high: float | None
-    per_step: float | None = None
-    parameter: str | None = None
-    level: float | None = None
+"""The records that were measured with this version."""
 
 
 class StableStepLaw(Part):
@@ -89,60 +52,6 @@ class StableStepRecord(Document):
     stable_step: StableStepLaw
 
 
-class EngineVersion(Part):
-    """The version of LIGGGHTS."""
-
-    engine: str
-
-
-class Tradeoff(Document):
-    """What is read of the measured trade-off: costs of settings and options, and drop tests."""
-
-    remedy = (
-        "name a fidelity instead of a tolerance; or measure the trade-off, `snakemake "
-        "tradeoff --config study=uhlmann2015 plan=long`, and copy its "
-        "tradeoff.json to workflow/dragdeck/data/"
-    )
-
-    measured: str
-    versions: EngineVersion
-    drop_test: Sequence[MeasuredDrop]
-    costs: Sequence[MeasuredCost]
-
-    def cost(self, name: str) -> MeasuredCost | None:
-        """The cost of a variant, None if it was not timed."""
-        return next((cost for cost in self.costs if cost.name == name), None)
-
-
-@cache
-def stable_step_law() -> StableStepLaw:
-    """The law that was measured with this version in designed scenes."""
-    return StableStepRecord.read(_DATA / "stable_step.json").stable_step
-
-
-@cache
-def measured_tradeoff(file: Path = _TRADEOFF_FILE) -> Tradeoff:
-    """The measured trade-off.
-
-    Raises
-    ------
-    InputError
-        It has not been measured, or another version of dragdeck wrote it.
-    """
-    return Tradeoff.read(file)
-
-
-def tradeoff_if_measured(file: Path = _TRADEOFF_FILE) -> Tradeoff | None:
-    """`measured_tradeoff`, or None where it cannot be read.
-
-    For what is only told, not chosen.
-    """
-    try:
-        return measured_tradeoff(file)
-    except InputError:
-        return None
-
-
 def _to_digits(digits: int) -> BeforeValidator:
     def rounded(value: object) -> object:
         if not isinstance(value, float):
@@ -152,13 +61,13 @@ def _to_digits(digits: int) -> BeforeValidator:
     return BeforeValidator(rounded)
 
 
-_Step = Annotated[float | None, _to_digits(4)]
+Step = Annotated[float | None, _to_digits(4)]
 """A step over another, to four digits; NaN becomes None."""
 
-_KnownStep = Annotated[float, _to_digits(4)]
+KnownStep = Annotated[float, _to_digits(4)]
 """The same of a step that is always known."""
 
-_Rounded = Annotated[float, _to_digits(3)]
+Rounded = Annotated[float, _to_digits(3)]
 """A number to three digits."""
 
 
@@ -182,23 +91,23 @@ class SafeSteps(Part):
     limited_by : str
         The condition with the smallest safe step.
     ordinary : float or None
-        Safe without the strongly damped conditions, those below `ORDINARY_RESTITUTION`.
+        Safe without the strongly damped conditions, those with a restitution below 0.5.
     """
 
     conditions: int
     usable: int
-    base_fraction: _Step
-    base_critical: _Step
-    safe_fraction: _KnownStep
-    recommended_fraction: _KnownStep
-    over_rule: _KnownStep
-    stable_fraction: _Step
-    safe_critical: _Step
-    recommended_critical: _Step
-    stable_critical: _Step
+    base_fraction: Step
+    base_critical: Step
+    safe_fraction: KnownStep
+    recommended_fraction: KnownStep
+    over_rule: KnownStep
+    stable_fraction: Step
+    safe_critical: Step
+    recommended_critical: Step
+    stable_critical: Step
     limited_by: str
-    ordinary_fraction: _Step
-    ordinary_critical: _Step
+    ordinary_fraction: Step
+    ordinary_critical: Step
 
 
 class RestitutionErrors(Part):
@@ -212,22 +121,22 @@ class RestitutionErrors(Part):
         Of the largest restitution error among a run's impacts.
     worst, ordinary_worst : (B,) tuple of float
         Largest of the bin and of all with more steps; ordinary: where the restitution is at least
-        `ORDINARY_RESTITUTION`.
+        0.5.
     peak_force_worst : (B,) tuple of float
         The same of the relative error of the peak force.
     runs : (B,) tuple of int
     """
 
-    steps_per_contact: tuple[_Rounded, ...]
-    median: tuple[_Rounded, ...]
-    ordinary_worst: tuple[_Rounded, ...]
-    worst: tuple[_Rounded, ...]
-    peak_force_worst: tuple[_Rounded, ...]
+    steps_per_contact: tuple[Rounded, ...]
+    median: tuple[Rounded, ...]
+    ordinary_worst: tuple[Rounded, ...]
+    worst: tuple[Rounded, ...]
+    peak_force_worst: tuple[Rounded, ...]
     runs: tuple[int, ...]
 
 
 class Criteria(Part):
-    """The limits that points were classified with; see `ENERGY_LIMITS` and `OVERLAP_LIMIT`."""
+    """The limits that points were classified with; see `evidence.stability.judge`."""
 
     tolerance: float
     overlap_limit: float
@@ -235,7 +144,7 @@ class Criteria(Part):
     rest_floor: float
 
 
-class StabilityMap(Document):
+class StabilityFile(Document):
     """The content of ``stability.json``.
 
     Attributes
@@ -250,7 +159,9 @@ class StabilityMap(Document):
     regimes : mapping of str to SafeSteps
     """
 
-    remedy = "measure it: snakemake stability; then copy its stability.json here"
+    remedy = (
+        "measure it: snakemake stability; then copy its stability.json to workflow/dragdeck/data/"
+    )
 
     commands: tuple[str, ...]
     engine_versions: tuple[str, ...]
@@ -265,6 +176,12 @@ class StabilityMap(Document):
 
 
 @cache
-def stability_map() -> StabilityMap:
+def stable_step_law() -> StableStepLaw:
+    """The law that was measured with this version in designed scenes."""
+    return StableStepRecord.read(_DATA / "stable_step.json").stable_step
+
+
+@cache
+def stability_map() -> StabilityFile:
     """The map that was measured with this version."""
-    return StabilityMap.read(_DATA / "stability.json")
+    return StabilityFile.read(_DATA / "stability.json")

@@ -1,0 +1,1 @@
+"""JSON documents: a model a document, written and read by the same class."""

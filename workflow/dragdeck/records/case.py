@@ -1,0 +1,274 @@
+"""``case.json`` of a run of a study: what it models, for whoever reads its output."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Literal
+
+from pydantic import JsonValue, PositiveFloat, PositiveInt
+
+from dragdeck.documents import Part, omitted
+from dragdeck.errors import DocumentError, choices
+from dragdeck.physics.contact_network import ContactConstants
+from dragdeck.physics.run_limits import RunLimits
+from dragdeck.records.advised import AdvisedSettings
+from dragdeck.records.run import CaseFile, CountOfRun, RanksOfRun, SettlingCriterion
+from dragdeck.study.driven import PathEntry, SuperposedEntry
+from dragdeck.study.reference import Reference
+
+
+class FidelityOfRun(RanksOfRun):
+    """The settings for speed and accuracy with which this run is simulated.
+
+    A drop test and a filling have their own time step, and no workpiece that could be faster.
+
+    Attributes
+    ----------
+    name : str
+        Name of the fidelity of the case.
+    youngs_modulus_scale, speed_factor : float
+        Multipliers of every Young's modulus and of the speed of the workpiece.
+    timestep_fraction : float
+        Time step as a fraction of the Rayleigh time.
+    skin_m : float
+        Neighbour skin, m.
+    ranks : int
+        MPI ranks.
+    """
+
+    name: str
+    youngs_modulus_scale: PositiveFloat
+    timestep_fraction: PositiveFloat
+    speed_factor: PositiveFloat
+    skin_m: PositiveFloat
+
+
+class MediaOfRun(CountOfRun):
+    """The media: number of particles, and their radii and density as specified in the study.
+
+    Attributes
+    ----------
+    count : int
+        Number of particles.
+    radius_mean_m, radius_std_m : float
+        Mean and standard deviation of the radii, m.
+    density_kg_m3 : float
+        Density, kg/m3.
+    """
+
+    radius_mean_m: PositiveFloat
+    radius_std_m: float
+    density_kg_m3: PositiveFloat
+
+
+class BowlOfRun(Part):
+    """The bowl: a cylinder about the z axis with its floor at z = 0.
+
+    Attributes
+    ----------
+    radius_m : float
+        Inner radius, m.
+    walls : str
+        ``primitive`` (analytical plane and cylinder) or ``mesh``.
+    """
+
+    radius_m: PositiveFloat
+    walls: Literal["primitive", "mesh"]
+
+
+class WorkpieceOfRun(Part):
+    """The workpiece.
+
+    Attributes
+    ----------
+    number, count : int
+        Number of this workpiece, from 1, and number of all; absent if there is only one.
+    wake_from_m : float or None
+        Path length after which its axis is where a workpiece has passed before; absent if that
+        never happens, or if the path is not a circle.
+    kind : str
+        ``cylinder`` or ``mesh``.
+    radius_m : float
+        Radius of the vertical cylinder around its immersed part, m.
+    length_m : float
+        Height, m.
+    mesh : str
+        File of its mesh.
+    immersion_depth_m : float
+        Depth of its tip below the settled surface, m.
+    """
+
+    kind: Literal["cylinder", "mesh"]
+    radius_m: PositiveFloat
+    length_m: PositiveFloat
+    mesh: str
+    immersion_depth_m: float
+    number: int = omitted(0)
+    count: PositiveInt = omitted(1)
+    wake_from_m: PositiveFloat | None = omitted(None)
+
+
+class AssumptionOfRun(Part):
+    """A value that the source of the study does not report.
+
+    Attributes
+    ----------
+    field : str
+        Dotted name of the field.
+    value : JSON value
+        The assumed value.
+    why : str
+        Reason for the value.
+    """
+
+    field: str
+    value: JsonValue
+    why: str
+
+
+class StatisticsOfRun(Part):
+    """The part of the drag that is excluded from the statistics.
+
+    Attributes
+    ----------
+    transient_s : float
+        Initial time of the drag, s of simulated time.
+    """
+
+    transient_s: float
+
+
+class CaseOfRun(CaseFile):
+    """The content of ``case.json`` of a run of a study.
+
+    The attributes are the keys of the document. Those that a scene does not have are absent.
+
+    Attributes
+    ----------
+    inputs : mapping
+        The values that the run depends on, by dotted name; of a process all of the study.
+    contact_moduli : mapping
+        Contact constants of a particle with a ``particle``, the ``bowl`` and the ``workpiece``,
+        softened as the run is.
+    unsafe_timestep : str or None
+        Why a step of the process beyond the stable one is accepted.
+    fidelity : FidelityOfRun
+        Settings for speed and accuracy.
+    assumptions : tuple of AssumptionOfRun
+        Values that the source of the study does not report.
+    reference : Reference or None
+        Published values to compare with.
+    case : str or None
+        Readable name of the case of a process.
+    upstream : mapping
+        Run ids of the filling and drop test of a process.
+    output_of : str or None
+        Run whose raw output is read, for a second or further workpiece.
+    lead : str or None
+        Run id of the softer run that a process continues.
+    numbers : mapping
+        Dimensionless numbers of a process at the physical modulus and the speed of the study.
+    surface_m : float or None
+        Height of the settled surface above the floor, m.
+    workpiece : WorkpieceOfRun or None
+        Geometry and immersion.
+    motion, superposed
+        Path of the drag as simulated, and motions superposed on it.
+    statistics : StatisticsOfRun or None
+        Transient that is excluded.
+    asked : AdvisedSettings or None
+        Tolerance from which the settings were derived.
+    restitution : float or None
+        Coefficient of restitution in the input script of a drop test.
+    """
+
+    gravity_m_s2: float
+    fidelity: FidelityOfRun
+    inputs: Mapping[str, JsonValue]
+    media: MediaOfRun
+    bowl: BowlOfRun
+    contact_moduli: Mapping[str, ContactConstants]
+    assumptions: tuple[AssumptionOfRun, ...]
+    reference: Reference | None
+    unsafe_timestep: str | None = None
+    case: str | None = omitted(None)
+    upstream: Mapping[str, str] = omitted({})
+    output_of: str | None = omitted(None)
+    lead: str | None = omitted(None)
+    numbers: Mapping[str, float] = omitted({})
+    surface_m: PositiveFloat | None = omitted(None)
+    workpiece: WorkpieceOfRun | None = omitted(None)
+    motion: PathEntry | None = omitted(None)
+    superposed: tuple[SuperposedEntry, ...] = omitted(())
+    statistics: StatisticsOfRun | None = omitted(None)
+    asked: AdvisedSettings | None = omitted(None)
+    restitution: float | None = omitted(None)
+
+
+class DropTestCase(CaseOfRun):
+    """The ``case.json`` of a drop test."""
+
+    scene: Literal["drop_test"] = "drop_test"
+    restitution: float
+
+
+class FillingCase(CaseOfRun):
+    """The ``case.json`` of a filling."""
+
+    scene: Literal["filling"] = "filling"
+    settled: SettlingCriterion
+    limits: RunLimits
+
+
+class ProcessCase(CaseOfRun):
+    """The ``case.json`` of a process: the workpiece is dragged through the settled packing."""
+
+    scene: Literal["process"] = "process"
+    case: str
+    upstream: Mapping[str, str]
+    numbers: Mapping[str, float]
+    surface_m: PositiveFloat
+    workpiece: WorkpieceOfRun
+    motion: PathEntry
+    statistics: StatisticsOfRun
+    limits: RunLimits
+    asked: AdvisedSettings | None = None
+
+
+_OF_SCENE: Mapping[str, type[CaseOfRun]] = {
+    "drop_test": DropTestCase,
+    "filling": FillingCase,
+    "process": ProcessCase,
+}
+
+
+def load_case(run_dir: Path | str) -> CaseOfRun:
+    """Read ``case.json`` of a run folder.
+
+    Parameters
+    ----------
+    run_dir : Path or str
+        The run folder.
+
+    Returns
+    -------
+    CaseOfRun
+        A `DropTestCase`, `FillingCase` or `ProcessCase`.
+
+    Raises
+    ------
+    DocumentError
+        If the file is absent, is not JSON, has another schema number, or lacks
+        a key or has a value of the wrong type.
+    """
+    file = Path(run_dir) / "case.json"
+    scene = CaseFile.read(file).scene
+    if scene not in _OF_SCENE:
+        raise DocumentError(
+            "the scene is not one of a study",
+            file=file,
+            field="scene",
+            value=scene,
+            limit=choices(scene, _OF_SCENE),
+            remedy=CaseFile.remedy,
+        )
+    return _OF_SCENE[scene].read(file)
