@@ -187,6 +187,14 @@ def test_an_assumption_may_be_about_a_field_or_a_block(field: str, load: Load) -
     assert load({"assumptions": [{"field": field, "why": "any"}]})
 
 
+@pytest.mark.parametrize("name", [".", "..", "", "a/b"])
+def test_a_name_that_can_be_none_is_not_called_taken(
+    project: Project, case: Case, name: str
+) -> None:
+    with pytest.raises(InputError, match="this name cannot be used for a study"):
+        new_study(project.studies, name, "small")
+
+
 def test_an_assumption_about_another_kind_of_path_is_left_out(made: Made) -> None:
     circle = made({"assumptions": [{"field": "motion.path.radius_m", "why": "a guess"}]})
     line = made({"motion.path": {"kind": "line", "start_m": [-0.01, 0.0], "length_m": 0.02}})
