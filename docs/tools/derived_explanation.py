@@ -5,11 +5,10 @@ import math
 import pandas as pd
 from tables import ROOT, Store, derived
 
-from dragchain.contact_law.hertz import tangential_damping_ratio
 from dragchain.statistics.estimate import student_quantile
 from dragdeck.cases.bed import bed_rayleigh_time, bed_timestep, full_stiffness_number
 from dragdeck.physics.contact_mechanics import effective_modulus, effective_shear, shear_modulus
-from dragdeck.physics.damping import damping_ratio
+from dragdeck.physics.damping import damping_ratio, tangential_damping_ratio
 from dragdeck.project import Project
 from dragdeck.records.stability import StableStepLaw
 from dragdeck.study.model import BUILT_IN_FIDELITIES, Study

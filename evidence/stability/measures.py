@@ -11,7 +11,6 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from dragchain.arrays import Floats, Ints
-from dragchain.contact_law.hertz import sphere_mass
 from dragchain.dumps.frame import Columns, Frame
 from dragchain.dumps.run_parts import iter_frames, iter_prints
 from dragchain.errors import TableError
@@ -25,6 +24,7 @@ from dragchain.tables.workpiece_contacts import WorkpieceFrames
 from dragchain.tables.write import workpiece_force_rows
 from dragdeck.decks import CASE_FILE
 from dragdeck.decks.outputs import load_outputs
+from dragdeck.physics.contact_mechanics import sphere_mass
 from dragdeck.physics.contact_network import largest_eigenvalue
 from dragdeck.physics.damping import damping_ratio
 from dragdeck.records.case import CaseOfRun

@@ -8,10 +8,15 @@ from pathlib import Path
 import numpy as np
 
 from dragchain.arrays import Floats
-from dragchain.contact_law.hertz import Elastic, effective_modulus, effective_shear, sphere_mass
 from dragchain.dumps.run_parts import iter_frames
 from dragchain.errors import TableError
 from dragdeck.decks.outputs import load_outputs
+from dragdeck.physics.contact_mechanics import (
+    Elastic,
+    effective_modulus,
+    effective_shear,
+    sphere_mass,
+)
 from dragdeck.records.run import read_accepted
 from evidence.contact_law.impact import Contact, Motion, Particle, sliding_impact
 from evidence.contact_law.integrated_impact import integrated_impact

@@ -9,12 +9,12 @@ from typing import get_args
 
 import pandas as pd
 
-from dragchain.contact_law.hertz import tangential_damping_ratio
 from dragchain.errors import TableError
 from dragchain.figures.style import drawing, png
 from dragchain.report.page import data_uri, render_page, write_bundle
 from dragchain.tables.by_step import read_table
 from dragdeck.errors import RejectedRunError
+from dragdeck.physics.damping import tangential_damping_ratio
 from evidence.contact_law.impact import limited_restitution
 from evidence.verification.checks import CHECKS, JUDGED, Verdict, judge
 from evidence.verification.collide import CollideCase

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from dragchain.contact_law.hertz import sphere_mass
+from dragdeck.physics.contact_mechanics import sphere_mass
 from dragdeck.physics.contact_network import ContactConstants
 from dragdeck.records.case import CaseOfRun, MediaOfRun
 from evidence.stability.measures import (

@@ -4,14 +4,14 @@ import math
 
 import pytest
 
-from dragchain.contact_law.hertz import (
+from dragdeck.physics.contact_mechanics import (
     Elastic,
-    contact_time,
     effective_modulus,
     effective_shear,
+    hertz_contact_time,
     sphere_mass,
-    tangential_damping_ratio,
 )
+from dragdeck.physics.damping import tangential_damping_ratio
 from evidence.contact_law.impact import CONTACT_TIME, Contact, Particle, largest_overlap
 
 STEEL = Elastic(2e11, 0.3)
@@ -31,4 +31,4 @@ def test_the_contact_time_is_that_of_the_largest_overlap() -> None:
     mass = sphere_mass(0.0025, 2500.0)
     plane = Contact(Particle(mass, 0.0025), None, 6e10, 1.3e10, 1.0, 0.0, True)
     exact = CONTACT_TIME * largest_overlap(plane, 0.5) / 0.5
-    assert contact_time(mass, 0.0025, 6e10, 0.5) == pytest.approx(exact, rel=1e-3)
+    assert hertz_contact_time(mass, 0.0025, 6e10, 0.5) == pytest.approx(exact, rel=1e-3)
