@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from dragdeck.physics.damping import tangential_damping_ratio
+from dragdeck.physics.contact_mechanics import tangential_damping_ratio
 from evidence.contact_law.impact import CONTACT_TIME, Contact, Particle, largest_overlap
 
 from dragdeck.physics.contact_mechanics import (
