@@ -25,14 +25,14 @@ from dragchain.report.values import Extrapolated
 from dragchain.tradeoff.measure_run import quantities_along
 from dragchain.windows.estimate import Round, WindowsRecord
 from dragchain.windows.rounds import judged
-from dragdeck.advice.options import Work, plain_option, stiff_settings
+from dragdeck.advice.advise import Work, plain_option, stiff_settings
 from dragdeck.cases.case import Case
 from dragdeck.project import Project, by_run
 from dragdeck.records.case import load_case
 from dragdeck.records.run import RunRecord
 from dragdeck.records.tradeoff import measured_tradeoff
-from dragdeck.scenes.dimensionless import describe
-from dragdeck.scenes.registry import SCENES
+from dragdeck.scenes.process import SCENES
+from dragdeck.scenes.workpiece import describe
 
 TOLERANCE = 0.1
 QUANTITIES = [

@@ -25,8 +25,7 @@ from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import timestep
 from dragdeck.scenes.drop_test import DropDeck, drop_scene
 from dragdeck.scenes.filling import FILLING, filling_scene
-from dragdeck.scenes.legs import Stop
-from dragdeck.scenes.moved_workpiece import MovedWorkpiece, ProcessDeck
+from dragdeck.scenes.motion import MovedWorkpiece, ProcessDeck, Stop
 from dragdeck.scenes.process import process_scene
 from dragdeck.scenes.scene import read_bed
 from dragdeck.study.model import Study

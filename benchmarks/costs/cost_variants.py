@@ -16,7 +16,7 @@ from jinja2 import StrictUndefined
 from jinja2.nativetypes import NativeEnvironment
 
 from dragdeck.cases.case import Case
-from dragdeck.physics.engine_limits import ENGINE_SOFTEST_PA
+from dragdeck.physics.contact_mechanics import ENGINE_SOFTEST_PA
 from dragdeck.scenes.process import process_scene
 from dragdeck.study.base import Model
 from dragdeck.sweep.cases import settle_case

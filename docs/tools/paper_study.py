@@ -6,8 +6,12 @@ from pathlib import Path
 import pandas as pd
 
 from dragdeck.cases.bed import bed_rayleigh_time, bed_timestep, full_stiffness_number
-from dragdeck.physics.contact_mechanics import effective_modulus, effective_shear, shear_modulus
-from dragdeck.physics.damping import damping_ratio
+from dragdeck.physics.contact_mechanics import (
+    damping_ratio,
+    effective_modulus,
+    effective_shear,
+    shear_modulus,
+)
 from dragdeck.project import Project
 from dragdeck.records.stability import stable_step_law
 from dragdeck.study.model import BUILT_IN_FIDELITIES

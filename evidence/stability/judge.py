@@ -308,7 +308,7 @@ def conditions(points: pd.DataFrame) -> pd.DataFrame:
     -------
     DataFrame
         ``regime condition axis label usable`` (whether its reference is stable, so that a safe
-        step can be asked for), ``safe_fraction`` (no class of ``NOT_SAFE`` up to it),
+        step can be asked for), ``safe_fraction`` (none of `_NOT_SAFE` up to it),
         ``stable_fraction`` (no energy gained and no particles lost up to it), both over the
         Rayleigh time, the same over the critical step (``..._critical``), ``grid_end`` (whether
         the largest step of the grid is the safe one, so the limit lies above), ``restitution``.

@@ -25,8 +25,7 @@ from dragchain.tables.write import workpiece_force_rows
 from dragdeck.decks import CASE_FILE
 from dragdeck.decks.outputs import load_outputs
 from dragdeck.dumps.frame import Columns, Frame
-from dragdeck.physics.contact_network import largest_eigenvalue
-from dragdeck.physics.damping import damping_ratio
+from dragdeck.physics.contact_mechanics import damping_ratio, largest_eigenvalue
 from dragdeck.records.case import CaseOfRun
 from dragdeck.records.run import RunRecord
 from evidence.stability.points import Point, PointsFile

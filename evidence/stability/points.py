@@ -13,7 +13,7 @@ from dragdeck.scenes.scene import Regime
 from dragdeck.study.base import Number
 from dragdeck.study.check import explained
 from dragdeck.study.yaml import read_yaml
-from dragdeck.sweep.design import Design, Variation
+from dragdeck.sweep.cases import Design, Variation
 from evidence.stability.scenes import Packing
 
 REGIMES: tuple[Regime, ...] = get_args(Regime)

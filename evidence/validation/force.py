@@ -315,8 +315,12 @@ def setting_effects(runs: RunsByBed) -> list[Effect]:
 
 
 def effect_table(rows: Sequence[Effect]) -> pd.DataFrame:
-    """The effects as a table, one row per quantity and setting."""
-    return pd.DataFrame([dict(row) for row in rows], columns=list(Effect.model_fields))
+    """The effects as a table, one row per quantity and setting; values are text if any is."""
+    table = pd.DataFrame([dict(row) for row in rows], columns=list(Effect.model_fields))
+    for name in ("value", "reference_value"):
+        if any(isinstance(value, str) for value in table[name]):
+            table[name] = table[name].map(str, na_action="ignore")
+    return table
 
 
 def _base(runs: RunsByBed, run: MeasuredRun) -> MeasuredRun:

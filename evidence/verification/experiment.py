@@ -10,14 +10,14 @@ from pydantic.dataclasses import dataclass as checked
 from dragdeck import __version__
 from dragdeck.cases.case import digest
 from dragdeck.decks import outputs
-from dragdeck.decks.data_file import Body as DataBody
-from dragdeck.decks.data_file import Vector, data_file
 from dragdeck.decks.deck import Deck, Materials, Scene, contact_law
+from dragdeck.decks.render import Body as DataBody
+from dragdeck.decks.render import Vector, data_file
 from dragdeck.physics.contact_mechanics import rayleigh_time
 from dragdeck.physics.rounding import round_to
 from dragdeck.records.run import CaseFile, CountOfRun, RanksOfRun
 from dragdeck.study.contact_law import Pair
-from dragdeck.study.material import Material
+from dragdeck.study.workpiece import Material
 
 _FRAMES_TIMES_BODIES = 25_000
 """Rows of the largest output of a run: every step for two particles, fewer frames for a rack."""

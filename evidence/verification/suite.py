@@ -10,13 +10,13 @@ from typing import Annotated, Any, Literal
 import yaml
 from pydantic import Field, model_validator
 
-from dragdeck.decks.data_file import Vector
+from dragdeck.decks.render import Vector
 from dragdeck.physics import contact_mechanics as mechanics
 from dragdeck.physics.rounding import round_to
 from dragdeck.study.base import Model, Number, Positive, Whole
 from dragdeck.study.contact_law import Pair
-from dragdeck.study.material import Material
 from dragdeck.study.model import Study
+from dragdeck.study.workpiece import Material
 from evidence.verification.experiment import (
     ContactFacts,
     Experiment,

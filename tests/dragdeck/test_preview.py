@@ -23,7 +23,7 @@ from dragdeck.preview.page import Words, page
 from dragdeck.preview.swept import swept_volume
 from dragdeck.project import Project
 from dragdeck.scenes.filling import expected_surface
-from dragdeck.scenes.fit import check_fit, clearances
+from dragdeck.scenes.workpiece import check_fit, clearances
 from dragdeck.study.drive import Drive
 from dragdeck.study.superposed.oscillation import Oscillation
 from dragdeck.study.superposed.spin import Spin

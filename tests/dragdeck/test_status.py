@@ -10,8 +10,7 @@ from dragdeck.cli import main
 from dragdeck.project import Project, by_run
 from dragdeck.records.run import AcceptanceCheck, RunPart, RunRecord
 from dragdeck.scenes.filling import FILLING
-from dragdeck.scenes.process import PROCESS
-from dragdeck.scenes.registry import SCENES
+from dragdeck.scenes.process import PROCESS, SCENES
 
 
 @pytest.fixture(autouse=True)

@@ -145,7 +145,8 @@ def output(kind: str, columns: Sequence[str], period: int, first: int, last: int
 def run_json(**more: Any) -> dict[str, Any]:
     """Content of ``run.json`` of an accepted run."""
     return {
-        "schema": 2, "inputs": "0f", "state": "complete", "engine_version": "Engine 3.8", "ranks": 2,
+        "schema": 2, "inputs": "0f", "state": "complete", "engine_version": "Engine 3.8",
+        "ranks": 2,
         "steps": 160000, "steps_per_s": 2100.0, "wall_time_s": 76.0,
         "started": "2026-01-01T00:00:00", "parts": [{"part": 1, "from": None, "from_step": 0}],
         "checks": [particles_kept(1422)],

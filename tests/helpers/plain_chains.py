@@ -20,7 +20,7 @@ from dragchain.network.chains import (
     major_stress,
 )
 from dragchain.network.frame import FLOOR, KINDS, SIDE, WORKPIECE, NetworkFrame
-from dragdeck.study.rotation import wrap_angle
+from dragdeck.study.drive import wrap_angle
 
 BOWL = -1
 Net = dict[int, list[tuple[float, int, int]]]

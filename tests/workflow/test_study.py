@@ -23,7 +23,7 @@ from dragchain import read_dump, write_tables
 from dragchain.network.write import write_chains
 from dragchain.tables.network_contacts import contact_rows
 from dragchain.tables.run_folder import Run
-from dragdeck.scenes.registry import SCENES
+from dragdeck.scenes.process import SCENES
 
 pytestmark = [pytest.mark.engine, pytest.mark.slow]
 

@@ -38,8 +38,7 @@ from dragdeck.records.case import CaseOfRun
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import PROCESS
 from dragdeck.scenes.scene import read_bed
-from dragdeck.study.drive import Drive
-from dragdeck.study.rotation import rotated
+from dragdeck.study.drive import Drive, rotated
 from dragdeck.study.superposed.motion import SuperposedMotion
 from dragdeck.study.superposed.oscillation import Oscillation
 from dragdeck.study.superposed.spin import Spin

@@ -1,8 +1,7 @@
 // What all charts have in common: uPlot fitted to an element, its axes, and marks over the plotting area.
 import uPlot from "uplot";
 import style from "uplot/dist/uPlot.min.css";
-import { make } from "./dom.js";
-import { plain } from "./numbers.js";
+import { make, plain } from "./dom.js";
 
 document.head.prepend(make("style", {}, style));
 

@@ -1,4 +1,4 @@
-// Elements of the page.
+// Elements of the page, and numbers as text.
 
 export const byId = (id) => document.getElementById(id);
 
@@ -8,3 +8,29 @@ export function make(tag, properties, ...parts) {
   element.append(...parts);
   return element;
 }
+
+const RAISED = "⁰¹²³⁴⁵⁶⁷⁸⁹";
+
+export const minus = (text) => text.replaceAll("-", "−");
+
+/** A round number, without needless digits. */
+export const plain = (value) => minus(String(Number(value.toPrecision(6))));
+
+export const tenTo = (power) =>
+  `10${power < 0 ? "⁻" : ""}${[...String(Math.abs(power))].map((digit) => RAISED[digit]).join("")}`;
+
+/** A number with four significant digits; the data have a little more. */
+export function digits(value, count = 4) {
+  if (!Number.isFinite(value)) return "–";
+  if (value === 0) return "0";
+  const text = value.toPrecision(count),
+    [front, power] = text.split("e");
+  if (power === undefined) return minus(text);
+  return Math.abs(value) >= 1 ? minus(Number(text).toFixed(0)) : `${minus(front)} × ${tenTo(Number(power))}`;
+}
+
+export const fixed = (value, decimals) => minus(value.toFixed(decimals));
+
+export const seconds = (value) => `${fixed(value, 3)} s`;
+
+export const whole = (value) => value.toLocaleString("en-GB").replaceAll(",", "\u202f");

@@ -1,7 +1,7 @@
 // The force against the motion over process time: raw and filtered, with zoom, cursor and peaks.
 import { axis, Chart, line } from "./chart.js";
 import { COLOURS } from "./colours.js";
-import { digits, seconds } from "./numbers.js";
+import { digits, seconds } from "./dom.js";
 
 const LEAST_SPAN = 0.02; // shortest stretch to zoom into, as a fraction of the whole
 const NEAR = 4; // pixels: a shorter drag is a click

@@ -1,13 +1,11 @@
 // What colours and lengths mean.
-import { CLASS_COLOURS } from "./colours.js";
-import { make } from "./dom.js";
-import { CLASSES } from "./frames.js";
-import { digits } from "./numbers.js";
+import { digits, make } from "./dom.js";
+import { CLASSES } from "./data.js";
 
 const SCALES = {
-  force: ["Normal force of a contact (N)", 1],
-  speed: ["Speed of a particle (mm/s)", 1],
-  displacement: ["Displacement of a particle (mm)", 1],
+  force: "Normal force of a contact (N)",
+  speed: "Speed of a particle (mm/s)",
+  displacement: "Displacement of a particle (mm)",
 };
 
 /** Fill the legend with the scale of the scene and that of the load on the workpiece. */
@@ -15,7 +13,7 @@ export function showLegend(element, { colours, scales }, look, load) {
   const key = `${look.colour} ${load?.name}`;
   if (element.dataset.key === key) return;
   element.dataset.key = key;
-  const parts = [look.colour === "class" ? classes() : scale(SCALES[look.colour][0], scales[look.colour], colours)];
+  const parts = [look.colour === "class" ? classes() : scale(SCALES[look.colour], scales[look.colour], colours)];
   if (load) parts.push(scale(`Workpiece: ${load.label} (${load.unit})`, load.top, colours));
   element.replaceChildren(...parts);
 }
@@ -33,11 +31,7 @@ export function colourBar(colours) {
 }
 
 function classes() {
-  const rows = CLASSES.map((name, kind) => {
-    const swatch = make("i");
-    swatch.style.background = CLASS_COLOURS[kind];
-    return make("div", {}, swatch, name.replace("-", "–"));
-  });
+  const rows = CLASSES.map((name, kind) => make("div", {}, make("i", { className: `class-${kind}` }), name));
   return make("div", {}, "Class of a contact", ...rows);
 }
 

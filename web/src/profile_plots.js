@@ -2,8 +2,7 @@
 import uPlot from "uplot";
 import { axis, Chart, line } from "./chart.js";
 import { colourBar } from "./legend.js";
-import { digits, plain, seconds, tenTo, whole } from "./numbers.js";
-import { profilesOf } from "./profiles.js";
+import { digits, plain, seconds, tenTo, whole } from "./dom.js";
 
 const BLUE = "#0b5c96",
   GREY = "#ccd3da";
@@ -33,11 +32,8 @@ const FORCE = {
 
 const inWords = (value) => (Number.isInteger(value) ? whole(value) : digits(value));
 const highest = (values) => values.reduce((best, value, bin) => (value > values[best] ? bin : best), 0);
-const binOf = (limits, at) =>
-  Math.max(
-    limits.slice(0, -1).findLastIndex((limit) => limit <= at),
-    0,
-  );
+/** The bin that a value is in: how many inner limits are not above it. */
+const binOf = (limits, at) => limits.slice(1, -1).filter((limit) => limit <= at).length;
 const ends = (limits) => [limits[0], limits.at(-1)];
 /** Heights of bars, from zero at the first limit to zero at the last one. */
 const outline = (values) => [0, ...values, 0];
@@ -105,12 +101,20 @@ class Bins extends Chart {
   }
 }
 
+/** A profile: limits of its bins, their values at a frame, and the mean of all frames. */
+function profile(name, { head, columns }) {
+  const { limits, ...all } = head.profiles[name],
+    bins = limits.length - 1;
+  return { limits, ...all, at: (number) => columns[`${name}_profile`].subarray(bins * number, bins * (number + 1)) };
+}
+
 /** All plots; `parts`: elements `azimuth`, `depth`, `map`, `size`, the map's `scale`, and `told` for the values. */
 export class ProfilePlots {
   constructor(parts, frames, colourOf) {
-    const { azimuth, depth, size, map } = (this.profiles = profilesOf(frames)),
-      { times, head } = frames;
-    const force = (number) => `${digits(azimuth.values[number].reduce((sum, one) => sum + one))} N in all`,
+    const [azimuth, depth, size] = ["azimuth", "depth", "size"].map((name) => profile(name, frames)),
+      { times, head } = frames,
+      { map } = head.profiles;
+    const force = (number) => `${digits(azimuth.at(number).reduce((sum, one) => sum + one))} N in all`,
       mean = (number) => `mean ${digits(size.means[number])} N; mean of all frames ${digits(head.scales.mean)} N`;
     Object.assign(this, { times, number: 0, told: (text) => (parts.told.textContent = text) });
     this.bars = [
@@ -121,16 +125,16 @@ export class ProfilePlots {
     const mark = (force) => force > 0 && { x: [Math.log10(force), Math.log10(force)] };
     this.bars[2].mark("mean", () => mark(head.scales.mean));
     this.bars[2].mark("now", () => mark(size.means[this.number]));
-    this.addMap(parts.map, map, colourOf);
+    this.addMap(parts.map, { ...map, sectors: azimuth.limits, levels: depth.limits }, colourOf);
     parts.scale.append("0", colourBar(head.colours), `${digits(map.top, 3)} N`);
   }
 
   /** Bars of a profile: upright, or over depth from the left edge. */
-  addBars(element, along, { limits, mean, values, top }, [label, unit], sum) {
+  addBars(element, along, { limits, mean, at, top }, [label, unit], sum) {
     const lying = along === DEPTH ? 1 : 0,
       title = element.getAttribute("aria-label");
     const bins = { along: { x: along }, limits: { x: limits }, values: mean, below: lying || -1, told: this.told };
-    bins.value = (bin) => [values[this.number], mean].map((one) => `${inWords(one[bin])} ${unit}`).join(", mean ");
+    bins.value = (bin) => [at(this.number), mean].map((one) => `${inWords(one[bin])} ${unit}`).join(", mean ");
     const x = { time: false, range: ends(limits), ori: lying, dir: lying ? -1 : 1 },
       scales = { x, y: { range: [0, 1.04 * top], ori: 1 - lying } };
     const axes = [along.axis, axis(label, { side: lying ? 2 : 3, space: 30 })];
@@ -138,7 +142,7 @@ export class ProfilePlots {
       series = [{}, line({ fill: GREY, width: 0, paths }), now];
     const chart = new Bins(element, bins, { scales, axes, series }, []);
     chart.show = () => {
-      chart.plot.setData([[limits[0], ...limits], outline(mean), outline(values[this.number])]);
+      chart.plot.setData([[limits[0], ...limits], outline(mean), outline(at(this.number))]);
       element.setAttribute("aria-label", `${title} at ${seconds(this.times[this.number])}: ${sum(this.number)}`);
       chart.tell();
     };
@@ -146,7 +150,7 @@ export class ProfilePlots {
   }
 
   /** The mean normal force on the workpiece over azimuth and depth. */
-  addMap(element, { sectors, levels, values, top }, colourOf) {
+  addMap(element, { sectors, levels, mean: values, top }, colourOf) {
     const bins = { along: { x: AZIMUTH, y: DEPTH }, limits: { x: sectors, y: levels }, values, told: this.told };
     Object.assign(bins, { value: (bin) => `mean ${digits(values[bin])} N`, below: sectors.length - 1 });
     const scales = { x: { time: false, range: ends(sectors) }, y: { range: ends(levels), dir: -1 } };

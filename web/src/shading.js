@@ -7,7 +7,7 @@ uniform mat4 modelViewMatrix, projectionMatrix;
 const LIGHT = `float light(vec3 normal) { return 0.58 + 0.42 * max(dot(normal, vec3(0.30, 0.45, 0.84)), 0.0); }
 `;
 
-const material = (vertexShader, fragmentShader, options = {}) =>
+const material = (vertexShader, fragmentShader, options) =>
   new RawShaderMaterial({
     glslVersion: GLSL3,
     vertexShader: HEAD + vertexShader,
@@ -27,7 +27,7 @@ const SQUARE = `
 /** Bodies between two points, which may be one: spheres, and cylinders with round ends. Texels:
  *  (start, radius), (end, width of a halo or 0), (colour, 0). In parallel projection the outline of such
  *  a body is that of a stadium, and its depth is exact where it is a sphere. */
-export const bodyMaterial = () =>
+export const bodyMaterial = (uniforms, options) =>
   material(
     SQUARE +
       `
@@ -60,11 +60,11 @@ export const bodyMaterial = () =>
     vec3 normal = vec3(off.x * shape.xy + off.y * vec2(-shape.y, shape.x), towards);
     shown = vec4(halo ? tint : tint * light(normal), 1.0);
   }`,
-    { side: DoubleSide },
+    { side: DoubleSide, uniforms, ...options },
   );
 
 /** Facets with a colour each, lit from the camera's side. */
-export const facetMaterial = () =>
+export const facetMaterial = (options) =>
   material(
     `
   in vec3 position, normal, colour;
@@ -80,17 +80,5 @@ export const facetMaterial = () =>
     vec3 normal = normalize(facing);
     shown = vec4(tint * (0.3 + 0.7 * light(normal.z < 0.0 ? -normal : normal)), 1.0);
   }`,
-    { side: DoubleSide },
-  );
-
-/** Lines of one colour. */
-export const lineMaterial = (colour, options) =>
-  material(
-    `
-  in vec3 position;
-  void main() { gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0); }`,
-    `
-  uniform vec3 colour; out vec4 shown;
-  void main() { shown = vec4(colour, 1.0); }`,
-    { uniforms: { colour: { value: colour } }, ...options },
+    { side: DoubleSide, ...options },
   );

@@ -14,8 +14,9 @@ import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 ColorManagement.enabled = false; // colours are shown as they are given
 
 export const PRESETS = ["overview", "above", "along", "side", "follow"];
-// Where presets look from: ahead of the workpiece, to its right, and above; "above" keeps y upright instead.
-const FROM = { overview: [0.55, 0.75, 0.4], along: [-1, 0, 0], side: [0, 1, 0], follow: [-0.75, 0.5, 0.45] };
+// Where presets look from: ahead of the workpiece, to its left, and above; "above" keeps y upright instead.
+const FROM = { overview: [0.55, -0.75, 0.4], along: [-1, 0, 0], side: [0, -1, 0], follow: [-0.75, -0.5, 0.45] },
+  ABOVE = new Vector3(0, -1e-4, 1);
 const FINE = 2; // pixels of the picture per pixel of the page at rest: smooth edges
 const LEAST_RATIO = 0.6;
 const REST_MS = 180,
@@ -31,13 +32,11 @@ export class View {
     this.scene = new Scene();
     this.camera = new OrthographicCamera();
     this.camera.up.copy(UP);
-    this.area = area;
-    this.pose = pose;
+    Object.assign(this, { area, pose });
     this.controls = new OrbitControls(this.camera, canvas);
     Object.assign(this.controls, { enableDamping: false, zoomToCursor: true, minZoom: 0.3, maxZoom: 40 });
     this.controls.addEventListener("change", () => this.wanted());
     this.controls.addEventListener("start", () => (this.framed = null));
-    this.drawn = 0; // pictures so far
     this.pace = { ratio: devicePixelRatio, last: 0, slow: 0 };
     new ResizeObserver(() => this.resize()).observe(canvas.parentElement);
     this.resize();
@@ -49,14 +48,8 @@ export class View {
     if (!width || !height) return;
     const { radius } = this.area(),
       half = radius * Math.max(1, height / width);
-    Object.assign(this.camera, {
-      left: (-half * width) / height,
-      right: (half * width) / height,
-      top: half,
-      bottom: -half,
-      near: 0.1 * radius,
-      far: 20 * radius,
-    });
+    const [top, right] = [half, (half * width) / height];
+    Object.assign(this.camera, { left: -right, right, top, bottom: -top, near: 0.1 * radius, far: 20 * radius });
     this.camera.updateProjectionMatrix();
     this.renderer.setSize(width, height, false);
     if (this.framed) this.preset(this.framed);
@@ -86,28 +79,17 @@ export class View {
     this.request = undefined;
     if (this.renderer.getPixelRatio() !== ratio) this.renderer.setPixelRatio(ratio);
     this.renderer.render(this.scene, this.camera);
-    this.drawn++;
     this.after?.();
   }
 
   preset(name) {
-    const { heading } = this.pose(),
-      { centre, radius } = this.area(),
-      ahead = new Vector3(Math.cos(heading), Math.sin(heading), 0);
-    const right = new Vector3().crossVectors(ahead, UP),
-      [forth, aside, up] = FROM[name] ?? [];
-    const from =
-      forth === undefined
-        ? new Vector3(0, -1e-4, 1)
-        : new Vector3(0, 0, up).addScaledVector(ahead, forth).addScaledVector(right, aside);
-    this.follows = name === "follow" ? heading : null;
+    const follows = name === "follow",
+      { heading } = this.pose(),
+      { centre, radius } = this.area();
+    const from = name === "above" ? ABOVE.clone() : new Vector3(...FROM[name]).applyAxisAngle(UP, heading);
+    this.follows = follows ? heading : null;
     this.framed = name; // until the user moves the camera: a window of another size is filled again
-    this.look(
-      this.follows === null ? centre : this.nearWorkpiece(),
-      from,
-      name === "follow" ? 1.4 * this.zoomOf(from) : this.zoomOf(from),
-      radius,
-    );
+    this.look(follows ? this.nearWorkpiece() : centre, from, (follows ? 1.4 : 1) * this.zoomOf(from), radius);
   }
 
   /** The magnification at which the area just fits, seen from a direction. */
@@ -149,24 +131,13 @@ export class View {
 
   turn(sideways, upwards) {
     this.framed = null;
-    const offset = this.camera.position.clone().sub(this.controls.target).applyAxisAngle(UP, sideways);
-    const tilt = Math.min(Math.max(offset.angleTo(UP) + upwards, 1e-4), Math.PI - 1e-4),
-      radius = Math.hypot(offset.x, offset.y),
-      length = offset.length();
-    const across = radius > 1e-6 ? new Vector3(offset.x / radius, offset.y / radius, 0) : new Vector3(0, -1, 0);
-    this.look(
-      this.controls.target.clone(),
-      across.multiplyScalar(Math.sin(tilt)).add(new Vector3(0, 0, Math.cos(tilt))),
-      this.camera.zoom,
-      length / 8,
-    );
+    this.controls.rotateLeft(-sideways);
+    this.controls.rotateUp(-upwards);
   }
 
   magnify(factor) {
     this.framed = null;
-    this.camera.zoom = Math.min(Math.max(this.camera.zoom * factor, this.controls.minZoom), this.controls.maxZoom);
-    this.camera.updateProjectionMatrix();
-    this.wanted();
+    this.controls.dollyOut(factor);
   }
 
   /** The ray under a point of the canvas, in pixels from its corner. */

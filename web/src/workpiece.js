@@ -1,21 +1,37 @@
-// The workpiece: its facets, coloured by what acted on them, and an arrow along its motion.
-import { BufferAttribute, BufferGeometry, ConeGeometry, CylinderGeometry, Group, Mesh, Triangle, Vector3 } from "three";
-import { COLOURS, rgb } from "./colours.js";
+// The workpiece: its facets, coloured by what acted on them, and an arrow along its motion; and outlines
+// of the bowl, the settled surface of the bed, and the path of the workpiece.
+import {
+  BufferAttribute,
+  BufferGeometry,
+  Group,
+  LatheGeometry,
+  Line,
+  LineBasicMaterial,
+  LineSegments,
+  Mesh,
+  Triangle,
+  Vector2,
+  Vector3,
+} from "three";
+import { COLOURS, STEEL, rgb } from "./colours.js";
 import { facetMaterial } from "./shading.js";
+
+const PARTS = 96;
+const UP = new Vector3(0, 0, 1);
+
+/** A geometry of this colour. */
+export function tinted(geometry, colour) {
+  const tints = Array(geometry.attributes.position.count).fill(rgb(colour)).flat();
+  return geometry.setAttribute("colour", new BufferAttribute(new Float32Array(tints), 3));
+}
 
 export class Workpiece {
   constructor(own, columns, top) {
-    this.own = own;
-    this.columns = columns;
-    this.corners = columns.corners;
-    this.count = this.corners.length / 9;
-    this.tints = new Float32Array(this.corners.length);
-    const geometry = new BufferGeometry();
-    geometry.setAttribute("position", new BufferAttribute(this.corners, 3));
+    Object.assign(this, { own, columns, corners: columns.corners });
+    const geometry = new BufferGeometry().setAttribute("position", new BufferAttribute(this.corners, 3));
     geometry.computeVertexNormals(); // no corner is shared: those of the facets
     this.normals = geometry.attributes.normal.array;
-    geometry.setAttribute("colour", new BufferAttribute(this.tints, 3));
-    this.body = new Mesh(geometry, facetMaterial());
+    this.body = new Mesh(tinted(geometry, COLOURS.workpiece), facetMaterial());
     this.body.frustumCulled = false;
     this.group = new Group().add(this.body);
     this.arrow = arrow(own.radius);
@@ -36,31 +52,38 @@ export class Workpiece {
     this.arrow.rotation.set(0, 0, heading);
   }
 
+  /** The load of this name, if there is one. */
+  load(name) {
+    return this.own.loads.find((load) => load.name === name);
+  }
+
   /** Colour the facets by a load; plain if there is none of that name. */
   update(look, colourOf) {
-    const load = this.own.loads.find(({ name }) => name === look.load),
-      plain = rgb(COLOURS.workpiece);
     if (this.shown === look.load) return;
     this.shown = look.load;
     this.group.visible = look.load !== "hidden";
-    for (let facet = 0; facet < this.count; facet++) {
-      const tint = load ? colourOf(this.columns[load.name][facet] / load.top) : plain;
-      for (let corner = 0; corner < 3; corner++) this.tints.set(tint, 9 * facet + 3 * corner);
+    const load = this.load(look.load),
+      colours = this.body.geometry.attributes.colour,
+      plain = rgb(COLOURS.workpiece);
+    for (let corner = 0; corner < colours.count; corner++) {
+      const value = load && this.columns[load.name][Math.floor(corner / 3)];
+      colours.array.set(load ? colourOf(value / load.top) : plain, 3 * corner);
     }
-    this.body.geometry.attributes.colour.needsUpdate = true;
+    colours.needsUpdate = true;
   }
 
   /** The facet with the largest value of a load. */
   highest(name) {
     const values = this.columns[name];
-    return values.reduce((best, value, facet) => (value > values[best] ? facet : best), 0);
+    return values.indexOf(values.reduce((one, other) => Math.max(one, other)));
   }
 
   /** Centre of a facet in the workpiece's own frame, its depth below the surface and its azimuth. */
   facet(number) {
-    const { position } = this.body.geometry.attributes,
-      corners = new Triangle().setFromAttributeAndIndices(position, 3 * number, 3 * number + 1, 3 * number + 2),
-      centre = corners.getMidpoint(new Vector3());
+    const corners = [0, 1, 2].map((corner) => 3 * number + corner),
+      centre = new Triangle()
+        .setFromAttributeAndIndices(this.body.geometry.attributes.position, ...corners)
+        .getMidpoint(new Vector3());
     return { centre, depth: this.own.immersion - centre.z, azimuth: Math.atan2(centre.y, centre.x) };
   }
 
@@ -74,15 +97,39 @@ export class Workpiece {
 /** An arrow along +x that starts beside a body of this radius. */
 function arrow(radius) {
   const length = Math.max(2 * radius, 8),
-    thick = 0.06 * length;
-  const shaft = new CylinderGeometry(thick, thick, length, 12).translate(0, radius + length / 2, 0);
-  const tip = new ConeGeometry(3 * thick, 0.4 * length, 16).translate(0, radius + 1.15 * length, 0);
-  const parts = [shaft, tip].map((part) => {
-    part.rotateZ(-Math.PI / 2);
-    const colours = new Float32Array(part.attributes.position.array.length),
-      ink = rgb(COLOURS.ink);
-    for (let at = 0; at < colours.length; at += 3) colours.set(ink, at);
-    return new Mesh(part.setAttribute("colour", new BufferAttribute(colours, 3)), facetMaterial());
-  });
-  return new Group().add(...parts);
+    [thin, thick] = [0.06 * length, 0.18 * length],
+    [foot, neck, tip] = [0, 0.95, 1.35].map((part) => radius + part * length);
+  const profile = [
+    [0, foot],
+    [thin, foot],
+    [thin, neck],
+    [thick, neck],
+    [0, tip],
+  ];
+  const twice = profile.flatMap(([x, y]) => [new Vector2(x, y), new Vector2(x, y)]); // edges stay sharp
+  const geometry = new LatheGeometry(twice, 16).rotateZ(-Math.PI / 2);
+  return new Group().add(new Mesh(tinted(geometry, COLOURS.ink), facetMaterial()));
+}
+
+/** The lines of bowl, surface and path. */
+export function outline({ bowl, surface, workpieces }) {
+  const at = (turn, height) => new Vector3(bowl.radius, 0, height).applyAxisAngle(UP, 2 * Math.PI * turn),
+    circle = (height) => Array.from({ length: PARTS + 1 }, (_, k) => at(k / PARTS, height)),
+    line = (points, color, Kind = Line) =>
+      new Kind(new BufferGeometry().setFromPoints(points), new LineBasicMaterial({ color }));
+  const edges = [0, 0.25, 0.5, 0.75].flatMap((turn) => [at(turn, 0), at(turn, bowl.height)]);
+  const lines = [
+    line(circle(0), COLOURS.bowl),
+    line(circle(surface), STEEL),
+    line(circle(bowl.height), COLOURS.bowl),
+    line(edges, COLOURS.bowl, LineSegments),
+    ...workpieces.map(({ poses }) =>
+      line(
+        poses.map(([x, y]) => new Vector3(x, y, surface)),
+        STEEL,
+      ),
+    ),
+  ];
+  for (const one of lines) one.frustumCulled = false;
+  return new Group().add(...lines);
 }

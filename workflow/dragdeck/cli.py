@@ -122,7 +122,7 @@ STEPS = (
     Command("drops", "run the drop tests of a calibration",
             "Run the drop tests that the calibration of the restitution requires, and write "
             "drops.json to the folder.",
-            "campaigns.restitution_drops:drops_command", (
+            "commands:drops_command", (
                 STUDY, FIDELITY, OUT_DIR,
                 Argument("set", choices=("sweep", "confirm"),
                           help="sweep: a range of restitutions; confirm: the fitted one"),

@@ -14,17 +14,16 @@ import jinja2
 from pydantic import ValidationError
 from rich.table import Table
 
-from dragdeck.advice.advise import Advice, advised_settings
+from dragdeck.advice.advise import Advice, advised_settings, with_option
 from dragdeck.advice.forecast import (
-    AdviceFile,
     advice_file,
     advice_tables,
     forecast,
     question,
     roles,
 )
-from dragdeck.advice.options import Speed, with_option
 from dragdeck.campaigns.machine_speed import measure_machine_speed
+from dragdeck.campaigns.restitution_drops import FitFile, confirmation, run_drops, sweep
 from dragdeck.cases.case import Case
 from dragdeck.cases.ranks import check_ranks, cores_here
 from dragdeck.decks.render import (
@@ -37,6 +36,7 @@ from dragdeck.decks.render import (
     write_workpiece,
 )
 from dragdeck.decks.templates import environment
+from dragdeck.engine.batch import Batch
 from dragdeck.engine.process import LAUNCHER_VARIABLE, find_engine
 from dragdeck.engine.reports import say
 from dragdeck.errors import DragdeckError, InputError, choices, together
@@ -57,9 +57,10 @@ from dragdeck.preview.layout import CaseLayout, layout
 from dragdeck.preview.page import Words, page, picture, small_picture
 from dragdeck.preview.swept import swept_volume
 from dragdeck.project import Project, by_folder, by_run, find_project, study_templates
+from dragdeck.records.advice import AdviceFile, Speed
 from dragdeck.records.tradeoff import TradeoffRecord, measured_tradeoff, tradeoff_if_measured
 from dragdeck.scenes.lead import with_leads
-from dragdeck.scenes.registry import SCENES
+from dragdeck.scenes.process import SCENES
 from dragdeck.scenes.scene import SceneType, StudyScene, read_bed
 from dragdeck.study.check import explained, warnings
 from dragdeck.study.model import RESTITUTION
@@ -411,3 +412,34 @@ def _bed(kind: SceneType, packing: Path | None) -> Bed | None:
             remedy="give the packing.json that dragchain tables made of the filling",
         )
     return read_bed(packing)
+
+
+def drops_command(
+    study: str,
+    fidelity: str | None,
+    out: Path,
+    set: str,
+    fit: Path | None,
+) -> None:
+    """Run one set of drop tests.
+
+    Raises
+    ------
+    InputError
+        A confirmation without a fit.
+    """
+    project = find_project(Path.cwd())
+    case = project.cases(study, fidelity)[0]
+    if set == "sweep":
+        drops = list(sweep(case.study))
+    elif fit is not None:
+        fitted = FitFile.read(fit)
+        drops = list(confirmation(case.study, fitted.fit.restitution, fitted.fit_full.restitution))
+    else:
+        raise InputError(
+            "the result of the fit is missing",
+            field="--fit",
+            remedy="give the path of its result.json",
+        )
+    batch = Batch(out, environment(project.templates, study_templates(case)))
+    run_drops(case, drops, batch, say)

@@ -11,8 +11,7 @@ from dragdeck.errors import InputError, choices
 from dragdeck.outlook.timestep import check_timestep
 from dragdeck.records.tradeoff import TradeoffRecord
 from dragdeck.scenes.lead import FIRST_WINDOWS, LEAD, with_leads
-from dragdeck.scenes.process import PROCESS
-from dragdeck.scenes.registry import SCENES
+from dragdeck.scenes.process import PROCESS, SCENES
 from dragdeck.scenes.scene import SceneType
 from dragdeck.study.base import NAME, NAME_LIMIT
 from dragdeck.study.workpiece import MeshShape
@@ -107,7 +106,7 @@ class Project:
             There is no such plan or study, or they do not fit together.
         """
         file = self.plan_file(plan)
-        return plan_points(Plan.read(file), file, self.cases(study)[0], resolve)
+        return plan_points(Plan.read(file), file, self.cases(study)[0], SCENES, resolve)
 
     def results(self, study: str) -> Path:
         """The results of a study."""

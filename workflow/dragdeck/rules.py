@@ -33,7 +33,7 @@ from dragdeck.project import (
     study_templates,
 )
 from dragdeck.scenes.lead import FIRST_WINDOWS, led, windows_of, with_leads
-from dragdeck.scenes.registry import SCENES
+from dragdeck.scenes.process import SCENES
 from dragdeck.sweep.plan import Points
 
 RECORD = {place: "outcome.json" if place in OUTCOMES else "run.json" for place in PLACES}

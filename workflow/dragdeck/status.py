@@ -17,7 +17,7 @@ from dragdeck.outlook.runs import (
     expected_runs,
 )
 from dragdeck.project import find_project
-from dragdeck.scenes.registry import SCENES
+from dragdeck.scenes.process import SCENES
 
 _SHOWN = 8
 """Runs of a state that are listed without ``--verbose``."""

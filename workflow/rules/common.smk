@@ -25,7 +25,7 @@ from dragdeck.rules import (
     checked_settings,
     tables_of,
 )
-from dragdeck.scenes.registry import SCENES
+from dragdeck.scenes.process import SCENES
 from dragdeck.snakemake_lock import hold_lock
 from dragdeck.source_hash import source_hash
 from dragdeck.study.check import warnings

@@ -30,7 +30,7 @@ for PLACE, SCENE in PLACES.items():
             case=WORK.digest_of(PLACE),
             cases=WORK.cases_option(PLACE),
             packing="--packing" if SCENE.needs_bed else "",
-            source=source_hash("dragdeck.decks.render", "dragdeck.scenes.registry"),
+            source=source_hash("dragdeck.decks.render", "dragdeck.scenes.process"),
             scene=SCENE.name,
         shell:
             "dragdeck step render {wildcards.study} {params.scene} {wildcards.run} {params.cases}"
@@ -95,7 +95,7 @@ for PLACE in ("process", WINDOWS):
         params:
             case=WORK.digest_of(PLACE),
             cases=WORK.cases_option(PLACE),
-            source=source_hash("dragdeck.decks.render", "dragdeck.scenes.registry"),
+            source=source_hash("dragdeck.decks.render", "dragdeck.scenes.process"),
         shell:
             "dragdeck step render {wildcards.study} process {wildcards.run} {params.cases}"
             " --packing {input.packing} > {log} 2>&1"

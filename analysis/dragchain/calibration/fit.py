@@ -26,6 +26,9 @@ from dragchain.errors import RecordError
 from dragchain.statistics.estimate import CONFIDENCE, Estimate
 from dragdeck.documents import Part
 
+# --- sampling ------------------------------------------------------------------------------------
+
+
 _SAMPLINGS = 200
 """Random samplings of a simulated impact, to know what sampling does to it."""
 
@@ -147,6 +150,9 @@ def observe(measured: Measured, samplings: Sequence[Sampling], *, with_peaks: bo
 def _since_first(std: Floats) -> Floats:
     """Covariance of x_k - x_1 for independent x."""
     return np.asarray(np.diag(std[1:] ** 2) + std[0] ** 2)
+
+
+# --- fit -----------------------------------------------------------------------------------------
 
 
 _RISE = float(chi2.ppf(CONFIDENCE, 1))

@@ -18,6 +18,8 @@ from dragchain.figures.panels import legend_below, new_figure, new_panels, row_n
 from dragchain.figures.style import BLUE, COLOURS, GREEN, GREY, ORANGE, RED, drawing, png
 from dragchain.report.page import data_uri, render_page, write_bundle
 
+# --- figures -------------------------------------------------------------------------------------
+
 
 def draw_impacts(record: Record, found: RecordFit, confirm: Drops) -> Figure:
     """The record, and each impact measured and simulated."""
@@ -139,6 +141,9 @@ def _measured_lines(axes: Axes, rebound: float, deck: float) -> None:
     for label, place in labels.items():
         axes.annotate(label, place, (3, 3), textcoords="offset points", color=COLOURS["experiment"])
     axes.set(xlim=ends, ylim=ends)
+
+
+# --- report --------------------------------------------------------------------------------------
 
 
 def write_calibration_report(record: Path, folder: Path) -> None:

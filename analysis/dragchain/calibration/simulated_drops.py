@@ -253,6 +253,9 @@ def _parabola_top(three: Floats) -> float:
     return middle if bend == 0.0 else middle - (right - left) ** 2 / (8.0 * bend)
 
 
+# --- sweep ---------------------------------------------------------------------------------------
+
+
 _DEGREE = 4
 """Of the polynomials through the sweep."""
 

@@ -3,24 +3,27 @@
 Nothing is held but the frame at hand, so memory does not grow with the length of a run.
 """
 
+from collections import Counter, defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from dragchain.arrays import Floats, Ints
 from dragchain.errors import ExportError, TableError
-from dragchain.network.frame import KINDS, WORKPIECE, NetworkFrame, frame_of
-from dragchain.tables.by_step import RisingSteps, read_groups, read_steps
+from dragchain.network.frame import KINDS, PARTICLE, WORKPIECE, NetworkFrame, frame_of
+from dragchain.tables.by_step import RisingSteps, read_steps
 from dragchain.tables.columns import CONTACTS, KINEMATICS
-from dragchain.tables.run_folder import WORKPIECE_COLUMNS, Run, workpiece_place
+from dragchain.tables.run_folder import Run, workpiece_places
 from dragdeck.records.case import CaseOfRun
-from dragdeck.study.rotation import Rotation
+from dragdeck.study.drive import Rotation
 
 _BODY = {name: body for body, name in KINDS.items()}
+_PARTICLES = ("step", *KINEMATICS)
+_CHAINS = ("step", "definition", "particle_ids", "reaches_bowl", "end_kind", "dominant")
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,11 @@ class Membership:
 def chain_membership(frame: NetworkFrame, chains: pd.DataFrame) -> Membership:
     """Which particles and contacts are in the chains of a frame.
 
+    A path has a row for each strong workpiece contact, by falling force: of several rows that
+    begin at one particle, the n-th belongs to its n-th strongest contact with the workpiece. At the
+    bowl a path ends in the particle's strongest contact of its kind. Only paths that reach the
+    bowl count.
+
     Parameters
     ----------
     frame : NetworkFrame
@@ -60,99 +68,54 @@ def chain_membership(frame: NetworkFrame, chains: pd.DataFrame) -> Membership:
     TableError
         If a chain names a particle or a contact that the frame does not have.
     """
-    found = Membership(
-        *(np.zeros(size, dtype=np.int64) for _ in range(3) for size in _sizes(frame))
-    )
-    links = _Links(frame)
-    peters = chains[chains["definition"] == "peters"]
-    for number, ids in enumerate(peters["particle_ids"], start=1):
-        particles = links.particles(ids)
-        found.particle_peters[particles] = number
-        found.contact_peters[links.between(particles)] = number
-    for particles, contacts, dominant in _paths(
-        links, chains[chains["definition"] == "widest_path"]
-    ):
-        found.particle_paths[particles] += 1
-        found.contact_paths[contacts] += 1
-        if dominant:
-            found.particle_dominant[particles] = 1
-            found.contact_dominant[contacts] = 1
+    sizes = (frame.particle_id.size, frame.normal_force.size)
+    found = Membership(*(np.zeros(size, np.int64) for size in 3 * sizes))
+    row = {number: k for k, number in enumerate(frame.particle_id.tolist())}
+    between = _contacts(frame)
+
+    def links(particles: list[int]) -> list[int]:
+        return [between[PARTICLE, *sorted(pair)][0] for pair in pairwise(particles)]
+
+    begun: Counter[int] = Counter()
+    columns = [chains[name] for name in _CHAINS[1:]]
+    peters = 0
+    try:
+        for definition, ids, reaches_bowl, end_kind, dominant in zip(*columns, strict=True):
+            particles = [row[number] for number in ids]
+            if definition == "peters":
+                peters += 1
+                found.particle_peters[particles] = peters
+                found.contact_peters[links(particles)] = peters
+                continue
+            first, last = particles[0], particles[-1]
+            begun[first] += 1
+            if reaches_bowl:
+                start = between[WORKPIECE, -1, first][begun[first] - 1]
+                contacts = [start, *links(particles), between[_BODY[end_kind], -1, last][0]]
+                found.particle_paths[particles] += 1
+                found.contact_paths[contacts] += 1
+                found.particle_dominant[particles] |= bool(dominant)
+                found.contact_dominant[contacts] |= bool(dominant)
+    except (KeyError, IndexError):
+        raise TableError(
+            f"a chain of step {frame.step} has a particle or a contact that is missing in"
+            " particles.parquet or contacts.parquet\n"
+            "  remedy: make the chains again with `dragchain chains`"
+        ) from None
     return found
 
 
-def _sizes(frame: NetworkFrame) -> tuple[int, int]:
-    return frame.particle_id.size, frame.normal_force.size
+def _contacts(frame: NetworkFrame) -> dict[tuple[int, ...], list[int]]:
+    """The contacts between two bodies, the strongest first.
 
-
-def _paths(links: "_Links", paths: pd.DataFrame) -> Iterator[tuple[Ints, Ints, bool]]:
-    """Yield particles and contacts of every workpiece path that reaches the bowl.
-
-    A path has a row for each strong workpiece contact, by falling force: of several rows that
-    begin at one particle, the n-th belongs to its n-th strongest contact with the workpiece. At the
-    bowl a path ends in the particle's strongest contact of its kind.
+    Their key is the kind of the second body, and the rows of the particles, -1 for another body.
     """
-    begun: dict[int, int] = {}
-    columns = [paths[name] for name in ("particle_ids", "reaches_bowl", "end_kind", "dominant")]
-    for ids, reaches_bowl, end_kind, dominant in zip(*columns, strict=True):
-        particles = links.particles(ids)
-        first, last = int(particles[0]), int(particles[-1])
-        rank = begun.get(first, 0)
-        begun[first] = rank + 1
-        if reaches_bowl:
-            workpiece = links.with_body(first, WORKPIECE, rank)
-            bowl = links.with_body(last, _BODY[end_kind], 0)
-            yield particles, np.array([workpiece, *links.between(particles), bowl]), bool(dominant)
-
-
-class _Links:
-    """Finds the contacts of a frame by what they are between."""
-
-    def __init__(self, frame: NetworkFrame) -> None:
-        self._frame = frame
-        inner = np.flatnonzero(frame.between_particles())
-        keys = self._keys(frame.a[inner], frame.b[inner])
-        order = np.argsort(keys)
-        self._inner, self._sorted = inner[order], keys[order]
-        self._walls = np.flatnonzero(~frame.between_particles())
-
-    def _keys(self, first: Ints, second: Ints) -> Ints:
-        size = self._frame.particle_id.size
-        return np.minimum(first, second) * size + np.maximum(first, second)
-
-    def particles(self, ids: NDArray[np.int64]) -> Ints:
-        """Rows of particles by their ids."""
-        return self._found(self._frame.particle_id, np.asarray(ids, dtype=np.int64), "particle")
-
-    def between(self, particles: Ints) -> Ints:
-        """Contacts of each particle of a chain with the next."""
-        return self._inner[
-            self._found(self._sorted, self._keys(particles[:-1], particles[1:]), "contact")
-        ]
-
-    def _found(self, known: Ints, wanted: Ints, what: str) -> Ints:
-        at = np.minimum(np.searchsorted(known, wanted), max(known.size - 1, 0))
-        if wanted.size and (not known.size or (known[at] != wanted).any()):
-            raise self._missing(what)
-        return at
-
-    def with_body(self, particle: int, body: int, rank: int) -> int:
-        """Contact of a particle with workpiece, floor or side; `rank` 0 is the strongest."""
-        frame, walls = self._frame, self._walls
-        rows = walls[(frame.a[walls] == particle) & (frame.other[walls] == body)]
-        if rank >= rows.size:
-            raise self._missing("contact")
-        return int(rows[np.argsort(-frame.normal_force[rows], kind="stable")[rank]])
-
-    def _missing(self, what: str) -> TableError:
-        return TableError(
-            f"a chain of step {self._frame.step} has a {what} that is missing in "
-            "particles.parquet or"
-            " contacts.parquet\n  remedy: make the chains again with `dragchain chains`"
-        )
-
-
-_PARTICLES = ("step", *KINEMATICS)
-_CHAINS = ("step", "definition", "particle_ids", "reaches_bowl", "end_kind", "dominant")
+    order = np.argsort(-frame.normal_force, kind="stable")
+    found = defaultdict[tuple[int, ...], list[int]](list)
+    columns = (order, frame.other[order], *np.sort([frame.a[order], frame.b[order]], axis=0))
+    for contact, *key in zip(*(column.tolist() for column in columns), strict=True):
+        found[tuple(key)].append(contact)
+    return dict(found)
 
 
 @dataclass(frozen=True)
@@ -276,7 +239,7 @@ class FrameSeries:
         if self.has_chains:
             chains = RisingSteps(run.table("chains.parquet"), _CHAINS, steps)
         searched = _steps(run.table("network.parquet")) if chains is not None else frozenset()
-        track = _Track(run) if run.case.workpiece is not None else None
+        place = workpiece_places(run.folder, run.case) if run.case.workpiece is not None else None
         for step, time_s in zip(steps.tolist(), self.times_s.tolist(), strict=True):
             of_particles = particles.at(step).sort_values("particle_id", ignore_index=True)
             of_contacts = None if contacts is None else contacts.at(step)
@@ -285,7 +248,7 @@ class FrameSeries:
                 network = frame_of(of_contacts, of_particles, step, time_s, np.nan)
             if chains is not None and network is not None and step in searched:
                 membership = chain_membership(network, chains.at(step))
-            workpiece = None if track is None else track.at(step)
+            workpiece = None if place is None else place(step)
             yield FrameData(step, time_s, of_particles, of_contacts, network, membership, workpiece)
         for rows in (particles, contacts, chains):
             if rows is not None:
@@ -330,27 +293,3 @@ def _frame_times(file: Path) -> tuple[Ints, Floats]:
 
 def _steps(file: Path) -> frozenset[int]:
     return frozenset(_frame_times(file)[0].tolist())
-
-
-class _Track:
-    """Where the workpiece is at steps that rise.
-
-    A stretch of ``workpiece_force.parquet`` is held.
-    """
-
-    def __init__(self, run: Run) -> None:
-        self._case = run.case
-        self._blocks = read_groups(run.table("workpiece_force.parquet"), WORKPIECE_COLUMNS)
-        first = next(self._blocks, None)
-        if first is None:
-            raise TableError(f"{run.table('workpiece_force.parquet')} contains no samples")
-        self._rows = first
-
-    def at(self, step: int) -> tuple[Floats, Rotation]:
-        """Return reference point in m and orientation."""
-        while self._rows["step"].iloc[-1] < step:
-            following = next(self._blocks, None)
-            if following is None:
-                break
-            self._rows = pd.concat([self._rows.iloc[-1:], following])
-        return workpiece_place(self._rows, step, self._case)

@@ -4,13 +4,15 @@ The files are not compressed and name what a particle has as LIGGGHTS does in it
 files (``id``, ``radius``, ``v``, ``omega``), so that OVITO opens the same series.
 """
 
-from collections.abc import Mapping
+from collections import defaultdict
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from dragchain.arrays import Floats
 from dragchain.export.frames import FrameData, FrameSeries
@@ -22,7 +24,6 @@ from dragchain.run.workpiece import placed, workpiece_mesh
 from dragchain.tables.run_folder import Run
 from dragdeck.documents import Document
 from dragdeck.files import write_text, write_vtp
-from dragdeck.records.case import CaseOfRun
 
 SCRIPT = "view.py"
 DATA = "view.json"
@@ -55,37 +56,6 @@ class View(Document):
     upper: Mapping[str, float]
 
 
-class ViewWriter:
-    """Collects the colour scales frame by frame, and writes script and data at the end."""
-
-    def __init__(self, case: CaseOfRun, *, chains: bool) -> None:
-        self._case = case
-        self._chains = chains
-        self._upper: dict[str, list[float]] = {}
-
-    def add(self, parts: Mapping[str, Any]) -> None:
-        """Take the meshes of one frame into account."""
-        for mesh in parts.values():
-            for name in (name for name in SCALED if name in mesh.array_names and mesh.n_points):
-                values = mesh[name]
-                sizes = np.linalg.norm(values, axis=1) if values.ndim > 1 else values
-                found = float(np.quantile(sizes, SCALED[name]))
-                self._upper.setdefault(name, []).append(found)
-
-    def write(self, folder: Path) -> None:
-        """Write ``view.py`` and ``view.json``; a scale ends at the median over the frames."""
-        bowl = self._case.bowl
-        height_m = self._case.inputs.get("bowl.height_m")
-        View(
-            chains=self._chains,
-            bowl_radius_m=bowl.radius_m,
-            bowl_height_m=height_m if isinstance(height_m, int | float) else 2 * bowl.radius_m,
-            particle_radius_m=self._case.media.radius_mean_m,
-            upper={name: float(np.median(found)) for name, found in self._upper.items()},
-        ).write(folder / DATA)
-        (folder / SCRIPT).write_bytes(Path(__file__).with_name(SCRIPT).read_bytes())
-
-
 MAIN = "run.pvd"
 """The file to open: all there is."""
 
@@ -94,60 +64,63 @@ _LOADING = ("mean_pressure_pa", "friction_work_pa", "peak_normal_force_n")
 _CHAIN_ARRAYS = {"peters_chain": "peters", "widest_paths": "paths", "dominant": "dominant"}
 
 
-class ParaviewWriter:
-    """Writes one frame after another, and the lists of them at the end.
-
-    Parameters
-    ----------
-    folder : Path
-        An empty folder.
-    series : FrameSeries
-        The frames that will be written.
-    """
-
-    def __init__(self, folder: Path, series: FrameSeries) -> None:
-        self._folder = folder
-        self._with_chains = series.has_chains
-        self._width = len(str(series.steps[-1]))
-        case = series.run.case
-        self._workpiece = None if case.workpiece is None else _loaded_workpiece(series.run)
-        self._view = ViewWriter(case, chains=self._with_chains)
-        self._series: dict[str, list[tuple[float, str]]] = {}
-        (folder / _FRAMES).mkdir()
-
-    def add(self, frame_data: FrameData) -> None:
-        """Write the files of one frame."""
-        parts = {"particles": _particles_mesh(frame_data, with_chains=self._with_chains)}
-        if frame_data.network is not None:
-            parts["contacts"] = _contacts_mesh(frame_data, with_chains=self._with_chains)
-        if self._workpiece is not None and frame_data.workpiece is not None:
-            parts["workpiece"] = placed(self._workpiece, *frame_data.workpiece)
-        self._view.add(parts)
-        name = f"{frame_data.step:0{self._width}d}"
-        frames = self._folder / _FRAMES
-        rows = []
-        for number, (part_name, part) in enumerate(parts.items()):
-            file = f"{name}/{name}_{number}.vtp"
-            write_vtp(frames / file, part, compressed=False)
-            self._list(part_name, frame_data.time_s, file)
-            rows.append(f'index="{number}" name="{part_name}" file="{file}"')
-        write_text(frames / f"{name}.vtm", _data_sets("vtkMultiBlockDataSet", "1.0", rows))
-        self._list("run", frame_data.time_s, f"{name}.vtm")
-
-    def _list(self, series: str, time_s: float, file: str) -> None:
-        self._series.setdefault(series, []).append((time_s, f"{_FRAMES}/{file}"))
-
-    def close(self) -> None:
-        """Write the PVD files, and the script that opens them."""
-        for name, files in self._series.items():
-            (self._folder / f"{name}.pvd").write_text(pvd(files), encoding="utf-8")
-        self._view.write(self._folder)
+def write_paraview(folder: Path, series: FrameSeries, frames: Iterable[FrameData]) -> None:
+    """Write the frames of a series into an empty folder, the lists of them, and the view."""
+    workpiece = None if series.run.case.workpiece is None else _loaded_workpiece(series.run)
+    listed, upper = defaultdict[str, list[str]](list), defaultdict[str, list[float]](list)
+    (folder / _FRAMES).mkdir()
+    for frame_data in frames:
+        parts = _parts(frame_data, workpiece, with_chains=series.has_chains)
+        name = f"{frame_data.step:0{len(str(series.steps[-1]))}d}"
+        for part, file in _write_frame(folder / _FRAMES, name, parts).items():
+            time, path = f'timestep="{frame_data.time_s!r}" part="0"', f"{_FRAMES}/{file}"
+            listed[part].append(f"{time} file={quoteattr(path)}")
+        for mesh in parts.values():
+            for array in (array for array in mesh.array_names if array in SCALED and mesh.n_points):
+                upper[array].append(_upper_end(mesh[array], SCALED[array]))
+    for part, rows in listed.items():
+        write_text(folder / f"{part}.pvd", _data_sets("Collection", "0.1", rows))
+    _write_view(folder, series, {name: float(np.median(found)) for name, found in upper.items()})
 
 
-def pvd(files: list[tuple[float, str]]) -> str:
-    """A PVD file, which lists times in s and the file of each."""
-    rows = [f'timestep="{time_s!r}" part="0" file={quoteattr(file)}' for time_s, file in files]
-    return _data_sets("Collection", "0.1", rows)
+def _parts(frame_data: FrameData, workpiece: Any, *, with_chains: bool) -> dict[str, Any]:
+    parts = {"particles": _particles_mesh(frame_data, with_chains=with_chains)}
+    if frame_data.network is not None:
+        parts["contacts"] = _contacts_mesh(frame_data, with_chains=with_chains)
+    if workpiece is not None and frame_data.workpiece is not None:
+        parts["workpiece"] = placed(workpiece, *frame_data.workpiece)
+    return parts
+
+
+def _write_frame(folder: Path, name: str, parts: Mapping[str, Any]) -> dict[str, str]:
+    """Write the files of one frame; the file of each part, and of the whole ``run``."""
+    files = {part: f"{name}/{name}_{number}.vtp" for number, part in enumerate(parts)}
+    rows = []
+    for number, (part, file) in enumerate(files.items()):
+        write_vtp(folder / file, parts[part], compressed=False)
+        rows.append(f'index="{number}" name="{part}" file="{file}"')
+    write_text(folder / f"{name}.vtm", _data_sets("vtkMultiBlockDataSet", "1.0", rows))
+    return {**files, "run": f"{name}.vtm"}
+
+
+def _upper_end(values: NDArray[Any], part: float) -> float:
+    """The upper end of the scale that covers a fraction of the values of an array."""
+    sizes = np.linalg.norm(values, axis=1) if values.ndim > 1 else values
+    return float(np.quantile(sizes, part))
+
+
+def _write_view(folder: Path, series: FrameSeries, upper: Mapping[str, float]) -> None:
+    """Write ``view.py`` and ``view.json``; a scale ends at the median over the frames."""
+    case = series.run.case
+    bowl, height_m = case.bowl, case.inputs.get("bowl.height_m")
+    View(
+        chains=series.has_chains,
+        bowl_radius_m=bowl.radius_m,
+        bowl_height_m=height_m if isinstance(height_m, int | float) else 2 * bowl.radius_m,
+        particle_radius_m=case.media.radius_mean_m,
+        upper=upper,
+    ).write(folder / DATA)
+    (folder / SCRIPT).write_bytes(Path(__file__).with_name(SCRIPT).read_bytes())
 
 
 def _data_sets(kind: str, version: str, rows: list[str]) -> str:

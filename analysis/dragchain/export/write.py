@@ -2,11 +2,10 @@
 
 import os
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path, PurePath
-from typing import Protocol
 
 from pydantic import field_validator
 
@@ -77,7 +76,7 @@ def fresh_folder(target: Path, *, replace: bool) -> Iterator[Path]:
         shutil.rmtree(draft, ignore_errors=True)
 
 
-def files_in(folder: Path) -> list[Path]:
+def _files_in(folder: Path) -> list[Path]:
     """All files of a folder and its folders, relative to it, in the order of their names."""
     files = (file.relative_to(folder) for file in folder.rglob("*") if file.is_file())
     return sorted(files, key=str)
@@ -107,7 +106,7 @@ def _old_files(target: Path, replace: bool) -> set[str]:
 
 def _move(draft: Path, target: Path, old: set[str]) -> None:
     """Put new files in the place of old ones."""
-    new = files_in(draft)
+    new = _files_in(draft)
     for file in new:
         if str(file) not in old and (target / file).exists():
             raise ExportError(
@@ -126,22 +125,11 @@ def _move(draft: Path, target: Path, old: set[str]) -> None:
 
 Report = Callable[[str], object]
 
-
-class Writer(Protocol):
-    """Writes the frames of one export."""
-
-    def add(self, frame_data: FrameData) -> None:
-        """Write one frame."""
-
-    def close(self) -> None:
-        """Write what comes after the last one."""
-
-
-_FORMATS: dict[str, tuple[str, Callable[[Path, FrameSeries], Writer]]] = {
-    "paraview": (paraview.MAIN, paraview.ParaviewWriter),
-    "xyz": (xyz.MAIN, xyz.XyzWriter),
+_FORMATS: dict[str, tuple[str, Callable[[Path, FrameSeries, Iterable[FrameData]], None]]] = {
+    "paraview": (paraview.MAIN, paraview.write_paraview),
+    "xyz": (xyz.MAIN, xyz.write_xyz),
 }
-"""The file to open and the writer of each format."""
+"""The file to open and the writer of each format; it takes one frame after another."""
 
 
 @dataclass(frozen=True)
@@ -196,50 +184,38 @@ def write_export(
     """
     if to not in _FORMATS:
         raise ExportError(f"unknown format {to!r}; known: {', '.join(_FORMATS)}")
-    main, writer_of = _FORMATS[to]
+    main, write = _FORMATS[to]
     run = Run.open(run_dir)
     series = FrameSeries.of(run, Selection() if selection is None else selection)
     target = run.folder / "export" / to if out is None else out
     with fresh_folder(target, replace=replace) as folder:
-        _write(folder, writer_of, series, report)
-        size = folder_size(folder)
+        write(folder, series, _foreseen(series, folder, report))
+        size = _size(folder)
         _list(folder, to, series, size).write(folder / LIST)
     return Exported(target / main, len(series), size)
 
 
-def _write(
-    folder: Path,
-    writer_of: Callable[[Path, FrameSeries], Writer],
-    series: FrameSeries,
-    report: Report,
-) -> None:
-    writer = writer_of(folder, series)
-    try:
-        for number, frame_data in enumerate(series):
-            writer.add(frame_data)
-            if number == 0:
-                _foresee(folder, len(series), report)
-    finally:
-        writer.close()
+def _foreseen(series: FrameSeries, folder: Path, report: Report) -> Iterator[FrameData]:
+    """Yield the frames; tell the size from that of the first, for which there must be room."""
+    for number, frame_data in enumerate(series):
+        yield frame_data
+        if number > 0:
+            continue
+        size, free = len(series) * _size(folder), shutil.disk_usage(folder).free
+        report(f"{len(series)} frames, about {size / 1e6:.1f} MB")
+        if size > free:
+            raise ExportError(
+                f"{folder.parent}: not enough free disk space for {len(series)} frames\n"
+                f"  value:  about {size / 1e6:.0f} MB\n"
+                f"  limit:  {free / 1e6:.0f} MB are free\n"
+                "  remedy: export fewer with --every, --from-time and --to-time, or name a folder"
+                " on another disk with --out"
+            )
 
 
-def _foresee(folder: Path, frames: int, report: Report) -> None:
-    """Tell the size from that of the first frame; there must be room for it."""
-    size, free = frames * folder_size(folder), shutil.disk_usage(folder).free
-    report(f"{frames} frames, about {size / 1e6:.1f} MB")
-    if size > free:
-        raise ExportError(
-            f"{folder.parent}: not enough free disk space for {frames} frames\n"
-            f"  value:  about {size / 1e6:.0f} MB\n"
-            f"  limit:  {free / 1e6:.0f} MB are free\n"
-            "  remedy: export fewer with --every, --from-time and --to-time, or name a folder on"
-            " another disk with --out"
-        )
-
-
-def folder_size(folder: Path) -> int:
+def _size(folder: Path) -> int:
     """The size of all files of a folder, in bytes."""
-    return sum((folder / file).stat().st_size for file in files_in(folder))
+    return sum((folder / file).stat().st_size for file in _files_in(folder))
 
 
 def _list(folder: Path, to: str, series: FrameSeries, size: int) -> ExportFile:
@@ -253,7 +229,7 @@ def _list(folder: Path, to: str, series: FrameSeries, size: int) -> ExportFile:
         first_time_s=float(series.times_s[0]),
         last_time_s=float(series.times_s[-1]),
         bytes=size,
-        files=tuple(map(str, files_in(folder))),
+        files=tuple(map(str, _files_in(folder))),
     )
 
 

@@ -5,6 +5,8 @@ column is and of which type, holds the time in s beside the step, and is read by
 programs too; a LAMMPS dump has neither types nor, in most readers, the time.
 """
 
+from collections.abc import Iterable
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -32,37 +34,21 @@ _SPECIES = "X"
 _PLAIN = pyarrow.csv.WriteOptions(include_header=False, delimiter=" ", quoting_style="none")
 
 
-class XyzWriter:
-    """Writes one frame after another.
-
-    Parameters
-    ----------
-    folder : Path
-        An empty folder.
-    series : FrameSeries
-        The frames that will be written.
-    """
-
-    def __init__(self, folder: Path, series: FrameSeries) -> None:
-        self._file = (folder / MAIN).open("wb")
-
-    def add(self, frame_data: FrameData) -> None:
-        """Append one frame; numbers are written so that they read back to the last bit."""
-        columns: dict[str, pa.Array] = {"species": pa.repeat(_SPECIES, len(frame_data.particles))}
-        for name in (name for names in _COLUMNS.values() for name in names):
-            columns[name] = pa.array(frame_data.particles[name].to_numpy())
-        if frame_data.network is not None:
-            columns["coordination"] = pa.array(contact_counts(frame_data.network))
-        self._file.write(header(frame_data).encode())
-        pyarrow.csv.write_csv(pa.table(columns), self._file, _PLAIN)
-        self._file.flush()
-
-    def close(self) -> None:
-        """Close the file."""
-        self._file.close()
+def write_xyz(folder: Path, _series: FrameSeries, frames: Iterable[FrameData]) -> None:
+    """Write frames one after another, with numbers that read back to the last bit."""
+    with (folder / MAIN).open("wb") as stream:
+        for frame_data in frames:
+            columns = {"species": pa.repeat(_SPECIES, len(frame_data.particles))}
+            for name in chain.from_iterable(_COLUMNS.values()):
+                columns[name] = pa.array(frame_data.particles[name].to_numpy())
+            if frame_data.network is not None:
+                columns["coordination"] = pa.array(contact_counts(frame_data.network))
+            stream.write(_header(frame_data).encode())
+            pyarrow.csv.write_csv(pa.table(columns), stream, _PLAIN)
+            stream.flush()
 
 
-def header(frame_data: FrameData) -> str:
+def _header(frame_data: FrameData) -> str:
     """The two lines before the particles of a frame."""
     kinds = [f"{name}:{'I' if name == 'id' else 'R'}:{len(of)}" for name, of in _COLUMNS.items()]
     if frame_data.network is not None:

@@ -31,7 +31,7 @@ from dragchain.run.workpiece import placed, workpiece_mesh
 from dragchain.tables.by_step import read_table
 from dragchain.tables.run_folder import workpiece_places
 from dragdeck.records.case import CaseOfRun
-from dragdeck.study.rotation import Rotation
+from dragdeck.study.drive import Rotation
 
 View = Literal["xy", "xz"]
 
@@ -265,6 +265,9 @@ def _tubes(axis: Floats, force: Floats, radius: Floats) -> Any:
     mesh = pv.PolyData(axis.reshape(-1, 3), lines=lines.ravel())
     mesh["force"], mesh["radius"] = np.repeat(force, 2), np.repeat(radius, 2)
     return mesh.tube(scalars="radius", absolute=True, n_sides=_SIDES, capping=True)
+
+
+# --- on axes in mm -------------------------------------------------------------------------------
 
 
 def show_network(axes: Axes, shown: NetworkScene, view: View, image: Image, extent: Floats) -> None:

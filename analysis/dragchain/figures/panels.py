@@ -58,6 +58,9 @@ def head(figure: Figure, text: str) -> None:
     figure.suptitle(text, x=0.02, ha="left")
 
 
+# --- marks ---------------------------------------------------------------------------------------
+
+
 class _Interval(Protocol):
     """One estimate, or columns of estimates."""
 

@@ -202,6 +202,9 @@ def _with_amounts(
     return added[[*_KEPT, *in_body]]
 
 
+# --- checks of facets ----------------------------------------------------------------------------
+
+
 _OFF_FACET = 1e-5
 """Largest distance of a contact point from its facet over the workpiece's length: rounding."""
 

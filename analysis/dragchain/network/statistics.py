@@ -158,6 +158,9 @@ def cluster_rows(frame: NetworkFrame, clusters: Clusters) -> dict[str, NDArray[A
     }
 
 
+# --- statistics ----------------------------------------------------------------------------------
+
+
 _LEAST_CONTACTS = 4
 """A particle with fewer contacts is a rattler. Four is the mean number with which frictional
 spheres are isostatic; Thornton (2000) leaves out only particles with fewer than two."""

@@ -24,7 +24,7 @@ from dragchain.network.chains import (
 from dragchain.network.frame import FLOOR, KINDS, SIDE, NetworkFrame, network_frames
 from dragchain.network.statistics import cluster_rows, frame_clusters, frame_statistics
 from dragchain.tables.parquet import table_writer, write_parquet
-from dragdeck.study.rotation import wrap_angle
+from dragdeck.study.drive import wrap_angle
 
 
 def chain_table(
@@ -175,6 +175,9 @@ def _any(values: NDArray[Any]) -> NDArray[np.bool_]:
 
 def _length(points: Floats) -> Floats:
     return np.asarray(np.linalg.norm(np.diff(points, axis=1), axis=2).sum(axis=1))
+
+
+# --- tables of a run -----------------------------------------------------------------------------
 
 
 def write_chains(run_dir: Path) -> None:

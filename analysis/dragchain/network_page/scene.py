@@ -5,7 +5,7 @@
 
 import base64
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -16,9 +16,16 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation as Quaternion
 
 from dragchain.arrays import Floats, Ints
-from dragchain.drag import DragPeaks, drag_peaks, peak_separation_s, read_counted
+from dragchain.drag import (
+    AZIMUTH_BINS,
+    circumference,
+    drag_peaks,
+    parts,
+    peak_separation_s,
+    read_counted,
+)
 from dragchain.errors import TableError
-from dragchain.export.frames import FrameData, FrameSeries
+from dragchain.export.frames import FrameSeries
 from dragchain.figures.style import force_map
 from dragchain.network.frame import KINDS, PARTICLE, NetworkFrame
 from dragchain.run.kinematics import drag_phase, needed, process_time
@@ -27,6 +34,9 @@ from dragchain.tables.by_step import read_table
 from dragchain.tables.columns import CENTRE, POINT, VELOCITY
 from dragchain.tables.run_folder import Run
 from dragdeck.records.case import CaseOfRun
+
+# --- columns as bytes ----------------------------------------------------------------------------
+
 
 Kind = Literal["u8", "u16", "u32", "f24"]
 """Whole numbers of 1, 2 or 4 bytes, or the first 3 bytes of a single-precision number."""
@@ -69,6 +79,9 @@ class PackedColumns:
         return base64.b64encode(zlib.compress(b"".join(self._parts))).decode("ascii")
 
 
+# --- shown frames --------------------------------------------------------------------------------
+
+
 FRAMES = 100
 """Frames at equal intervals that are shown, or fewer if the run has fewer."""
 
@@ -86,33 +99,39 @@ BODIES = 0xFFFF
 
 
 @dataclass(frozen=True)
-class ShownFrame:
-    """A frame with N particles and M contacts as the page shows them.
+class Shown:
+    """What is shown of F frames: the rows of all frames, one frame after another.
 
     Attributes
     ----------
-    data : FrameData
-        The whole frame.
-    particles : (N,) int
-        Rows of the shown particles in the frame.
-    contacts : (M,) int
-        Rows of the shown contacts: those of which no particle is left out.
-    a, b : (M,) int
-        A contact's particles as places in `particles`; for a body that is no particle, ``b`` is its
-        ``b_id`` plus `BODIES`.
-    flags : (M,) int
-        Sums of `QUASI_LINEAR`, `PATH` and `DOMINANT`.
+    particles : DataFrame
+        Rows of ``particles.parquet``, and ``frame``, 0 to F - 1.
+    contacts : DataFrame
+        Rows of ``contacts.parquet`` of which no particle is left out; ``frame``; ``a`` and ``b``,
+        places of the particles in their frame, where a body that is no particle is its ``b_id``
+        plus `BODIES`; and ``flags``, sums of `QUASI_LINEAR`, `PATH` and `DOMINANT`.
+    poses : (F, 7) float
+        The workpiece's reference point in m, and its orientation as a quaternion.
+    most : int
+        Particles of the frame that has most, with those that are left out.
     """
 
-    data: FrameData
-    particles: Ints
-    contacts: Ints
-    a: Ints
-    b: Ints
-    flags: Ints
+    particles: pd.DataFrame
+    contacts: pd.DataFrame
+    poses: Floats
+    most: int
+
+    def touching(self) -> pd.DataFrame:
+        """The contacts on workpiece and bowl."""
+        return self.contacts[self.contacts["b"] > BODIES - len(KINDS)]
+
+    def reach_m(self) -> float:
+        """How far the particles of the first frame are from the workpiece's axis, at most."""
+        first = self.particles[self.particles["frame"] == 0][list(CENTRE)].to_numpy()
+        return float(np.hypot(*(first - self.poses[0, :3])[:, :2].T).max())
 
 
-def highest_peaks(run: Run) -> DragPeaks:
+def highest_peaks(run: Run) -> pd.DataFrame:
     """The peaks of the drag force in the counted stretch, the highest first, `PEAKS` at most.
 
     Raises
@@ -121,10 +140,8 @@ def highest_peaks(run: Run) -> DragPeaks:
         If the run is too short to have peaks.
     """
     peaks = drag_peaks(read_counted(run.folder, ("time_s", "drag_n")), run.case)
-    order = np.argsort(peaks.drag_n, kind="stable")[:PEAKS]
-    return DragPeaks(
-        peaks.index[order], peaks.time_s[order], peaks.drag_n[order], peaks.prominence_n[order]
-    )
+    found = pd.DataFrame({"time_s": peaks.time_s, "drag_n": peaks.drag_n})
+    return found.nsmallest(PEAKS, "drag_n")
 
 
 def shown_frames(run: Run, peak_time_s: Floats) -> FrameSeries:
@@ -153,25 +170,30 @@ def shown_frames(run: Run, peak_time_s: Floats) -> FrameSeries:
     return series
 
 
-def read_shown(series: FrameSeries) -> Iterator[ShownFrame]:
+def read_shown(series: FrameSeries) -> Shown:
     """Read the frames of a series; errors are those of its iterator."""
-    for data in series:
-        assert data.network is not None and data.membership is not None
+    particles, contacts, poses, most = [], [], [], 0
+    for number, data in enumerate(series):
+        network, chain = data.network, data.membership
+        assert network is not None and chain is not None
         assert data.contacts is not None and data.workpiece is not None
-        kept = _near(data.network, data.workpiece[0])
-        place = np.full(kept.size, -1, dtype=np.int64)
-        place[kept] = np.arange(kept.sum())
-        a, inner = place[data.network.a], data.network.between_particles()
+        kept = _near(network, data.workpiece[0])
+        place = np.where(kept, np.cumsum(kept) - 1, -1)
         bodies = BODIES + data.contacts["b_id"].to_numpy(np.int64)
-        b = np.where(inner, place[data.network.b], bodies)
-        rows = np.flatnonzero((a >= 0) & (b >= 0))
-        chain = data.membership
-        flags = (
-            QUASI_LINEAR * (chain.contact_peters > 0)
+        found = data.contacts.assign(
+            frame=number,
+            a=place[network.a],
+            b=np.where(network.between_particles(), place[network.b], bodies),
+            flags=QUASI_LINEAR * (chain.contact_peters > 0)
             + PATH * (chain.contact_paths > 0)
-            + DOMINANT * chain.contact_dominant
+            + DOMINANT * chain.contact_dominant,
         )
-        yield ShownFrame(data, np.flatnonzero(kept), rows, a[rows], b[rows], flags[rows])
+        particles.append(data.particles[kept].assign(frame=number))
+        contacts.append(found[(found["a"] >= 0) & (found["b"] >= 0)])
+        turn = Quaternion.from_matrix(data.workpiece[1].matrices[0]).as_quat()
+        poses.append([*data.workpiece[0], *turn])
+        most = max(most, kept.size)
+    return Shown(pd.concat(particles), pd.concat(contacts), np.array(poses), most)
 
 
 def _near(frame: NetworkFrame, workpiece_m: Floats) -> NDArray[np.bool_]:
@@ -180,6 +202,9 @@ def _near(frame: NetworkFrame, workpiece_m: Floats) -> NDArray[np.bool_]:
     if away.size <= MOST_PARTICLES:
         return np.ones(away.size, dtype=bool)
     return np.asarray(away < np.partition(away, MOST_PARTICLES)[MOST_PARTICLES])
+
+
+# --- scene ---------------------------------------------------------------------------------------
 
 
 _LOADS = {
@@ -197,6 +222,18 @@ _SMOOTHED_DIAMETERS = 0.1
 
 _TOP = 0.999
 """Quantile of all speeds, and of all displacements, at the top of their colour scale."""
+
+_MOST_LEVELS = 20
+"""Levels of depth of a profile, at most."""
+
+_ON_LIMIT_MM = 1e-6
+"""A contact nearer to the limit of a level than this is on it; points have nine digits."""
+
+_PER_DECADE = 8
+"""Bins of the size of forces."""
+
+_LEFT_OUT = 0.005
+"""Fraction of all contacts that may be weaker than the first of these bins."""
 
 
 @dataclass(frozen=True)
@@ -218,26 +255,29 @@ def page_scene(run: Run) -> PageScene:
         If the run is too short to have peaks.
     """
     case, columns, peaks = run.case, PackedColumns(), highest_peaks(run)
-    series = shown_frames(run, peaks.time_s)
-    frames = list(read_shown(series))
+    series = shown_frames(run, peaks["time_s"].to_numpy())
+    shown = read_shown(series)
     times_s = process_time(series.times_s, case)
+    headings = _headings(run, series.steps)
     bowl, surface = case.bowl, 1e3 * needed(case.surface_m, "surface_m")
     head = {
         "run": case.run,
         "steps": series.steps.tolist(),
         "times": times_s.tolist(),
-        "frames": _frames(columns, frames, case),
-        "scales": _scales(frames, case),
-        "paths": _dominant_paths(run, frames),
+        "frames": _frames(columns, shown, case),
+        "scales": _scales(shown, case),
+        "paths": _dominant_paths(run, series.steps),
         "bodies": {BODIES + body: name for body, name in KINDS.items() if body != PARTICLE},
         "bowl": {"radius": 1e3 * bowl.radius_m, "height": 1.2 * surface},
         "surface": surface,
         "media": {
             "radius": 1e3 * case.media.radius_mean_m,
-            "count": max(len(frame.data.particles) for frame in frames),
+            "count": shown.most,
             "most": MOST_PARTICLES,
+            "reach": 1e3 * shown.reach_m(),
         },
-        "workpieces": [_workpiece(columns, run, frames)],
+        "workpieces": [_workpiece(columns, run, shown) | {"headings": headings.tolist()}],
+        "profiles": profiles(columns, shown, headings, surface),
         "curve": _curve(columns, run),
         "peaks": _peaks(peaks, times_s, case),
         "colours": _colours(),
@@ -254,89 +294,65 @@ def _colours() -> list[str]:
 # --- frames ----------------------------------------------------------------------------------
 
 
-def _frames(columns: PackedColumns, frames: list[ShownFrame], case: CaseOfRun) -> dict[str, Any]:
+def _frames(columns: PackedColumns, shown: Shown, case: CaseOfRun) -> dict[str, Any]:
     """Add particles and contacts of all frames; where each frame starts, and the box of places."""
-    centres = [_vectors(one.data.particles, CENTRE)[one.particles] for one in frames]
-    points = [_outer_points(one) for one in frames]
-    box = np.concatenate([*centres, *points])
+    particles, contacts, touching = shown.particles, shown.contacts, shown.touching()
+    centre, point = (
+        table[list(names)].to_numpy() for table, names in ((particles, CENTRE), (touching, POINT))
+    )
+    box = np.concatenate([centre, point])
     low, step = box.min(axis=0), float(np.ptp(box, axis=0).max()) / 0xFFFF or 1.0
-    contacts = [_table(one).iloc[one.contacts] for one in frames]
-    particles = [one.data.particles.iloc[one.particles] for one in frames]
-    places = {"centre": centres, "point": points}
-    for name, parts in places.items():
-        columns.add(name, "u16", ((np.concatenate(parts) - low) / step).round().T)
-    columns.add("id", "u32", _joined(particles, "particle_id"))
-    columns.add("radius", "f24", 1e3 * _joined(particles, "radius_m"))
-    columns.add("speed", "f24", 1e3 * _speeds(pd.concat(particles), case))
-    columns.add("a", "u16", np.concatenate([one.a for one in frames]))
-    columns.add("b", "u16", np.concatenate([one.b for one in frames]))
-    columns.add("flags", "u8", np.concatenate([one.flags for one in frames]))
-    columns.add("normal", "f24", _joined(contacts, "normal_force_n"))
-    columns.add("tangential", "f24", _joined(contacts, "tangential_force_n"))
-    return {
-        "particles": [one.particles.size for one in frames],
-        "contacts": [one.contacts.size for one in frames],
-        "points": [len(part) for part in points],
-        "low": (1e3 * low).tolist(),
-        "step": 1e3 * step,
+    columns.add("centre", "u16", ((centre - low) / step).round().T)
+    columns.add("point", "u16", ((point - low) / step).round().T)
+    columns.add("id", "u32", particles["particle_id"].to_numpy())
+    columns.add("radius", "f24", 1e3 * particles["radius_m"].to_numpy())
+    columns.add("speed", "f24", 1e3 * _speeds(particles, case))
+    columns.add("a", "u16", contacts["a"].to_numpy())
+    columns.add("b", "u16", contacts["b"].to_numpy())
+    columns.add("flags", "u8", contacts["flags"].to_numpy())
+    columns.add("normal", "f24", contacts["normal_force_n"].to_numpy())
+    columns.add("tangential", "f24", contacts["tangential_force_n"].to_numpy())
+    tables = {"particles": particles, "contacts": contacts, "points": touching}
+    rows = {
+        name: np.bincount(table["frame"], minlength=len(shown.poses)).tolist()
+        for name, table in tables.items()
     }
-
-
-def _table(frame: ShownFrame) -> pd.DataFrame:
-    assert frame.data.contacts is not None
-    return frame.data.contacts
-
-
-def _outer_points(frame: ShownFrame) -> Floats:
-    """The contact points on workpiece and bowl, in the order of the contacts."""
-    rows = frame.contacts[frame.b > BODIES - len(KINDS)]
-    return _vectors(_table(frame), POINT)[rows]
-
-
-def _vectors(table: pd.DataFrame, names: tuple[str, ...]) -> Floats:
-    return table[list(names)].to_numpy(np.float64)
-
-
-def _joined(tables: list[pd.DataFrame], name: str) -> Any:
-    return np.concatenate([table[name].to_numpy() for table in tables])
+    return rows | {"low": (1e3 * low).tolist(), "step": 1e3 * step}
 
 
 def _speeds(particles: pd.DataFrame, case: CaseOfRun) -> Floats:
     """Speeds of particles in process time, m/s."""
-    simulated = np.linalg.norm(_vectors(particles, VELOCITY), axis=1)
+    simulated = np.linalg.norm(particles[list(VELOCITY)].to_numpy(), axis=1)
     return np.asarray(simulated / case.fidelity.speed_factor)
 
 
-def _scales(frames: list[ShownFrame], case: CaseOfRun) -> dict[str, float]:
+def _scales(shown: Shown, case: CaseOfRun) -> dict[str, float]:
     """The tops of the colour scales, and the mean normal force, over all shown frames."""
-    forces = [_table(one)["normal_force_n"].to_numpy()[one.contacts] for one in frames]
-    largest = [part.max(initial=0.0) for part in forces]
-    speeds = np.concatenate([_speeds(one.data.particles, case)[one.particles] for one in frames])
+    forces = shown.contacts["normal_force_n"].to_numpy()
+    largest = np.zeros(len(shown.poses))
+    np.maximum.at(largest, shown.contacts["frame"], forces)
     return {
         "force": float(np.median(largest)) or 1.0,
-        "largest": float(max(largest)),
-        "mean": float(np.concatenate([*forces, np.zeros(0)]).mean()),
-        "speed": float(1e3 * np.quantile(speeds, _TOP)) or 1.0,
-        "displacement": 1e3 * _displacement(frames) or 1.0,
+        "largest": float(largest.max()),
+        "mean": float(forces.mean()),
+        "speed": float(1e3 * np.quantile(_speeds(shown.particles, case), _TOP)) or 1.0,
+        "displacement": 1e3 * _displacement(shown) or 1.0,
     }
 
 
-def _displacement(frames: list[ShownFrame]) -> float:
+def _displacement(shown: Shown) -> float:
     """Quantile `_TOP` of how far particles have moved at the end, m."""
-    first, last = (
-        frame.data.particles.iloc[frame.particles].set_index("particle_id")[list(CENTRE)]
-        for frame in (frames[0], frames[-1])
-    )
-    moved = (last - first).dropna().to_numpy()
+    places = shown.particles.set_index(["frame", "particle_id"])[list(CENTRE)]
+    moved = (places.loc[len(shown.poses) - 1] - places.loc[0]).dropna().to_numpy()
     return float(np.quantile(np.linalg.norm(moved, axis=1), _TOP)) if len(moved) else 0.0
 
 
-def _dominant_paths(run: Run, frames: list[ShownFrame]) -> list[dict[str, Any] | None]:
+def _dominant_paths(run: Run, steps: Ints) -> list[dict[str, Any] | None]:
     """The dominant path of each frame: bottleneck in N, particles in order, where it ends."""
     names = ["step", "particle_ids", "bottleneck_n", "mean_force_n", "end_kind", "dominant"]
     table = read_table(run.table("chains.parquet"), names)
     rows = {int(row["step"]): row for row in table[table["dominant"]].to_dict("records")}
-    return [_path(rows.get(frame.data.step)) for frame in frames]
+    return [_path(rows.get(step)) for step in steps.tolist()]
 
 
 def _path(row: Mapping[Any, Any] | None) -> dict[str, Any] | None:
@@ -350,24 +366,89 @@ def _path(row: Mapping[Any, Any] | None) -> dict[str, Any] | None:
     }
 
 
+# --- profiles ----------------------------------------------------------------------------------
+
+
+def profiles(
+    columns: PackedColumns, shown: Shown, headings: Floats, surface: float
+) -> dict[str, Any]:
+    """Add the profiles of the normal forces, frame by frame; limits and means of their bins.
+
+    On the workpiece ``azimuth`` (limits in degrees; N), ``depth`` (mm; N/mm) and their ``map`` (N,
+    mean of all frames); of all contacts ``size`` (decadic logarithm of N; number).
+    """
+    frames = len(shown.poses)
+    touching = shown.contacts[shown.contacts["b"] == BODIES]
+    frame, force = touching["frame"].to_numpy(), touching["normal_force_n"].to_numpy()
+    x, y, z = touching[list(POINT)].to_numpy().T
+    azimuth = np.arctan2(y - shown.poses[frame, 1], x - shown.poses[frame, 0]) - headings[frame]
+    depth = surface - 1e3 * z
+    limits = _levels(depth)
+    # The end face may lie on a limit: what is no deeper than it is above it.
+    level = (np.searchsorted(limits, depth - _ON_LIMIT_MM) - 1).clip(0, len(limits) - 2)
+    cells = np.zeros((frames, len(limits) - 1, AZIMUTH_BINS))
+    for sector in parts(azimuth, AZIMUTH_BINS):
+        np.add.at(cells, (frame, level, sector), 0.5 * force)
+
+    def profile(name: str, limits: Floats, values: Floats) -> dict[str, Any]:
+        columns.add(f"{name}_profile", "f24", values)
+        mean = values.mean(axis=0)
+        return {"limits": limits.tolist(), "mean": mean.tolist(), "top": float(values.max()) or 1.0}
+
+    rows, sums = (
+        np.bincount(shown.contacts["frame"], weights=weights, minlength=frames)
+        for weights in (None, shown.contacts["normal_force_n"])
+    )
+    mean = cells.mean(axis=0)
+    return {
+        "azimuth": profile("azimuth", np.degrees(circumference(AZIMUTH_BINS)), cells.sum(axis=1)),
+        "depth": profile("depth", limits, cells.sum(axis=2) / np.diff(limits)),
+        "size": profile("size", *_sizes(shown.contacts, frames))
+        | {"means": (sums / np.maximum(rows, 1)).tolist()},
+        "map": {"mean": mean.ravel().tolist(), "top": float(mean.max()) or 1.0},
+    }
+
+
+def _levels(depth: Floats) -> Floats:
+    """Limits of levels of depth, mm: round ones from the surface or above to the deepest contact.
+
+    A thin last level is part of the one above it.
+    """
+    least = min(depth.min(initial=0.0), 0.0)
+    most = max(np.ceil(100 * (depth.max(initial=0.0) - _ON_LIMIT_MM)) / 100, 0.0) or 1.0
+    rough = (most - least) / (_MOST_LEVELS - 2)
+    power = 10.0 ** np.floor(np.log10(rough))
+    step = power * next(factor for factor in (1, 2, 5, 10) if factor * power >= rough)
+    first = int(np.floor(least / step))
+    last = max(round(most / step), first + 1)
+    return np.append(step * np.arange(first, last), most)
+
+
+def _sizes(contacts: pd.DataFrame, frames: int) -> tuple[Floats, Floats]:
+    """Limits of the bins of size, decadic logarithm of N, and the number of contacts in each."""
+    loaded = contacts[contacts["normal_force_n"] > 0.0]
+    bins = np.floor(_PER_DECADE * np.log10(loaded["normal_force_n"].to_numpy())).astype(np.int64)
+    lowest = bins.min() if bins.size else 0
+    width = bins.max() - lowest + 1 if bins.size else 1
+    counts = np.zeros((frames, width + _PER_DECADE))
+    np.add.at(counts, (loaded["frame"].to_numpy(), bins - lowest), 1.0)
+    weaker = np.cumsum(counts.sum(axis=0))
+    first = int(np.searchsorted(weaker[:width], _LEFT_OUT * weaker[-1], side="right"))
+    last = max(width, first + _PER_DECADE)
+    return (lowest + np.arange(first, last + 1)) / _PER_DECADE, counts[:, first:last]
+
+
 # --- workpiece and force -----------------------------------------------------------------------
 
 
-def _workpiece(columns: PackedColumns, run: Run, frames: list[ShownFrame]) -> dict[str, Any]:
+def _workpiece(columns: PackedColumns, run: Run, shown: Shown) -> dict[str, Any]:
     """Add the workpiece's facets in its own frame and their loads; its poses, frame by frame."""
     case = run.case
     surface = read_surface(run.folder, case)
     columns.add("corners", "f24", 1e3 * surface.corners)
     own = needed(case.workpiece, "workpiece")
-    poses = []
-    for frame in frames:
-        assert frame.data.workpiece is not None
-        place, rotation = frame.data.workpiece
-        turn = Quaternion.from_matrix(rotation.matrices[0]).as_quat()
-        poses.append([*(1e3 * place).tolist(), *turn.tolist()])
     return {
-        "poses": poses,
-        "headings": _headings(run, frames),
+        "poses": (shown.poses * [1e3, 1e3, 1e3, 1.0, 1.0, 1.0, 1.0]).tolist(),
         "radius": 1e3 * own.radius_m,
         "immersion": 1e3 * own.immersion_depth_m,
         "loads": _loads(columns, run),
@@ -389,12 +470,11 @@ def _loads(columns: PackedColumns, run: Run) -> list[dict[str, Any]]:
     return loads
 
 
-def _headings(run: Run, frames: list[ShownFrame]) -> list[float]:
+def _headings(run: Run, steps: Ints) -> Floats:
     """The direction of motion at each frame, rad."""
     table = _force(run, ["step", "direction_rad"])
     heading = np.unwrap(table["direction_rad"].to_numpy(np.float64))
-    steps = [frame.data.step for frame in frames]
-    return [float(one) for one in np.interp(steps, table["step"], heading)]
+    return np.interp(steps, table["step"], heading)
 
 
 def _force(run: Run, names: list[str]) -> pd.DataFrame:
@@ -422,11 +502,10 @@ def _curve(columns: PackedColumns, run: Run) -> dict[str, Any]:
     }
 
 
-def _peaks(peaks: DragPeaks, times_s: Floats, case: CaseOfRun) -> list[dict[str, Any]]:
+def _peaks(peaks: pd.DataFrame, times_s: Floats, case: CaseOfRun) -> list[dict[str, Any]]:
     """The highest peaks, each with its nearest frame."""
+    times = process_time(peaks["time_s"].to_numpy(), case).tolist()
     return [
         {"time": time, "force": -drag, "frame": int(np.abs(times_s - time).argmin())}
-        for time, drag in zip(
-            process_time(peaks.time_s, case).tolist(), peaks.drag_n.tolist(), strict=True
-        )
+        for time, drag in zip(times, peaks["drag_n"].tolist(), strict=True)
     ]

@@ -2,7 +2,7 @@
 
 Trade-off, stability map, verification, validation, scalings and costs are campaigns:
 
-1. **A design of runs**, in YAML: `dragdeck.sweep.design`.
+1. **A design of runs**, in YAML: `dragdeck.sweep.cases`.
 2. **Runs.** Those of a study are jobs of their own (``workflow/rules/runs.smk``); many short ones
    are a batch in one job (`dragdeck.engine.batch.Batch.each`), and one that fails is a finding.
 3. **Measures:** a function that makes of a finished run one row, whose uncertain numbers are of

@@ -38,6 +38,8 @@ from dragdeck.errors import DocumentError, RejectedRunError
 from dragdeck.records.case import CaseOfRun, load_case
 from dragdeck.records.run import RunRecord, read_accepted
 
+# --- what was simulated --------------------------------------------------------------------------
+
 
 def set_up(
     case: CaseOfRun, packings: int, filling: FillingFindings | None
@@ -131,6 +133,9 @@ def _mm(length_m: float) -> str:
 
 def _text(value: JsonValue) -> str:
     return value if isinstance(value, str) else ""
+
+
+# --- runs ----------------------------------------------------------------------------------------
 
 
 F = TypeVar("F", bound=Findings, covariant=True)
@@ -230,6 +235,9 @@ def upstream_folders(run_dir: Path, case: CaseOfRun) -> dict[str, Path]:
 def _read(run_dir: Path, findings: type[F]) -> ReportedRun[F]:
     record = read_accepted(run_dir)
     return ReportedRun(run_dir, load_case(run_dir), findings.read(run_dir / FILE), record)
+
+
+# --- cases ---------------------------------------------------------------------------------------
 
 
 _SEED = "seed"

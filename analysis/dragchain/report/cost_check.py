@@ -9,13 +9,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from pydantic import JsonValue
-
 from dragchain.report.cases import ReportedCase
 from dragchain.report.values import mean_over_packings
 from dragchain.run.case import changed_inputs
 from dragchain.statistics.estimate import Estimate
-from dragdeck.documents import Document, Part
+from dragdeck.records.advice import AdviceFile, OptionEntry
 from dragdeck.records.advised import AdvisedSettings
 from dragdeck.records.case import CaseOfRun
 from dragdeck.records.run import RunRecord
@@ -24,38 +22,8 @@ _RESTITUTION = "restitution"
 """The quantity of the drop test."""
 
 
-class Settings(Part):
-    """The settings of an option."""
-
-    youngs_modulus_scale: float
-    timestep_fraction: float
-    speed_factor: float
-    ranks: int
-
-
-class Option(Part):
-    """Settings for a case, and what its runs are expected to take with them, by scene."""
-
-    settings: Settings
-    inputs: Mapping[str, JsonValue]
-    steps: Mapping[str, int]
-    steps_per_s: Mapping[str, float]
-    wall_time_s: Mapping[str, float]
-    source: str
-
-
-class AdvisedCase(Part):
-    """A case of ``advice.json``."""
-
-    options: tuple[Option, ...]
-
-
-class Advice(Document):
-    """The content of ``advice.json`` that is set beside the runs."""
-
-    remedy = "make it with: dragdeck advise"
-
-    cases: tuple[AdvisedCase, ...]
+_SETTINGS = ("youngs_modulus_scale", "timestep_fraction", "speed_factor", "ranks")
+"""Those that tell a run from another."""
 
 
 @dataclass(frozen=True)
@@ -114,27 +82,28 @@ class Answer:
         return "yes" if self.half_width <= self.tolerance else "no"
 
 
-def read_advice(file: Path) -> list[Option]:
+def read_advice(file: Path) -> list[OptionEntry]:
     """The options of all cases of an ``advice.json``."""
-    return [option for case in Advice.read(file).cases for option in case.options]
+    return [option for case in AdviceFile.read(file).cases for option in case.options]
 
 
-def prediction_for(case: CaseOfRun, options: Sequence[Option]) -> Option | None:
+def prediction_for(case: CaseOfRun, options: Sequence[OptionEntry]) -> OptionEntry | None:
     """The option that a process run is: same settings, same inputs; None where there is none."""
     return next((option for option in options if _is_of(case, option)), None)
 
 
-def _is_of(case: CaseOfRun, option: Option) -> bool:
-    same = all(math.isclose(value, getattr(case.fidelity, name)) for name, value in option.settings)
+def _is_of(case: CaseOfRun, option: OptionEntry) -> bool:
+    own, other = case.fidelity, option.settings
+    same = all(math.isclose(getattr(other, name), getattr(own, name)) for name in _SETTINGS)
     return same and not changed_inputs(case.inputs, option.inputs)
 
 
-def cost_rows(option: Option, records: Mapping[str, RunRecord]) -> Iterator[CostRow]:
+def cost_rows(option: OptionEntry, records: Mapping[str, RunRecord]) -> Iterator[CostRow]:
     """Predicted and actual cost of every run that the option says something of.
 
     Parameters
     ----------
-    option : Option
+    option : OptionEntry
     records : mapping
         ``run.json`` by scene.
     """

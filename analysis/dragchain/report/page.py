@@ -125,6 +125,9 @@ def interval(estimate: Mapping[str, float | None], digits: int = 3) -> str:
     return f"{value} ({low} to {high})"
 
 
+# --- pages ---------------------------------------------------------------------------------------
+
+
 LARGE_PICTURE = 200_000
 """Bytes above which a page holds a picture as WebP; ``figures/`` keeps the PNG."""
 
@@ -221,6 +224,9 @@ def file_uri(picture: Path) -> str | None:
         return data_uri(picture.read_bytes(), picture.suffix.removeprefix("."))
     except (OSError, ValueError) as error:
         raise TableError(f"{picture} is damaged ({error}); draw the figures again") from error
+
+
+# --- files ---------------------------------------------------------------------------------------
 
 
 def write_bundle(

@@ -129,6 +129,9 @@ def dominant_bottlenecks(network: pd.DataFrame, chains: pd.DataFrame) -> Floats:
     return dominant.reindex(network["step"]).fillna(0.0).to_numpy(np.float64)
 
 
+# --- findings ------------------------------------------------------------------------------------
+
+
 def write_findings(run: RunData) -> Findings:
     """Compute the findings of a run, write them to ``tables/figures.json`` and return them.
 

@@ -42,6 +42,9 @@ from dragchain.statistics.estimate import Estimate
 from dragdeck.decks.outputs import load_outputs
 from dragdeck.records.case import CaseOfRun, load_case
 
+# --- panels --------------------------------------------------------------------------------------
+
+
 _DEPTH = "depth below the surface (mm)"
 
 
@@ -110,6 +113,9 @@ def load_depth_panel(axes: Axes, found: ProcessFindings) -> None:
     """Sum of the normal forces per depth in bins of depth."""
     depth_bars(axes, found.depth.edges_m, found.depth.line_load_n_per_m, 1e-3)
     axes.set(xlabel="total normal force per depth (N/mm)", ylabel=_DEPTH)
+
+
+# --- process -------------------------------------------------------------------------------------
 
 
 def forces(run: RunData, found: ProcessFindings) -> Figure:

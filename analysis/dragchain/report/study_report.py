@@ -18,14 +18,7 @@ from dragchain.report.cases import (
     read_upstream,
     upstream_folders,
 )
-from dragchain.report.cost_check import (
-    CostRow,
-    Option,
-    answers,
-    cost_rows,
-    prediction_for,
-    read_advice,
-)
+from dragchain.report.cost_check import CostRow, answers, cost_rows, prediction_for, read_advice
 from dragchain.report.findings import FIGURES, FillingFindings, Findings, ProcessFindings
 from dragchain.report.page import (
     NETWORK_PAGE,
@@ -41,8 +34,12 @@ from dragchain.statistics.correlated import RELIABLE_TIMES
 from dragchain.tables.network_contacts import Corrections
 from dragdeck.errors import DragdeckError
 from dragdeck.files import write_bytes
+from dragdeck.records.advice import OptionEntry
 from dragdeck.records.case import AssumptionOfRun, load_case
 from dragdeck.records.run import RunRecord
+
+# --- runs without a result -----------------------------------------------------------------------
+
 
 _STEPS = ("render", "run", "tables", "chains", "loading", "figures")
 """The steps of a run that have a log, in order: the first that failed is to blame."""
@@ -155,6 +152,9 @@ def _split(message: str) -> tuple[str, str]:
     return " ".join(problem.split()), " ".join(remedy.split()) or "see the logs in its folder"
 
 
+# --- report --------------------------------------------------------------------------------------
+
+
 _SHOWN = 6
 """Cases that the head of the page names; more are in its first table alone."""
 
@@ -258,7 +258,7 @@ def _with_upstream(run_dirs: Sequence[Path]) -> list[Path]:
 
 
 def _read(
-    run_dirs: Sequence[Path], options: Sequence[Option]
+    run_dirs: Sequence[Path], options: Sequence[OptionEntry]
 ) -> tuple[list[RunSection], list[MissingRun]]:
     """What the page shows of the process runs, and the runs without a result."""
     sections, missing = [], []
@@ -273,7 +273,7 @@ def _read(
     return sections, missing
 
 
-def _section(study: StudyRuns, options: Sequence[Option]) -> RunSection:
+def _section(study: StudyRuns, options: Sequence[OptionEntry]) -> RunSection:
     process = study.process
     expected = prediction_for(process.case, options)
     records = {str(run.case.scene): run.record for run in study.runs}

@@ -200,6 +200,9 @@ def _upstream(study: StudyRuns) -> Row:
     }
 
 
+# --- main numbers --------------------------------------------------------------------------------
+
+
 _SHOWN = 10
 """Cases that are listed; all are in the summary."""
 

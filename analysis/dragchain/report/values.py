@@ -144,6 +144,9 @@ class Extrapolated(Document):
         return next((one for one in self.quantities if one.name == name), None)
 
 
+# --- values --------------------------------------------------------------------------------------
+
+
 _FORCES = {"drag_mean": "drag_n", "lateral_mean": "lateral_n", "vertical_mean": "vertical_n"}
 _PER_METRE = {
     "force_slide": "force_slide_n_m",

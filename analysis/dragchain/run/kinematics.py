@@ -12,9 +12,9 @@ from dragchain.arrays import Floats, Ints
 from dragchain.errors import TableError
 from dragdeck.records.case import CaseOfRun
 from dragdeck.records.run import Phase
+from dragdeck.study.drive import Rotation, about_vertical, rotated, wrap_angle
 from dragdeck.study.driven import DrivenMotion
 from dragdeck.study.model import Motion
-from dragdeck.study.rotation import Rotation, about_vertical, rotated, wrap_angle
 
 
 def drag_start_s(case: CaseOfRun) -> float:

@@ -10,7 +10,7 @@ from dragchain.arrays import Floats
 from dragchain.errors import TableError
 from dragchain.run.kinematics import needed
 from dragdeck.records.case import CaseOfRun
-from dragdeck.study.rotation import Rotation, rotated
+from dragdeck.study.drive import Rotation, rotated
 
 
 def workpiece_mesh(run_dir: Path, case: CaseOfRun) -> Any:

@@ -51,6 +51,9 @@ IMPACTS = (
 )  # fmt: skip
 
 
+# --- meanings ------------------------------------------------------------------------------------
+
+
 _UNITS: Mapping[str, str] = {
     "n_m_per_m": "N m/m", "n_s_per_m": "N s/m", "m_per_m": "m/m", "n_per_m": "N/m",
     "j_per_m": "J/m", "per_m": "1/m", "per_s": "1/s", "kg_m3": "kg/m3", "m_s2": "m/s2",

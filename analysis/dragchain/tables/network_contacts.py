@@ -230,6 +230,9 @@ def _joined(groups: list[ContactRows]) -> ContactRows:
     return ContactRows(*(getattr(rows, name)[order] for name in names))
 
 
+# --- corrections ---------------------------------------------------------------------------------
+
+
 _ROUNDING = 1e-6
 """A force above the limit by this fraction is rounded, not cut."""
 

@@ -18,7 +18,7 @@ from dragchain.tables.workpiece_contacts import Meshes, WorkpieceFrames, join_wo
 from dragdeck.decks.outputs import OutputOfRun, load_outputs
 from dragdeck.dumps.frame import Columns, Frame
 from dragdeck.records.case import CaseOfRun, load_case
-from dragdeck.study.rotation import Rotation
+from dragdeck.study.drive import Rotation
 
 _BATCH_ROWS = 8192
 """Contacts on the workpiece that are joined at once, but for those of the last frame."""
@@ -127,38 +127,28 @@ class Run:
             yield _joined(batch)
 
 
+# --- place of the workpiece ----------------------------------------------------------------------
+
+
 WorkpiecePlaces = Callable[[int], tuple[Floats, Rotation]]
 
-WORKPIECE_COLUMNS = ("step", "ref_x_m", "ref_y_m", "ref_z_m", "direction_rad")
+_WORKPIECE = ["step", "ref_x_m", "ref_y_m", "ref_z_m", "direction_rad"]
 """Columns of ``workpiece_force.parquet`` that say where the workpiece is."""
 
 
 def workpiece_places(run_dir: Path, case: CaseOfRun) -> WorkpiecePlaces:
-    """A function of a step: the workpiece's reference point in m, and its orientation.
+    """A function of a step: the workpiece's reference point in m, (3,), and its orientation.
 
     Raises
     ------
     TableError
-        If ``workpiece_force.parquet`` is not there.
+        If ``workpiece_force.parquet`` is not there, or empty.
     """
-    workpiece = read_table(run_dir / "tables" / "workpiece_force.parquet", list(WORKPIECE_COLUMNS))
-    return lambda step: workpiece_place(workpiece, step, case)
-
-
-def workpiece_place(workpiece: pd.DataFrame, step: int, case: CaseOfRun) -> tuple[Floats, Rotation]:
-    """The workpiece's reference point at a step in m, (3,), and its orientation.
-
-    Parameters
-    ----------
-    workpiece : DataFrame
-        `WORKPIECE_COLUMNS` of ``workpiece_force.parquet``, of the samples around that step at
-        least.
-    step : int
-        The step.
-    case : CaseOfRun
-        The case, of a process.
-    """
-    return _reference_point(workpiece, step), _workpiece_rotation(workpiece, step, case)
+    file = run_dir / "tables" / "workpiece_force.parquet"
+    table = read_table(file, _WORKPIECE)
+    if table.empty:
+        raise TableError(f"{file} contains no samples")
+    return lambda step: (_reference_point(table, step), _workpiece_rotation(table, step, case))
 
 
 def _reference_point(workpiece: pd.DataFrame, step: int) -> Floats:

@@ -50,7 +50,7 @@ from dragchain.tables.workpiece_contacts import WallContacts
 from dragdeck.dumps.frame import Columns
 from dragdeck.errors import RejectedRunError
 from dragdeck.records.case import CaseOfRun
-from dragdeck.study.rotation import wrap_angle
+from dragdeck.study.drive import wrap_angle
 
 
 @dataclass(frozen=True)

@@ -213,6 +213,9 @@ def _gain(
     return Gain(setting, base, factors, speed_up(tradeoff, setting, base), errors, product)
 
 
+# --- what is left out ----------------------------------------------------------------------------
+
+
 _PLAIN = ("plain_full", "plain")
 """Names of the cost of the plain deck, that at full stiffness first."""
 

@@ -195,6 +195,9 @@ def values_within(measures: Measures, arc_m: float, stretch: int = 0) -> dict[st
     return {**single, **measures.values(stretch * count, (stretch + 1) * count)}
 
 
+# --- comparison ----------------------------------------------------------------------------------
+
+
 Levels = Mapping[str, Hashable]
 
 

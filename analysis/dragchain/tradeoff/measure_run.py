@@ -85,6 +85,10 @@ def _load_map(counted: Sampled, depth_m: float) -> Floats:
 LONG_WAVE, SHORT_WAVE = 2.0, 0.25
 """Wave lengths in mean particle diameters that part the spectrum of the drag in three bands."""
 
+
+# --- blocks of the path --------------------------------------------------------------------------
+
+
 FORCE_BINS = np.logspace(-5.0, 2.0, 71)
 """Edges of the histogram of normal forces on the workpiece, N."""
 
@@ -320,6 +324,9 @@ def _of_chains(chains: pd.DataFrame, frames: Ints, path: CountedPath) -> dict[st
             paths["step"].to_numpy(np.int64), paths["bottleneck_n"].to_numpy(np.float64)
         ),
     }
+
+
+# --- measures ------------------------------------------------------------------------------------
 
 
 def write_measures(run_dir: Path, packing_table: Path) -> Measures:

@@ -124,6 +124,9 @@ MAIN = tuple(quantity.name for quantity in QUANTITIES if quantity.short)
 """The quantities that figures and the tables of settings show."""
 
 
+# --- measures of a run ---------------------------------------------------------------------------
+
+
 FILE = "measures.json"
 
 _TELLING_CHECKS = ("within_limits", "no_engine_error")

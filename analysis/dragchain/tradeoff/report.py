@@ -32,6 +32,9 @@ from dragchain.tradeoff.outcome import (
 from dragchain.tradeoff.path_length import along, chance, reaches
 from dragchain.tradeoff.record import tradeoff_record
 
+# --- numbers -------------------------------------------------------------------------------------
+
+
 _FOLD = 2.0
 """Relative errors from this on are told as multiples."""
 
@@ -88,6 +91,9 @@ FILTERS: Mapping[str, Callable[..., str]] = {
     for function in (error_percent, size_percent, error_size, error_interval, times, cheaper, span)
 }
 """Filters of the page."""
+
+
+# --- report --------------------------------------------------------------------------------------
 
 
 _TOGETHER = ("contact_force_mean", "contact_force_p90")

@@ -22,10 +22,10 @@ from dragchain.windows.estimate import (
     WindowedQuantity,
     WindowOfRun,
     WindowsRecord,
+    corrected_map,
     joined,
     windows_needed,
 )
-from dragchain.windows.load_map import corrected
 from dragdeck.records.case import load_case
 from dragdeck.records.run import RunRecord
 
@@ -134,7 +134,7 @@ def _load_map(
 ) -> LoadMap | None:
     total = next((one.value for one in rows if one.name == "normal_load"), _NONE)
     runs = soft.arc_m / windows[0].arc_m if windows else math.nan
-    return corrected(soft.load_map, [one.load_map for one in windows], total, runs)
+    return corrected_map(soft.load_map, [one.load_map for one in windows], total, runs)
 
 
 def _joined(

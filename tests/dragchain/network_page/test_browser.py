@@ -202,8 +202,8 @@ def test_a_click_on_a_contact_tells_its_forces(page: Browser, run: Path) -> None
 def test_contacts_are_shown_by_force_class_and_chain(page: Browser, run: Path) -> None:
     def drawn() -> tuple[int, int, list[int]]:
         """Cylinders, halos, and counted contacts of each class."""
-        cylinders, halos = page.run("const {rows, halos} = networkPage.contacts;"
-                                    "return [rows.length, halos.count]")  # fmt: skip
+        cylinders, halos = page.run("const {cylinders, halos} = networkPage.contacts;"
+                                    "return [cylinders.count, halos.count]")  # fmt: skip
         counts = [int(page.text(f"#count-{kind}")) for kind in range(3)]
         assert sum(counts) == cylinders
         return cylinders, halos, counts
@@ -238,7 +238,7 @@ def test_a_section_plane_hides_what_is_beyond_it(page: Browser, run: Path) -> No
     choose(page, "section-axis", "y")
     at = page.run("""const slider = document.getElementById("section-at");
         slider.value = 0.4 * slider.min + 0.6 * slider.max;
-        slider.dispatchEvent(new Event("input"));
+        slider.dispatchEvent(new Event("input", {bubbles: true}));
         return Number(slider.value)""")
     assert numbers(page.text("#section-shown")) == [pytest.approx(at, abs=0.06)]
     particles, contacts = (rows(run, name, step_at(page)) for name in ("particles", "contacts"))
@@ -246,8 +246,8 @@ def test_a_section_plane_hides_what_is_beyond_it(page: Browser, run: Path) -> No
     for _ in range(2):
         larger = page.find("#section-side").is_selected()
         kept = set(particles["particle_id"][beyond == larger])
-        ids = page.run("const {media, frames, number} = networkPage;"
-                       "return media.rows.map(row => frames.at(number).id[row])")  # fmt: skip
+        ids = page.run("const {media: {spheres}, frames, number} = networkPage;"
+                       "return spheres.rows.map(row => frames.at(number).id[row])")  # fmt: skip
         assert set(ids) == kept
         other = contacts["b_id"].isin(kept) | (contacts["b_id"] <= 0)
         inside = (contacts["a_id"].isin(kept) & other).sum()
@@ -338,7 +338,7 @@ def test_profiles_are_those_of_the_tables(page: Browser, run: Path) -> None:
         assert now == pytest.approx(force[inside].sum() / (high - low), rel=1e-3)
     said = page.find("#profile-azimuth").get_attribute("aria-label")
     assert numbers(said)[1] == four_digits(force.sum())
-    cells = page.run("return Array.from(networkPage.profiles.profiles.map.values)")
+    cells = page.run("return networkPage.head.profiles.map.mean")
     assert sum(cells) == pytest.approx(every["normal_force_n"].sum() / len(steps), rel=1e-4)
     largest = page.find("#profile-map").get_attribute("aria-valuetext")
     assert numbers(largest)[-1] == four_digits(max(cells))

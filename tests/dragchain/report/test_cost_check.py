@@ -21,12 +21,13 @@ from report_files import (
 )
 
 from dragchain.report.cases import cases_of, read_study_runs
-from dragchain.report.cost_check import Option, answers, cost_rows, prediction_for, read_advice
+from dragchain.report.cost_check import answers, cost_rows, prediction_for, read_advice
 from dragchain.report.study_report import write_study_report
 from dragchain.report.values import EXTRAPOLATED, Extrapolated, ExtrapolatedQuantity
 from dragchain.run.basis import QUANTITIES
 from dragchain.statistics.estimate import Estimate
 from dragdeck.errors import DocumentError
+from dragdeck.records.advice import OptionEntry
 from dragdeck.records.case import CaseOfRun
 from dragdeck.records.run import RunRecord
 
@@ -45,12 +46,15 @@ def option(**more: Any) -> dict[str, Any]:
         "steps_per_s": {"filling": 4000.0, "process": 3000.0},
         "wall_time_s": {"filling": 20.0, "process": 50.0},
         "source": "a short run of this study, 2 ranks",
+        "drop_timestep_fraction": None, "error": None, "relative_cost": 1.0,
     }  # fmt: skip
 
 
 def advice_file(folder: Path, *options: dict[str, Any], schema: int = 2) -> Path:
     file = folder / "advice.json"
-    file.write_text(json.dumps({"schema": schema, "cases": [{"options": list(options)}]}))
+    case = {"case": "any", "run": "any", "asked": ASKED, "options": list(options)}
+    content = {"study": "any", "date": "any", "versions": {}, "speed": None, "cases": [case]}
+    file.write_text(json.dumps({"schema": schema, **content}))
     return file
 
 
@@ -105,13 +109,13 @@ def test_no_advice_no_comparison(run: Path, tmp_path: Path) -> None:
 )  # fmt: skip
 def test_a_prediction_of_other_settings_is_not_compared(run: Path, other: dict[str, Any]) -> None:
     case = CaseOfRun.read(run / "case.json")
-    wrong, right = (Option.model_validate(one) for one in (other, option()))
+    wrong, right = (OptionEntry.model_validate(one) for one in (other, option()))
     assert prediction_for(case, [wrong]) is None
     assert prediction_for(case, [wrong, right]) == right
 
 
 def test_only_scenes_that_were_run_and_predicted_have_a_row() -> None:
-    expected = Option.model_validate(option())
+    expected = OptionEntry.model_validate(option())
     (row,) = cost_rows(expected, {"process": RECORD, "drop_test": RECORD})
     assert (row.scene, row.steps, row.actual_steps) == ("process", 150_000, 160_000)
     assert row.ratio == pytest.approx(76 / 50)

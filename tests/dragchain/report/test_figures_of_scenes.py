@@ -3,7 +3,7 @@
 import pytest
 
 from dragchain.report.findings import FIGURES
-from dragdeck.scenes.registry import SCENES
+from dragdeck.scenes.process import SCENES
 
 
 @pytest.mark.parametrize("scene", sorted(SCENES))

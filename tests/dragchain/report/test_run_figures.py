@@ -46,8 +46,8 @@ from dragchain.report.run_figures import (
 from dragchain.run.reference import reference_drags
 from dragchain.statistics.estimate import Estimate
 from dragdeck.records.case import CaseOfRun, load_case
+from dragdeck.study.drive import Rotation
 from dragdeck.study.reference import Drag, Reference
-from dragdeck.study.rotation import Rotation
 
 pytestmark = pytest.mark.slow  # its data take seconds to make
 
@@ -302,7 +302,7 @@ def test_a_machine_that_cannot_render_is_told_what_to_install(
 @pytest.fixture
 def filling(tmp_path: Path) -> Path:
     settle = [{"name": "settle", "start_step": 0, "end_step": LAST}]
-    case = case_json("filling", phases=settle, settled={"energy_ratio": 1e-5})
+    case = case_json("filling", phases=settle, settled={"energy_ratio": 1e-5, "highest_m": 0.1})
     write_documents(tmp_path, case)
     bed = {
         "schema": 2,

@@ -14,9 +14,15 @@ from made_tradeoff import made_tradeoff
 from paths import ROOT
 
 from dragdeck import commands
-from dragdeck.advice.advise import advised_settings, resolve
+from dragdeck.advice.advise import (
+    Work,
+    advised_settings,
+    consistent,
+    plain_option,
+    resolve,
+    with_option,
+)
 from dragdeck.advice.forecast import question
-from dragdeck.advice.options import Work, consistent, plain_option, with_option
 from dragdeck.cases.bed import full_stiffness_number
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
@@ -25,8 +31,7 @@ from dragdeck.records.tradeoff import TradeoffRecord, measured_tradeoff
 from dragdeck.scenes.drop_test import drop_scene
 from dragdeck.scenes.filling import filling_scene
 from dragdeck.scenes.lead import FIRST_WINDOWS, with_leads
-from dragdeck.scenes.process import PROCESS, process_scene
-from dragdeck.scenes.registry import SCENES
+from dragdeck.scenes.process import PROCESS, SCENES, process_scene
 from dragdeck.study.model import BUILT_IN_FIDELITIES, Tolerance
 from dragdeck.sweep.cases import load_cases
 

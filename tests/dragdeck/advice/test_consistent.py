@@ -8,18 +8,16 @@ import pytest
 from hypothesis import given, settings
 from random_scenes import random_scenes
 
-from dragdeck.advice.advise import resolve
-from dragdeck.advice.options import consistent
+from dragdeck.advice.advise import consistent, resolve
 from dragdeck.cases.bed import bed_timestep, skin
 from dragdeck.cases.case import Case
 from dragdeck.errors import Caution
 from dragdeck.outlook.timestep import check_timestep, largest_of_case, stable_step_cautions
 from dragdeck.scenes.filling import filling_cautions
-from dragdeck.scenes.fit import process_cautions
 from dragdeck.scenes.lead import with_leads
-from dragdeck.scenes.process import PROCESS
-from dragdeck.scenes.registry import SCENES
+from dragdeck.scenes.process import PROCESS, SCENES
 from dragdeck.scenes.scene import SceneType
+from dragdeck.scenes.workpiece import process_cautions
 from dragdeck.study.model import Fidelity
 from dragdeck.sweep.cases import settle_case
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from made_tradeoff import cost, made_tradeoff
 
-from dragdeck.advice.options import Speed, step_cost
+from dragdeck.advice.advise import step_cost
 from dragdeck.campaigns.machine_speed import (
     DRAG_STEPS,
     last_loop,
@@ -19,6 +19,7 @@ from dragdeck.cases.case import Case
 from dragdeck.decks.templates import environment
 from dragdeck.errors import EngineError
 from dragdeck.project import Project
+from dragdeck.records.advice import Speed
 from dragdeck.scenes.filling import filling_scene
 from dragdeck.scenes.process import process_scene
 from dragdeck.study.model import Fidelity

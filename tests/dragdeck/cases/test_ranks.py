@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from dragdeck.advice.advise import advised_settings
-from dragdeck.advice.options import with_option
+from dragdeck.advice.advise import advised_settings, with_option
 from dragdeck.cases.case import Case
 from dragdeck.cases.ranks import CORES_VARIABLE
 from dragdeck.records.tradeoff import measured_tradeoff

@@ -16,8 +16,7 @@ from dragdeck.decks.templates import environment
 from dragdeck.errors import InputError
 from dragdeck.physics.packing import Bed
 from dragdeck.project import Project
-from dragdeck.scenes.process import PROCESS, process_scene
-from dragdeck.scenes.registry import SCENES
+from dragdeck.scenes.process import PROCESS, SCENES, process_scene
 from dragdeck.study.contact_law import Pair
 from dragdeck.sweep.cases import load_cases
 

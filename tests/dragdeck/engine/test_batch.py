@@ -5,12 +5,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from dragdeck.engine.record import RunRecord
 
 from dragdeck.cases.case import Case
 from dragdeck.decks.deck import AnyScene
 from dragdeck.decks.templates import environment
 from dragdeck.engine.batch import Batch
-from dragdeck.engine.record import RunRecord
 from dragdeck.errors import InputError, RejectedRunError
 from dragdeck.project import Project
 from dragdeck.scenes.drop_test import drop_scene

@@ -20,8 +20,7 @@ from dragdeck.outlook.runs import (
 )
 from dragdeck.project import Project
 from dragdeck.scenes.filling import FILLING
-from dragdeck.scenes.process import PROCESS
-from dragdeck.scenes.registry import SCENES
+from dragdeck.scenes.process import PROCESS, SCENES
 
 
 def a_run(

@@ -29,10 +29,9 @@ from dragdeck.records.stability import (
     stability_map,
     stable_step_law,
 )
-from dragdeck.scenes.dimensionless import describe
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import PROCESS
-from dragdeck.scenes.workpiece import workpiece_radius
+from dragdeck.scenes.workpiece import describe, workpiece_radius
 from dragdeck.study.model import Fidelity
 from dragdeck.sweep.cases import load_cases
 

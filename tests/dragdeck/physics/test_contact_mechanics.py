@@ -14,7 +14,7 @@ from dragdeck.physics.contact_mechanics import (
     rayleigh_time,
     shear_modulus,
 )
-from dragdeck.study.material import Material
+from dragdeck.study.workpiece import Material
 
 CERAMIC = Material(youngs_modulus_pa=77e9, poissons_ratio=0.19, density_kg_m3=2656)
 STEEL = Material(youngs_modulus_pa=210e9, poissons_ratio=0.30, density_kg_m3=7610)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from dragdeck.physics.contact_network import ContactConstants, Floats, stability_number
+from dragdeck.physics.contact_mechanics import ContactConstants, Floats, stability_number
 from evidence.stability.measures import hertz_stiffness, largest_frequency
 
 RADIUS, DENSITY, BOWL, OVERLAP = 3e-3, 2500.0, 0.05, 1e-5

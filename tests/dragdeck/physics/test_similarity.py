@@ -10,7 +10,7 @@ from dragdeck.cases.case import Case
 from dragdeck.physics.contact_mechanics import SOLID_FRACTION_ESTIMATE
 from dragdeck.physics.rounding import rounded
 from dragdeck.physics.similarity import softest_scale
-from dragdeck.scenes.dimensionless import describe
+from dragdeck.scenes.workpiece import describe
 
 
 def test_numbers_of_a_scene_by_hand(case: Case) -> None:

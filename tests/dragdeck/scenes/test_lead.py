@@ -23,8 +23,7 @@ from dragdeck.scenes.process import PROCESS, process_scene
 from dragdeck.scenes.scene import StudyScene
 from dragdeck.scenes.workpiece import reference_height
 from dragdeck.study.base import Json
-from dragdeck.study.drive import Drive
-from dragdeck.study.rotation import by_vector, rotated
+from dragdeck.study.drive import Drive, by_vector, rotated
 from dragdeck.sweep.cases import load_cases
 
 BED = Bed(surface_m=0.038, top_m=0.0446)

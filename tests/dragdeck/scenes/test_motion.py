@@ -24,10 +24,9 @@ from dragdeck.physics.packing import Bed
 from dragdeck.preview.layout import layout
 from dragdeck.records.case import CaseOfRun as ReadCase
 from dragdeck.records.case import load_case
-from dragdeck.scenes.fit import clearances
-from dragdeck.scenes.legs import farthest_reach, path_heights
-from dragdeck.scenes.motion import course
+from dragdeck.scenes.motion import course, farthest_reach, path_heights
 from dragdeck.scenes.process import process_scene
+from dragdeck.scenes.workpiece import clearances
 from dragdeck.study.check import warnings
 from dragdeck.sweep.cases import load_cases
 

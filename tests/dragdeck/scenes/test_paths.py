@@ -14,9 +14,8 @@ from dragdeck.errors import InputError
 from dragdeck.outlook.process import workpiece_notes
 from dragdeck.physics.packing import Bed
 from dragdeck.project import Project
-from dragdeck.scenes.dimensionless import describe
-from dragdeck.scenes.fit import fastest_motion
 from dragdeck.scenes.process import process_scene
+from dragdeck.scenes.workpiece import describe, fastest_motion
 from dragdeck.sweep.cases import load_cases
 
 BED = Bed(surface_m=0.038, top_m=0.0446)

@@ -19,11 +19,9 @@ from dragdeck.decks.templates import environment
 from dragdeck.errors import InputError
 from dragdeck.physics.packing import Bed
 from dragdeck.project import Project
-from dragdeck.scenes.dimensionless import describe
-from dragdeck.scenes.fit import fastest_motion
-from dragdeck.scenes.legs import surface_speed
+from dragdeck.scenes.motion import surface_speed
 from dragdeck.scenes.process import PROCESS, process_scene
-from dragdeck.scenes.workpiece import workpiece_length
+from dragdeck.scenes.workpiece import describe, fastest_motion, workpiece_length
 from dragdeck.study.drive import Drive
 from dragdeck.study.model import Motion
 from dragdeck.study.superposed.oscillation import Oscillation

@@ -11,10 +11,10 @@ import pytest
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
 from dragdeck.physics.packing import Bed
-from dragdeck.scenes.dimensionless import describe
 from dragdeck.scenes.motion import course
 from dragdeck.scenes.process import PROCESS, process_scene
 from dragdeck.scenes.workpiece import (
+    describe,
     dip,
     farthest_surface,
     reference_height,

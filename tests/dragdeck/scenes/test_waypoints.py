@@ -20,15 +20,12 @@ from dragdeck.errors import InputError
 from dragdeck.physics.packing import Bed
 from dragdeck.preview.layout import layout
 from dragdeck.project import Project
-from dragdeck.scenes.dimensionless import describe
-from dragdeck.scenes.fit import clearances, fastest_motion
-from dragdeck.scenes.legs import path_heights, surface_speed
-from dragdeck.scenes.motion import driven
+from dragdeck.scenes.motion import driven, path_heights, surface_speed
 from dragdeck.scenes.process import PROCESS, process_scene
-from dragdeck.scenes.workpiece import workpiece_length
+from dragdeck.scenes.workpiece import clearances, describe, fastest_motion, workpiece_length
 from dragdeck.study.check import warnings
+from dragdeck.study.drive import in_steps
 from dragdeck.study.paths.waypoints import WaypointsPath
-from dragdeck.study.stages import in_steps
 from dragdeck.sweep.cases import load_cases
 
 BED = Bed(surface_m=0.038, top_m=0.0446)

@@ -16,8 +16,7 @@ from dragdeck.engine.log import read_samples
 from dragdeck.engine.run_folder import run
 from dragdeck.project import Project
 from dragdeck.scenes.filling import FILLING, filling_scene
-from dragdeck.scenes.process import process_scene
-from dragdeck.scenes.registry import SCENES
+from dragdeck.scenes.process import SCENES, process_scene
 from dragdeck.study import contact_law
 from dragdeck.study.contact_law import (
     Coefficient,
@@ -27,7 +26,7 @@ from dragdeck.study.contact_law import (
     contact_model,
     contact_settings,
 )
-from dragdeck.study.material import Material
+from dragdeck.study.workpiece import Material
 from dragdeck.sweep.cases import load_cases
 from evidence.verification.experiment import PlacedSphere, Wall, collide_scene, experiment
 

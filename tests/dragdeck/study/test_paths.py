@@ -13,9 +13,9 @@ from dragdeck.decks.templates import environment
 from dragdeck.physics.packing import Bed
 from dragdeck.project import Project
 from dragdeck.scenes.process import process_scene
+from dragdeck.study.drive import rotated
 from dragdeck.study.driven import DrivenMotion
 from dragdeck.study.model import AnyPath, Motion
-from dragdeck.study.rotation import rotated
 from dragdeck.sweep.cases import load_cases
 
 BED = Bed(surface_m=0.038, top_m=0.0446)

@@ -13,8 +13,7 @@ from dragdeck.errors import InputError
 from dragdeck.project import Project, by_run
 from dragdeck.scenes.drop_test import DROP_TEST
 from dragdeck.scenes.filling import FILLING
-from dragdeck.scenes.process import PROCESS, process_scene
-from dragdeck.scenes.registry import SCENES
+from dragdeck.scenes.process import PROCESS, SCENES, process_scene
 from dragdeck.sweep.cases import load_cases, study_file
 
 
@@ -186,6 +185,14 @@ def test_a_scaling_is_part_of_no_run(load: Load) -> None:
 @pytest.mark.parametrize("field", ["media.count", "pairs", "motion.tilt_deg", "reference"])
 def test_an_assumption_may_be_about_a_field_or_a_block(field: str, load: Load) -> None:
     assert load({"assumptions": [{"field": field, "why": "any"}]})
+
+
+@pytest.mark.parametrize("name", [".", "..", "", "a/b"])
+def test_a_name_that_can_be_none_is_not_called_taken(
+    project: Project, case: Case, name: str
+) -> None:
+    with pytest.raises(InputError, match="this name cannot be used for a study"):
+        new_study(project.studies, name, "small")
 
 
 def test_an_assumption_about_another_kind_of_path_is_left_out(made: Made) -> None:

@@ -11,7 +11,7 @@ from paths import ROOT
 from dragdeck.errors import InputError
 from dragdeck.project import Project
 from dragdeck.scenes.filling import FILLING
-from dragdeck.scenes.process import PROCESS
+from dragdeck.scenes.process import PROCESS, SCENES
 from dragdeck.study.model import Fidelity
 from dragdeck.sweep.cases import load_cases
 from dragdeck.sweep.plan import Plan, Points, plan_points
@@ -36,7 +36,7 @@ def make(tmp_path: Path, write_study: WriteStudy, small: dict[str, Any]) -> Call
         file = tmp_path / "plan.yaml"
         file.write_text(yaml.safe_dump({**PLAN, **changes}, sort_keys=False))
         (case,) = load_cases(write_study(small))
-        return plan_points(Plan.read(file), file, case)
+        return plan_points(Plan.read(file), file, case, SCENES)
 
     return points
 

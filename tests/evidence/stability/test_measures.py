@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dragchain.contact_law.hertz import sphere_mass
-from dragdeck.physics.contact_network import ContactConstants
+from dragdeck.physics.contact_mechanics import ContactConstants
 from dragdeck.records.case import CaseOfRun, MediaOfRun
 from evidence.stability.measures import (
     BOWL,

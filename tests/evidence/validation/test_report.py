@@ -184,6 +184,14 @@ def test_effects_are_found_against_what_they_change(runs: RunsByBed) -> None:
     assert (spread.ci95_low < spread.change).all() and (spread.change < spread.ci95_high).all()
 
 
+def test_an_input_may_be_text(runs: RunsByBed, tmp_path: Path) -> None:
+    *others, last = runs.others
+    steel = dataclasses.replace(last, changed={"workpiece.material": "steel"})
+    table = effect_table(setting_effects(RunsByBed(runs.packings, [*others, steel])))
+    table.to_parquet(tmp_path / "effects.parquet")
+    assert {"0.08", "steel"} <= set(table["value"])
+
+
 def test_a_shorter_run_counts_less(runs: RunsByBed) -> None:
     def half_width(arc_m: float) -> float:
         control, *others = runs.others

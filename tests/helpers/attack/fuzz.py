@@ -228,13 +228,13 @@ def _try_mesh(suffix: str, folder: Path, content: bytes) -> None:
 
 
 FUZZES: dict[str, tuple[Callable[[], list[bytes]], Callable[[Path, bytes], None]]] = {
-    "text dumps": (_text_dumps, _try_text_dump),
-    "binary dumps": (_binary_dumps, _try_binary_dump),
-    "print files": (_printed, _try_print_file),
-    "STL of text": (partial(_meshes, "ascii.stl"), partial(_try_mesh, "stl")),
-    "binary STL": (partial(_meshes, "stl"), partial(_try_mesh, "stl")),
-    "OBJ": (partial(_meshes, "obj"), partial(_try_mesh, "obj")),
-    "PLY": (partial(_meshes, "ply"), partial(_try_mesh, "ply")),
+    "dump: text": (_text_dumps, _try_text_dump),
+    "dump: binary": (_binary_dumps, _try_binary_dump),
+    "dump: print file": (_printed, _try_print_file),
+    "mesh: STL of text": (partial(_meshes, "ascii.stl"), partial(_try_mesh, "stl")),
+    "mesh: binary STL": (partial(_meshes, "stl"), partial(_try_mesh, "stl")),
+    "mesh: OBJ": (partial(_meshes, "obj"), partial(_try_mesh, "obj")),
+    "mesh: PLY": (partial(_meshes, "ply"), partial(_try_mesh, "ply")),
 }
 
 

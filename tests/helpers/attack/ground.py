@@ -18,7 +18,7 @@ from paths import DATA, PROJECT, ROOT
 
 from attack.calls import Said, call, command, main_of
 from dragdeck.project import Project
-from dragdeck.scenes.registry import SCENES
+from dragdeck.scenes.process import SCENES
 
 STUDY = "tiny"
 TINY_STUDY = DATA / "tiny_study.yaml"

@@ -5,21 +5,333 @@ and stop when the tolerance is met (docs/evidence/windows.md). Those of a drop t
 beforehand. Nothing here runs LIGGGHTS.
 """
 
+import math
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from itertools import chain
 
-from dragdeck.advice.options import (
-    Option,
-    drop_options,
-    finest_drop,
-    plain_option,
-    process_option,
-    with_option,
-)
-from dragdeck.cases.case import Case
+import numpy as np
+
+from dragdeck.cases.bed import bed_timestep, full_stiffness_number, widest_skin
+from dragdeck.cases.case import Case, of_each_workpiece
 from dragdeck.errors import InputError
+from dragdeck.outlook.timestep import largest_fraction, stable_fraction, stable_step_cautions
+from dragdeck.physics.rounding import rounded
+from dragdeck.physics.similarity import softest_scale
 from dragdeck.records.advised import AdvisedSettings
-from dragdeck.records.tradeoff import TradeoffRecord, measured_tradeoff
-from dragdeck.study.model import RESTITUTION, Tolerance
+from dragdeck.records.tradeoff import DropEntry, TradeoffRecord, measured_tradeoff
+from dragdeck.scenes.filling import FILLING, expected_surface, expected_time, filling_cautions
+from dragdeck.scenes.lead import FIRST_WINDOWS, covered_fraction, window_count, window_fraction
+from dragdeck.scenes.motion import plunge_point
+from dragdeck.scenes.workpiece import (
+    FACET_STEP_S,
+    PARTICLE_STEPS_PER_S,
+    describe,
+    process_cautions,
+    workpiece_facets,
+)
+from dragdeck.study.model import (
+    BUILT_IN_FIDELITIES,
+    LARGEST_TIMESTEP_FRACTION,
+    RESTITUTION,
+    Fidelity,
+    SoftStart,
+    Study,
+    Tolerance,
+    Windows,
+)
+
+_PROCESS_OF_DROP = "standard"
+"""Fidelity of the process in a study whose tolerance is about the drop test."""
+
+_SOFT_STIFFNESS = 1000.0
+"""Stiffness number of the softer runs from which others go on (docs/evidence/windows.md)."""
+
+_SOFTEST_START = 0.3
+"""Modulus scale from which on a softer start saves nothing."""
+
+_STABILITY_NUMBER, _FAST = 0.72, 0.1
+"""Stability number that steps at the physical modulus are forecast to have, and inertial number
+above which they are no larger than those of the plain run: there, impacts decide, and a sliding
+distance was 12 % too small at the larger step (docs/evidence/windows.md)."""
+
+_MOST_OF_DRAG = 0.5
+"""Fraction of the drag that the first windows may take: with more, the whole drag at the physical
+modulus is no dearer."""
+
+_PLAIN_FRACTION = 0.64
+"""Time step over the Rayleigh time of the plain run that costs are compared with."""
+
+
+@dataclass(frozen=True)
+class Work:
+    """What the filling and the process of a case take. Its drop test is the same at all settings.
+
+    Attributes
+    ----------
+    study : Study
+    tradeoff : TradeoffRecord
+    filling_s, process_s, entry_s : float
+        Simulated time, that of the process and of what goes before its drag at the study's own
+        speed, s.
+    facets : int
+        Of all workpieces.
+    """
+
+    study: Study
+    tradeoff: TradeoffRecord
+    filling_s: float
+    process_s: float
+    entry_s: float
+    facets: int
+
+    @classmethod
+    def of(cls, case: Case, tradeoff: TradeoffRecord) -> "Work":
+        """Of a case; its own fidelity does not matter."""
+        study, motion = case.study, case.study.motion
+        way = math.dist(plunge_point(motion), motion.path.start_point)
+        entry_s = (
+            expected_surface(study) / motion.plunge_speed_m_s + way / motion.approach_speed_m_s
+        )
+        process_s = entry_s + motion.path_length_m / motion.axis_speed_m_s + motion.ramp_s / 2
+        facets = sum(workpiece_facets(one) for one in of_each_workpiece(case))
+        return cls(study, tradeoff, expected_time(study), process_s, entry_s, facets)
+
+    def steps(self, fidelity: Fidelity, windows: int = 0) -> float:
+        """Time steps of process and windows, each counted as it costs at its modulus.
+
+        Parameters
+        ----------
+        fidelity : Fidelity
+        windows : int
+            How many are run, if the settings have any.
+        """
+        study = self.study.model_copy(update={"fidelity": fidelity})
+        start, entry = study.at_start(), covered_fraction(study)
+        drag_s = self.process_s - self.entry_s
+        softer = self.entry_s + entry * drag_s
+        steps = self._steps(start, softer) + self._steps(study, self.process_s - softer)
+        if fidelity.windows is not None:
+            stiff = fidelity.model_copy(
+                update={
+                    "youngs_modulus_scale": 1.0,
+                    "timestep_fraction": fidelity.windows.timestep_fraction,
+                }
+            )
+            own = self.study.model_copy(update={"fidelity": stiff})
+            steps += windows * self._steps(own, window_fraction(study) * drag_s)
+        return steps
+
+    def cpu_time(self, fidelity: Fidelity, windows: int = 0) -> float:
+        """CPU time of all runs with some settings, s: only ratios of it count."""
+        start = self.study.model_copy(update={"fidelity": fidelity}).at_start()
+        filling = self.filling_s / bed_timestep(start, "filling_timestep_fraction")
+        count, of_facets = self.study.media.count, self.facets * FACET_STEP_S
+        return filling * count / FILLING.particle_steps_per_s + self.steps(fidelity, windows) * (
+            count / PARTICLE_STEPS_PER_S + of_facets
+        )
+
+    def _steps(self, study: Study, time_s: float) -> float:
+        """Steps of a stretch of the process, each counted as it costs at its modulus."""
+        chosen = study.chosen_fidelity()
+        steps = time_s / bed_timestep(study, "timestep_fraction") / chosen.speed_factor
+        return steps * step_cost(chosen.youngs_modulus_scale, self.tradeoff)
+
+
+def step_cost(scale: float, tradeoff: TradeoffRecord) -> float:
+    """Time of a step of the drag at a modulus scale, over that at the others that were timed.
+
+    Soft particles have more contacts, and their steps cost more. Interpolated over
+    logarithms; 1 where nothing was timed.
+
+    Parameters
+    ----------
+    scale : float
+        Factor on every Young's modulus.
+    tradeoff : TradeoffRecord
+    """
+    timed = sorted(
+        (cost.level, cost.per_step)
+        for cost in tradeoff.costs
+        if cost.parameter == "youngs_modulus_scale" and cost.level and cost.per_step
+    )
+    if not timed:
+        return 1.0
+    levels, logs = zip(*((level, math.log(time)) for level, time in timed), strict=True)
+    return math.exp(np.interp(math.log(scale), np.log(levels), logs))
+
+
+@dataclass(frozen=True)
+class Option:
+    """Settings, as they are for a study.
+
+    Attributes
+    ----------
+    fidelity : Fidelity
+    relative_cost : float
+        Forecast CPU time of all runs that depend on the settings, with the first windows, over
+        that of the plain run.
+    largest_cost : float
+        The same with all windows that there can be.
+    error : float or None
+        Of a drop test: the largest measured one of an impact.
+    drop_timestep_fraction : float or None
+        Step of the drop test over the Rayleigh time, if the option is about it.
+    """
+
+    fidelity: Fidelity
+    relative_cost: float
+    largest_cost: float
+    error: float | None = None
+    drop_timestep_fraction: float | None = None
+
+    def __str__(self) -> str:
+        if self.drop_timestep_fraction is not None:
+            return f"drop at {100 * self.drop_timestep_fraction:.3g} % of the Rayleigh time"
+        chosen, windows = self.fidelity, self.fidelity.windows
+        text = (
+            f"E x {chosen.youngs_modulus_scale:g}, {100 * chosen.timestep_fraction:.3g} % of the "
+            "Rayleigh time"
+        )
+        if chosen.soft_start is not None:
+            text += f", begun with E x {chosen.soft_start.youngs_modulus_scale:g}"
+        if windows is not None:
+            step = f"{100 * windows.timestep_fraction:.3g} %"
+            text += f", {FIRST_WINDOWS} to {windows.most} windows with E x 1 at {step}"
+        return text
+
+
+def with_option(study: Study, option: Option) -> Study:
+    """A study with the settings of an option."""
+    update: dict[str, object] = {"fidelity": option.fidelity}
+    if (fraction := option.drop_timestep_fraction) is not None:
+        update["drop_test"] = study.drop_test.model_copy(update={"timestep_fraction": fraction})
+    return study.model_copy(update=update)
+
+
+def consistent(case: Case) -> Fidelity:
+    """Settings that pass every check of a case: its own, or the nearest to them.
+
+    Modulus and time step change only to the accurate side; skin, filling step and ranks do not
+    change the process. Warnings that remain are about the scene itself.
+    """
+    fidelity, lowest = case.study.chosen_fidelity(), describe(case)["lowest_restitution"]
+    filling = min(fidelity.filling_timestep_fraction, largest_fraction("settle", lowest))
+    remedy: Mapping[str, float] = {
+        "youngs_modulus_scale": max(fidelity.youngs_modulus_scale, softest_scale(case.study)),
+        "filling_timestep_fraction": filling,
+    }
+    while remedy:
+        fidelity = fidelity.model_copy(update=remedy)
+        study = case.study.model_copy(update={"fidelity": fidelity})
+        remedy = next(_remedies(replace(case, study=study)), {})
+    return fidelity
+
+
+def _remedies(case: Case) -> Iterator[Mapping[str, float]]:
+    """What checks that a case's settings do not pass take; the next one may need less after it."""
+    stable = stable_step_cautions(case, surely=True)
+    found = chain(filling_cautions(case), process_cautions(case), stable)
+    yield from (one.settings for one in found if one.settings)
+
+
+def _with(case: Case, **settings: float | str | SoftStart) -> Case:
+    """The case with these settings of a process."""
+    chosen = {"skin_m": widest_skin(case.study), "ranks": "auto", **settings}
+    fidelity = Fidelity.model_validate(chosen)
+    return replace(case, study=case.study.model_copy(update={"fidelity": fidelity}))
+
+
+def soft_settings(case: Case) -> Fidelity:
+    """Those of the soft run from which others go on, with its largest stable step."""
+    scale = min((_SOFT_STIFFNESS / full_stiffness_number(case.study)) ** 1.5, 1.0)
+    scale = max(rounded(scale, up=True), softest_scale(case.study))
+    stable = stable_fraction(_with(case, youngs_modulus_scale=scale))
+    return consistent(_with(case, youngs_modulus_scale=scale, timestep_fraction=_step(stable)))
+
+
+def stiff_settings(case: Case) -> Fidelity:
+    """Those of a run at the physical modulus, begun softer if that saves anything."""
+    stable = _step(stable_fraction(_with(case), math.log(_STABILITY_NUMBER)))
+    if describe(case)["inertial_number"] > _FAST:
+        stable = min(stable, _PLAIN_FRACTION)
+    chosen = consistent(_with(case, timestep_fraction=stable))
+    soft = soft_settings(case)
+    if soft.youngs_modulus_scale > _SOFTEST_START:
+        return chosen
+    start = SoftStart(
+        youngs_modulus_scale=soft.youngs_modulus_scale, timestep_fraction=soft.timestep_fraction
+    )
+    return chosen.model_copy(update={"soft_start": start})
+
+
+def _step(stable: float) -> float:
+    """A time step over the Rayleigh time that is stable and may be set."""
+    return min(rounded(stable, up=False), LARGEST_TIMESTEP_FRACTION)
+
+
+def process_option(case: Case, asked: Tolerance, tradeoff: TradeoffRecord) -> Option:
+    """The settings with which a tolerance is met in a case's own scene.
+
+    A soft run over the whole path, and windows at the physical modulus until the tolerance is met.
+    Where a few of them would take most of the path, or the material is so soft that nothing is
+    saved, a run at the physical modulus.
+    """
+    stiff, soft = stiff_settings(case), soft_settings(case)
+    work = Work.of(case, tradeoff)
+    plain = work.cpu_time(plain_option(case).fidelity)
+    if stiff.soft_start is not None:
+        windows = Windows(
+            tolerance=asked.tolerance,
+            quantities=list(asked.quantities),
+            timestep_fraction=stiff.timestep_fraction,
+        )
+        windowed = soft.model_copy(update={"windows": windows})
+        study = case.study.model_copy(update={"fidelity": windowed})
+        if FIRST_WINDOWS * window_fraction(study) <= _MOST_OF_DRAG:
+            most = window_count(study)
+            costs = (work.cpu_time(windowed, min(n, most)) for n in (FIRST_WINDOWS, most))
+            return Option(windowed, *(cost / plain for cost in costs))
+    cost = work.cpu_time(stiff) / plain
+    return Option(stiff, cost, cost)
+
+
+def plain_option(case: Case) -> Option:
+    """The plain run at the physical modulus that costs are compared with."""
+    return Option(consistent(_with(case, timestep_fraction=_PLAIN_FRACTION)), 1.0, 1.0)
+
+
+def drop_options(case: Case, tradeoff: TradeoffRecord) -> Iterator[Option]:
+    """Every measured step of the drop test that is within the stability limit."""
+    process, limit = _beside_drop(case)
+    for drop in tradeoff.drop_test:
+        if drop.timestep_fraction <= limit * (1 + 1e-9):
+            yield _drop_option(process, drop, drop.timestep_fraction)
+
+
+def finest_drop(case: Case, tradeoff: TradeoffRecord) -> Option:
+    """The drop test with the smallest measured step, or a smaller one where damping is strong."""
+    process, limit = _beside_drop(case)
+    finest = min(tradeoff.drop_test, key=lambda drop: drop.timestep_fraction)
+    return _drop_option(process, finest, min(finest.timestep_fraction, limit))
+
+
+def _beside_drop(case: Case) -> tuple[Fidelity, float]:
+    """If the drop test is asked about: settings of the process, and largest step of the drop."""
+    named = {**BUILT_IN_FIDELITIES, **case.study.fidelities}[_PROCESS_OF_DROP]
+    limit = largest_fraction("impact", describe(case)["lowest_restitution"])
+    study = case.study.model_copy(update={"fidelity": named})
+    return consistent(replace(case, study=study)), limit
+
+
+def _drop_option(process: Fidelity, drop: DropEntry, fraction: float) -> Option:
+    """A step of the drop test, whose error has no scatter."""
+    cost = drop.relative_cost
+    return Option(process, cost, cost, abs(drop.restitution_error), fraction)
+
+
+SCALE = 1e-3
+"""On the modulus of the short run; more where the engine refuses so soft a particle."""
 
 
 @dataclass(frozen=True)

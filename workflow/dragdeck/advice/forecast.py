@@ -8,13 +8,11 @@ from pathlib import Path
 from rich.table import Table
 
 from dragdeck import __version__
-from dragdeck.advice.advise import Advice, shown_share
-from dragdeck.advice.options import SCALE, Option, Speed, step_cost, with_option
+from dragdeck.advice.advise import SCALE, Advice, Option, shown_share, step_cost, with_option
 from dragdeck.cases.case import Case
-from dragdeck.documents import Document, Part
 from dragdeck.engine.reports import shown_time
 from dragdeck.outlook.explain import Cost, expected_cost, measured_speeds
-from dragdeck.records.advised import AdvisedSettings
+from dragdeck.records.advice import AdviceFile, AdvisedCase, OptionEntry, SettingsOfOption, Speed
 from dragdeck.records.tradeoff import TradeoffRecord
 from dragdeck.scenes.drop_test import DROP_TEST
 from dragdeck.scenes.filling import FILLING
@@ -22,7 +20,7 @@ from dragdeck.scenes.lead import FIRST_WINDOWS, with_leads
 from dragdeck.scenes.process import PROCESS, process_scene
 from dragdeck.scenes.scene import SceneType, StudyScene
 from dragdeck.study.base import Json
-from dragdeck.study.model import Fidelity, Tolerance
+from dragdeck.study.model import Tolerance
 
 _DEFAULT_TOLERANCE = Tolerance(tolerance=0.1)
 """What is advised for where a study asks for nothing."""
@@ -67,7 +65,7 @@ class Forecast:
     wall_times_s: Mapping[str, float]
     source: str
 
-    def for_file(self) -> "OptionEntry":
+    def for_file(self) -> OptionEntry:
         """An entry of ``options`` in ``advice.json``."""
         chosen = self.case.study.chosen_fidelity()
         return OptionEntry(
@@ -85,92 +83,6 @@ class Forecast:
             },
             source=self.source,
         )
-
-
-class SettingsOfOption(Fidelity):
-    """The settings of an option, with the MPI ranks of its runs.
-
-    Attributes
-    ----------
-    ranks : int
-        MPI ranks.
-    """
-
-    ranks: int
-
-
-class OptionEntry(Part):
-    """An option of ``advice.json``: settings and their expected cost.
-
-    Attributes
-    ----------
-    role : str
-        ``advised`` or ``reference``.
-    settings : SettingsOfOption
-        Settings of filling and process.
-    drop_timestep_fraction : float or None
-        Time step of the drop test as a fraction of the Rayleigh time.
-    error : float or None
-        Largest measured error of a drop test.
-    relative_cost : float
-        CPU time / CPU time of a plain run at the physical modulus.
-    inputs : mapping
-        Inputs of the process run, as in its ``case.json``.
-    steps, wall_time_s, steps_per_s : mapping
-        Expected steps, wall-clock time (s) and speed, by scene.
-    source : str
-        Where the speed comes from.
-    """
-
-    role: str
-    settings: SettingsOfOption
-    drop_timestep_fraction: float | None
-    error: float | None
-    relative_cost: float
-    inputs: Json
-    steps: Mapping[str, int]
-    wall_time_s: Mapping[str, float]
-    steps_per_s: Mapping[str, float]
-    source: str
-
-
-class AdvisedCase(Part):
-    """A case of ``advice.json``: its process run and its options.
-
-    Attributes
-    ----------
-    case, run : str
-        Name of the case, and its run id.
-    asked : AdvisedSettings
-        The tolerance, and what it costs.
-    options : sequence of OptionEntry
-        The advised settings first.
-    """
-
-    case: str
-    run: str
-    asked: AdvisedSettings
-    options: Sequence[OptionEntry]
-
-
-class AdviceFile(Document):
-    """``advice.json``: settings for a tolerance, with their expected cost.
-
-    Attributes
-    ----------
-    date : str
-        Date on which it was written.
-    speed : Speed or None
-        Measured speed of LIGGGHTS on this machine.
-    cases : sequence of AdvisedCase
-        One entry per process run.
-    """
-
-    study: str
-    date: str
-    versions: Mapping[str, str | None]
-    speed: Speed | None
-    cases: Sequence[AdvisedCase]
 
 
 def question(case: Case, tolerance: float | None, quantity: str | None) -> Tolerance:

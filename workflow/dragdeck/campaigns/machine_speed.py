@@ -11,7 +11,7 @@ from pathlib import Path
 
 import jinja2
 
-from dragdeck.advice.options import SCALE, Speed, consistent
+from dragdeck.advice.advise import SCALE, consistent
 from dragdeck.cases.bed import bed_timestep
 from dragdeck.cases.case import Case
 from dragdeck.engine.batch import Batch
@@ -19,9 +19,10 @@ from dragdeck.engine.log import loops
 from dragdeck.engine.reports import Report
 from dragdeck.errors import EngineError, RejectedRunError
 from dragdeck.physics.packing import Bed
+from dragdeck.records.advice import Speed
 from dragdeck.records.run import RunRecord
 from dragdeck.scenes.filling import FILLING, expected_surface
-from dragdeck.scenes.legs import plunge_point
+from dragdeck.scenes.motion import plunge_point
 from dragdeck.scenes.process import PROCESS
 from dragdeck.scenes.scene import SceneType
 from dragdeck.study.model import Fidelity, Motion, Outputs, Study

@@ -12,14 +12,12 @@ from typing import Literal
 
 from dragdeck.cases.bed import bed_rayleigh_time, particle_material
 from dragdeck.cases.case import Case
-from dragdeck.decks.templates import environment
 from dragdeck.documents import Document, Part
 from dragdeck.engine.batch import Batch
-from dragdeck.engine.reports import Report, say
+from dragdeck.engine.reports import Report
 from dragdeck.errors import InputError
 from dragdeck.physics import contact_mechanics as mechanics
 from dragdeck.physics.rounding import timestep
-from dragdeck.project import find_project, study_templates
 from dragdeck.scenes.drop_test import DropFidelity, drop_scene
 from dragdeck.study.model import Calibration, Study
 
@@ -289,34 +287,3 @@ def _listed(case: Case, rows: Sequence[DropOfList]) -> DropsFile:
         contact_time_s=mechanics.hertz_contact_time(mass, radius, modulus, speed),
         drops=rows,
     )
-
-
-def drops_command(
-    study: str,
-    fidelity: str | None,
-    out: Path,
-    set: str,
-    fit: Path | None,
-) -> None:
-    """Run one set of drop tests.
-
-    Raises
-    ------
-    InputError
-        A confirmation without a fit.
-    """
-    project = find_project(Path.cwd())
-    case = project.cases(study, fidelity)[0]
-    if set == "sweep":
-        drops = list(sweep(case.study))
-    elif fit is not None:
-        fitted = FitFile.read(fit)
-        drops = list(confirmation(case.study, fitted.fit.restitution, fitted.fit_full.restitution))
-    else:
-        raise InputError(
-            "the result of the fit is missing",
-            field="--fit",
-            remedy="give the path of its result.json",
-        )
-    batch = Batch(out, environment(project.templates, study_templates(case)))
-    run_drops(case, drops, batch, say)

@@ -16,8 +16,8 @@ from dragdeck.physics.contact_mechanics import (
 )
 from dragdeck.physics.packing import Array, radii
 from dragdeck.physics.rounding import round_to, rounded, timestep
-from dragdeck.study.material import Material
 from dragdeck.study.model import Media, Study
+from dragdeck.study.workpiece import Material
 
 JUST_BEYOND = 1 + 1e-6
 """A limit counts as passed from this multiple of it on: a rounded remedy may meet it exactly."""

@@ -11,7 +11,7 @@ from dragdeck.decks.outputs import OutputOfRun
 from dragdeck.engine import log
 from dragdeck.engine.checkpoints import is_whole
 from dragdeck.engine.completeness import coverage, part_files, some_frames
-from dragdeck.physics.contact_network import Floats, stability_number
+from dragdeck.physics.contact_mechanics import Floats, stability_number
 from dragdeck.records.case import CaseOfRun
 from dragdeck.records.run import (
     AcceptanceCheck,

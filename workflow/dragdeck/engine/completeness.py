@@ -11,7 +11,7 @@ import numpy as np
 from dragdeck.decks.outputs import OutputOfRun
 from dragdeck.dumps.content import Cursor
 from dragdeck.dumps.grammar import WholeFrames, frame_cells, whole_frames
-from dragdeck.physics.contact_network import Floats
+from dragdeck.physics.contact_mechanics import Floats
 from dragdeck.records.run import RunPart
 
 

@@ -4,7 +4,6 @@ import math
 
 from dragdeck.cases.case import Case, of_each_workpiece
 from dragdeck.cases.ranks import cores_here
-from dragdeck.scenes.dimensionless import describe
 from dragdeck.scenes.filling import (
     MOST_OVERLAP,
     expected_bed,
@@ -12,8 +11,7 @@ from dragdeck.scenes.filling import (
     floor_overlap,
     rank_split,
 )
-from dragdeck.scenes.fit import clearances, closest
-from dragdeck.scenes.workpiece import fastest_surface
+from dragdeck.scenes.workpiece import clearances, closest, describe, fastest_surface
 from dragdeck.study.contact_law import compared_labels
 
 _RATIOS = {

@@ -207,6 +207,9 @@ def timestep_notes(case: Case, kind: SceneType, scene: StudyScene) -> list[tuple
     return [*found, ("safe step", text)]
 
 
+# --- stability of contacts -----------------------------------------------------------------------
+
+
 _DOUBT = 2.0
 """Standard deviations about the law within which a run may pass or not."""
 

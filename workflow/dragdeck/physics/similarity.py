@@ -1,6 +1,6 @@
 """The softest particles that the engine takes."""
 
-from dragdeck.physics.engine_limits import ENGINE_SOFTEST_PA
+from dragdeck.physics.contact_mechanics import ENGINE_SOFTEST_PA
 from dragdeck.physics.rounding import rounded
 from dragdeck.study.model import Study
 

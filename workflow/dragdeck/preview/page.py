@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from trimesh import Trimesh
 
 
+# --- picture -------------------------------------------------------------------------------------
+
+
 _DASHES = {"plunge": (0, (1, 1.2)), "approach": (0, (4, 1.5)), "drag": "solid"}
 
 _WORDS = {"bed": "expected bed surface", "swept": "swept in the drag", "workpiece": "workpiece"}
@@ -168,6 +171,9 @@ def _darker(name: str) -> Floats:
     from matplotlib.colors import to_rgb
 
     return 0.6 * np.array(to_rgb(COLOURS[name]))
+
+
+# --- page ----------------------------------------------------------------------------------------
 
 
 _FRAMES_PER_LEG = 120

@@ -8,11 +8,11 @@ from pydantic import JsonValue, PositiveFloat, PositiveInt
 
 from dragdeck.documents import Part, omitted
 from dragdeck.errors import DocumentError, choices
-from dragdeck.physics.contact_network import ContactConstants
+from dragdeck.physics.contact_mechanics import ContactConstants
 from dragdeck.physics.run_limits import RunLimits
 from dragdeck.records.advised import AdvisedSettings
 from dragdeck.records.run import CaseFile, CountOfRun, RanksOfRun, SettlingCriterion
-from dragdeck.study.driven import PathEntry, SuperposedEntry
+from dragdeck.study.drive import PathEntry, SuperposedEntry
 from dragdeck.study.reference import Reference
 
 

@@ -10,7 +10,7 @@ from typing import Annotated
 from pydantic import BeforeValidator
 
 from dragdeck.documents import Document, Part
-from dragdeck.physics.damping import damping_ratio
+from dragdeck.physics.contact_mechanics import damping_ratio
 
 _DATA = Path(str(resources.files("dragdeck"))) / "data"
 """The records that were measured with this version."""
@@ -91,7 +91,7 @@ class SafeSteps(Part):
     limited_by : str
         The condition with the smallest safe step.
     ordinary : float or None
-        Safe without the strongly damped conditions, those below the ordinary restitution.
+        Safe without the strongly damped conditions, those with a restitution below 0.5.
     """
 
     conditions: int
@@ -121,7 +121,7 @@ class RestitutionErrors(Part):
         Of the largest restitution error among a run's impacts.
     worst, ordinary_worst : (B,) tuple of float
         Largest of the bin and of all with more steps; ordinary: where the restitution is at least
-        the ordinary restitution.
+        0.5.
     peak_force_worst : (B,) tuple of float
         The same of the relative error of the peak force.
     runs : (B,) tuple of int

@@ -13,8 +13,7 @@ from dragdeck.cases.bed import bed_timestep
 from dragdeck.cases.case import Case, Stretch, of_each_workpiece
 from dragdeck.errors import InputError
 from dragdeck.physics.rounding import round_to
-from dragdeck.scenes.legs import Stop
-from dragdeck.scenes.motion import driven
+from dragdeck.scenes.motion import Stop, driven
 from dragdeck.scenes.periods import output_periods
 from dragdeck.study.drive import Drive
 from dragdeck.study.model import SoftStart, Study

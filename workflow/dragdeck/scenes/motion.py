@@ -8,22 +8,147 @@ and preview are made from it.
 """
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from dragdeck.cases.bed import bed_timestep
+from dragdeck.cases.case import Case
+from dragdeck.decks.deck import Deck
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import round_to
-from dragdeck.scenes.legs import Leg, added_speed, plunge_point
 from dragdeck.scenes.periods import output_periods
-from dragdeck.study.drive import Drive, EngineMotion
+from dragdeck.study.drive import Drive, EngineMotion, Floats, Rotation, rotation_vector
 from dragdeck.study.driven import DrivenMotion
 from dragdeck.study.model import Motion, Study
-from dragdeck.study.paths.path import Vector
-from dragdeck.study.rotation import Floats, Rotation
+from dragdeck.study.paths.path import Point, Vector
 from dragdeck.study.workpiece import MeshShape
+
+
+@dataclass(frozen=True)
+class Leg:
+    """A stretch of the motion in whole steps; it ends where it should after them.
+
+    Attributes
+    ----------
+    name : str
+        ``plunge``, ``approach`` or ``drag``.
+    start_step, end_step : int
+    duration_s : float
+    velocity_m_s : tuple of 3 floats
+        At its beginning.
+    motion : EngineMotion
+        How the engine makes it.
+    """
+
+    name: str
+    start_step: int
+    end_step: int
+    duration_s: float
+    velocity_m_s: Vector
+    motion: EngineMotion
+
+    @property
+    def steps(self) -> int:
+        """How many it takes."""
+        return self.end_step - self.start_step
+
+    @property
+    def speed_m_s(self) -> float:
+        """Speed of the workpiece's axis at its beginning, m/s."""
+        return math.hypot(*self.velocity_m_s)
+
+    def straight_on(self, begun: Floats, steps: Floats) -> Floats:
+        """Places, (N, 3), after (N,) steps from where it begins, at that velocity."""
+        time = steps * self.duration_s / self.steps
+        return np.asarray(begun + time[:, None] * np.array(self.velocity_m_s))
+
+
+@dataclass(frozen=True)
+class Stop:
+    """A step of the drag up to which the engine runs, and what is done before and after.
+
+    Attributes
+    ----------
+    step : int
+    youngs_moduli_pa : sequence of float
+        Of each type from here on; empty if they stay.
+    first : bool
+        Whether the run of a lead begins here.
+    writes : bool
+        Whether the outputs of the drag begin here.
+    mark : str
+        File into which the state is written then; empty for none.
+    """
+
+    step: int
+    youngs_moduli_pa: Sequence[float] = ()
+    first: bool = False
+    writes: bool = False
+    mark: str = ""
+
+
+def plunge_point(motion: Motion) -> Point:
+    """Where the workpiece goes in, m."""
+    return motion.path.plunge_point if motion.plunge_at_m is None else motion.plunge_at_m
+
+
+def farthest_reach(motion: Motion) -> float:
+    """Largest distance of the workpiece's axis from the bowl's, m."""
+    aside = sum(one.horizontal_reach_m for one in motion.superposed().values())
+    places = [plunge_point(motion), *motion.path.corners[:, :2].tolist()]
+    return max(math.hypot(x, y) for x, y in places) + aside
+
+
+def surface_speed(motion: Motion, radius_m: float) -> float:
+    """Highest speed of the workpiece's surface in the drag, m/s: of its axis, and what is added.
+
+    The turn of a workpiece that follows a circle is not counted.
+
+    Parameters
+    ----------
+    motion : Motion
+    radius_m : float
+        Of the workpiece.
+    """
+    axis = motion.axis_speed_m_s * motion.path.peak_speed_ratio
+    return axis + added_speed(motion, radius_m, 1.0)
+
+
+def added_speed(motion: Motion, radius_m: float, factor: float) -> float:
+    """What turning and superposed motions add to the speed of the axis at most, m/s.
+
+    Parameters
+    ----------
+    motion : Motion
+    radius_m : float
+        Of the workpiece.
+    factor : float
+        On the study's own speeds.
+    """
+    turning = motion.path.turning_rad_s if motion.leans else 0.0
+    arm = math.hypot(radius_m, deepest(motion))
+    moving = motion.superposed(factor).values()
+    return turning * factor * arm + sum(one.surface_speed_m_s(radius_m) for one in moving)
+
+
+def path_heights(motion: Motion) -> tuple[float, float]:
+    """Lowest and highest height of the path above the immersion depth, m; 0 is within."""
+    heights = [0.0, *motion.path.corners[:, 2].tolist()]
+    return min(heights), max(heights)
+
+
+def vertical_range(motion: Motion) -> tuple[float, float]:
+    """Lowest and highest height of the tip above the immersion depth, m; 0 is within."""
+    reach = sum(one.vertical_reach_m for one in motion.superposed().values())
+    low, high = path_heights(motion)
+    return low - reach, high + reach
+
+
+def deepest(motion: Motion) -> float:
+    """Largest depth of the tip below the surface in the drag, m."""
+    return motion.immersion_depth_m - vertical_range(motion)[0]
 
 
 @dataclass(frozen=True)
@@ -144,4 +269,107 @@ def _in_periods(
         duration_s=round_to(steps * timestep_s, 12),
         velocity_m_s=(x, y, z),
         motion=EngineMotion({"": f"linear {x!r} {y!r} {z!r}"}),
+    )
+
+
+@dataclass(frozen=True)
+class MovedWorkpiece:
+    """A workpiece as the template moves it.
+
+    Attributes
+    ----------
+    ending : str
+        Of the names in the input script that are its own: empty for the first, ``_2`` and so on.
+    mesh : str
+        File of its mesh.
+    start_m : tuple of 3 floats
+        Its reference point as it starts.
+    turn_deg : float
+        About +z, as it starts.
+    own_turn : sequence of float
+        Before that, in its own frame: axis, and angle in degrees; empty for none.
+    legs : sequence of Leg
+        Those that the run moves it along.
+    driven : DrivenMotion
+        The motion in the drag.
+    superposed : mapping
+        What is superposed on the drag, by name.
+    """
+
+    ending: str
+    mesh: str
+    start_m: tuple[float, float, float]
+    turn_deg: float
+    own_turn: Sequence[float]
+    legs: Sequence[Leg]
+    driven: DrivenMotion
+    superposed: Mapping[str, EngineMotion]
+
+    @property
+    def name(self) -> str:
+        """Name of its mesh."""
+        return f"workpiece{self.ending}"
+
+    @property
+    def about_reference(self) -> bool:
+        """Whether a motion turns it about its live reference point, or might."""
+        return bool(self.superposed) or self.legs[-1].motion.about_reference
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProcessDeck(Deck):
+    """What the process template sees."""
+
+    bowl_type: int
+    bowl_radius_m: float
+    bowl_facets: bool
+    bowl_rad_s: float
+    workpiece_type: int
+    workpieces: Sequence[MovedWorkpiece]
+    stops: Sequence[Stop]
+    entry_step: int = 0
+
+    @property
+    def legs(self) -> Sequence[Leg]:
+        """Those of the first workpiece; the others' take as many steps."""
+        return self.workpieces[0].legs
+
+
+def _axis_and_angle(matrix: Floats) -> Sequence[float]:
+    vector = rotation_vector(matrix)
+    angle = float(np.linalg.norm(vector))
+    return [*(vector / angle).tolist(), math.degrees(angle)] if angle else ()
+
+
+def moved_workpiece(case: Case, motion: Course, mesh: str, entry_step: int) -> MovedWorkpiece:
+    """A workpiece of a case on its course.
+
+    Parameters
+    ----------
+    case : Case
+        Of the workpiece alone.
+    motion : Course
+    mesh : str
+        File of its mesh.
+    entry_step : int
+        Step of the drag at which it starts; 0: it starts with the plunge.
+    """
+    ending = f"_{case.number}" if case.number > 1 else ""
+    place, turn, own = motion.start_m, motion.turn_rad, None
+    legs = motion.legs[-1:] if entry_step else motion.legs
+    if entry_step:
+        places, rotation = motion.poses(legs[-1], np.array([entry_step - motion.drag.start]))
+        x, y, z = places[0].tolist()
+        place, turn = (x, y, z), float(rotation.turn_rad[0])
+        own = rotation.own
+    moving = motion.driven.superposed_on_engine()
+    return MovedWorkpiece(
+        ending=ending,
+        mesh=mesh,
+        start_m=place,
+        turn_deg=math.degrees(turn),
+        own_turn=() if own is None else _axis_and_angle(own[0]),
+        legs=[replace(leg, motion=leg.motion.ending(ending)) for leg in legs],
+        driven=motion.driven,
+        superposed={name: one.ending(ending) for name, one in moving.items()},
     )

@@ -13,14 +13,13 @@ from dragdeck.decks.outputs import Output
 from dragdeck.errors import Caution
 from dragdeck.files import file_checksum
 from dragdeck.mesh import bowl, stl_text
+from dragdeck.physics.contact_mechanics import ENGINE_NEIGHBOURS
 from dragdeck.physics.domain_split import warnings as rank_warnings
-from dragdeck.physics.engine_limits import ENGINE_NEIGHBOURS
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import round_to
 from dragdeck.physics.run_limits import RunLimits
 from dragdeck.records.case import ProcessCase, StatisticsOfRun, WorkpieceOfRun
 from dragdeck.records.run import Phase, SteadyCriterion
-from dragdeck.scenes.dimensionless import describe
 from dragdeck.scenes.drop_test import DROP_TEST
 from dragdeck.scenes.filling import (
     FILLING,
@@ -31,20 +30,18 @@ from dragdeck.scenes.filling import (
     partners_in_bed,
     rank_split,
 )
-from dragdeck.scenes.fit import (
-    check_apart,
-    check_fit,
-    check_headroom,
-    fastest_motion,
-    process_cautions,
-)
 from dragdeck.scenes.lead import Covered, covered, led, mark_file, stops
-from dragdeck.scenes.motion import Course, course
-from dragdeck.scenes.moved_workpiece import ProcessDeck, moved_workpiece
+from dragdeck.scenes.motion import Course, ProcessDeck, course, moved_workpiece
 from dragdeck.scenes.periods import Periods, output_periods
 from dragdeck.scenes.scene import SceneType, case_of_study, material_table
 from dragdeck.scenes.workpiece import (
     PARTICLE_STEPS_PER_S,
+    check_apart,
+    check_fit,
+    check_headroom,
+    describe,
+    fastest_motion,
+    process_cautions,
     reference_height,
     workpiece_facets,
     workpiece_length,
@@ -417,3 +414,6 @@ PROCESS = SceneType(
     particle_steps_per_s=PARTICLE_STEPS_PER_S,
     needs_bed=True,
 )
+
+
+SCENES: dict[str, SceneType] = {scene.name: scene for scene in (DROP_TEST, FILLING, PROCESS)}

@@ -11,9 +11,12 @@ from dragdeck.cases.case import Case, digest, slug
 from dragdeck.decks.deck import Materials, Scene, contact_law
 from dragdeck.documents import Document
 from dragdeck.errors import InputError
-from dragdeck.physics.contact_mechanics import effective_modulus, effective_shear
-from dragdeck.physics.contact_network import ContactConstants
-from dragdeck.physics.engine_limits import ENGINE_SOFTEST_PA
+from dragdeck.physics.contact_mechanics import (
+    ENGINE_SOFTEST_PA,
+    ContactConstants,
+    effective_modulus,
+    effective_shear,
+)
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import round_to
 from dragdeck.records.case import AssumptionOfRun, BowlOfRun, CaseOfRun, FidelityOfRun, MediaOfRun

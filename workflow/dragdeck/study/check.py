@@ -1,19 +1,185 @@
 """Whether the content of a study file can be used: errors name field, value, limit and remedy."""
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import product
 from pathlib import Path
 from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from dragdeck.errors import Caution, InputError, near, together
-from dragdeck.study.base import Model
-from dragdeck.study.consistency import contradictions
-from dragdeck.study.model import AnyPath, Study
+from dragdeck.errors import Caution, InputError, choices, near, together
+from dragdeck.study.base import Model, flat
+from dragdeck.study.model import BUILT_IN_FIDELITIES, AnyPath, Scaling, Study
 from dragdeck.study.plausible import implausible
 from dragdeck.study.recorded import Places, with_recording
+from dragdeck.study.workpiece import CylinderShape, Shape
 from dragdeck.study.yaml import located, shown
+
+_NO_SWEEP = ("accepted", "assumptions", "reference", "scaling", "sweep", "title")
+"""Blocks that no run depends on: cases that differ in them would be the same."""
+
+_LEAST_LEVELS = 3
+"""Levels that a power law is fitted to: two would fit any."""
+
+_Found = Iterator[tuple[str, str, str]]
+"""Field, what is wrong with it, and what would be accepted."""
+
+
+def contradictions(study: Study, whole: bool) -> Iterator[InputError]:
+    """Every contradiction within a whole study, or one of its cases; the errors name no file."""
+    values = flat(study.plain())
+    for check in (_names, _pairs, _shape, _motion, _assumptions, *([_sweep] if whole else [])):
+        for field, problem, limit in check(study):
+            yield InputError(problem, field=field, value=values.get(field), limit=limit)
+
+
+def _names(study: Study) -> _Found:
+    for owner in ("media", "bowl", "workpiece"):
+        name = getattr(study, owner).material
+        yield from _known(f"{owner}.material", name, study.materials, "no such material")
+    if isinstance(study.fidelity, str):
+        known = {**BUILT_IN_FIDELITIES, **study.fidelities}
+        yield from _known("fidelity", study.fidelity, known, "unknown fidelity")
+
+
+def _known(field: str, name: str, known: Iterable[str], problem: str) -> _Found:
+    if name not in known:
+        yield field, f"{problem} {name!r}", choices(name, known)
+
+
+def _pairs(study: Study) -> _Found:
+    every = ["-".join(both) for both in product(study.materials, repeat=2)]
+    for key, pair in study.pairs.items():
+        back = "-".join(key.split("-")[::-1])
+        yield from _known(f"pairs.{key}", key, every, "not a pair of two materials:")
+        if key < back and study.pairs.get(back, pair) != pair:
+            yield (
+                f"pairs.{back}",
+                f"differs from {key}, which is the same pair",
+                "one entry per pair",
+            )
+    for other in study.type_names():
+        key, back = f"{study.media.material}-{other}", f"{other}-{study.media.material}"
+        if key in every and not {key, back} & set(study.pairs):
+            yield (
+                "pairs",
+                f"has no entry {key!r}, although these come into contact",
+                "every pair in contact",
+            )
+
+
+def _shape(study: Study) -> _Found:
+    shape, field = study.workpiece.shape, "workpiece.shape"
+    if isinstance(shape, CylinderShape):
+        return
+    size, edge = shape.facet_size_m, shape.edge_facet_size_m
+    if shape.file.lower().endswith((".step", ".stp")):
+        if size is None:
+            problem = f"{shape.file} is meshed by dragdeck, but the facet size is missing"
+            yield f"{field}.facet_size_m", problem, "a target edge length, such as 0.0015"
+        elif edge is not None and edge > size:
+            problem = "the facets at edges are larger than the others"
+            yield f"{field}.edge_facet_size_m", problem, f"at most facet_size_m, {size:g}"
+        return
+    for name, value in (("facet_size_m", size), ("edge_facet_size_m", edge)):
+        if value is not None:
+            problem = f"{shape.file} is a mesh already: its facets are used as they are"
+            yield f"{field}.{name}", problem, "a STEP file (.step, .stp); or remove the field"
+
+
+def _motion(study: Study) -> _Found:
+    """Statistics need a frame of the contact network after all that they leave out."""
+    motion, problem = study.motion, "no path is left for the statistics"
+    length, speed = motion.path_length_m, motion.axis_speed_m_s
+    frame = speed / study.outputs.network_hz
+    if length < frame * (1 - 1e-9):
+        problem = "not one frame of the contact network is written during the drag"
+        limit = f"at least {speed / length:.3g} Hz; or use a longer path"
+        yield "outputs.network_hz", problem, limit
+        return
+    most = (length - frame) * (1 + 1e-9)
+    if motion.transient_m > most:
+        limit = (
+            f"at most {most:.4g} m: the length of the path, {length:.4g} m, minus that between "
+            "two frames of the contact network (outputs.network_hz)"
+        )
+        yield "motion.transient_m", problem, limit
+    own = {"": motion.ramp_s} if motion.ramp_s else {}
+    moving = {f"{name}.": one.ramp_s for name, one in motion.superposed().items()}
+    for name, ramp in {**own, **moving}.items():
+        if motion.passed_m(ramp) > most:
+            longest = most / speed + motion.ramp_s / 2 if name else 2 * most / speed
+            limit = f"at most {longest:.3g} s; or use a longer path"
+            yield f"motion.{name}ramp_s", problem, limit
+    if motion.uncounted_m > most and motion.counted_from_revolution is not None:
+        limit = "a revolution that begins before the drag ends (motion.path.revolutions)"
+        yield "motion.counted_from_revolution", problem, limit
+
+
+_OF_OTHER_KINDS = [
+    f"{block}.{name}"
+    for block, kinds in {
+        "motion.path": get_args(AnyPath),
+        "workpiece.shape": get_args(get_args(Shape)[0]),
+    }.items()
+    for kind in kinds
+    for name in kind.model_fields
+]
+"""Fields of all kinds of path and shape: a study may extend or sweep to another kind."""
+
+
+def _assumptions(study: Study) -> _Found:
+    values = [*flat(study.model_dump(mode="json")), *_OF_OTHER_KINDS]
+    parts = (name.split(".") for name in values)
+    known = {".".join(words[:count]) for words in parts for count in range(1, len(words) + 1)}
+    for number, entry in enumerate(study.assumptions):
+        if entry.field not in known:
+            limit = f"{near(entry.field, known)}the dotted name of a field, such as media.count"
+            yield f"assumptions.{number}.field", f"no such field {entry.field!r}", limit
+
+
+def _sweep(study: Study) -> _Found:
+    for field, values in study.sweep.items():
+        if not all(field.split(".")):
+            yield "sweep", f"{field!r} is not a field", "a dotted name, such as motion.speed_m_s"
+        if not values:
+            yield f"sweep.{field}", "no values", "one value or more"
+        if field.split(".")[0] in _NO_SWEEP:
+            yield f"sweep.{field}", "no run depends on it", "a field that the runs depend on"
+    count, most = math.prod(map(len, study.sweep.values())), study.accepted.cases
+    if count > most:
+        limit = f"{most}; if this is intended, set accepted.cases: {count}"
+        yield "sweep", f"makes {count} cases, more than are accepted", limit
+    if study.scaling is not None:
+        yield from _scaling(study.scaling, study)
+
+
+def _scaling(scaling: Scaling, study: Study) -> _Found:
+    """Why the sweep cannot tell the power law."""
+    field, others = scaling.field, [name for name in study.sweep if name != "seed"]
+    if field not in others:
+        yield "scaling.field", f"{field} is not a field of sweep", choices(field, others)
+        return
+    if len(others) > 1:
+        problem = "scaling requires a sweep over exactly one field, besides seed"
+        yield "sweep", problem, f"{field} and seed"
+    levels = [_level(value) for value in study.sweep[field]]
+    low, high = scaling.fit_range or (0.0, math.inf)
+    if not all(level > 0 for level in levels):
+        yield f"sweep.{field}", "a power law needs numbers above 0", "numbers above 0"
+    elif sum(low <= level <= high for level in levels) < _LEAST_LEVELS:
+        problem = f"too few levels from {low:g} to {high:g} for a power law"
+        yield f"sweep.{field}", problem, f"{_LEAST_LEVELS} levels or more"
+
+
+def _level(value: object) -> float:
+    """A level of a scaling as a number, NaN if it is none."""
+    try:
+        return math.nan if isinstance(value, bool) else float(str(value))
+    except ValueError:
+        return math.nan
 
 
 def validate(data: Mapping[str, Any], file: Path | str, *, whole: bool = False) -> Study:

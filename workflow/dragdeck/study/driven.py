@@ -5,43 +5,20 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, JsonValue
+from pydantic import JsonValue
 
-from dragdeck.study.drive import Drive, EngineMotion, Orientation, SmoothStart
+from dragdeck.study.drive import (
+    Drive,
+    EngineMotion,
+    Floats,
+    PathEntry,
+    Rotation,
+    SmoothStart,
+    StepCounts,
+    SuperposedEntry,
+)
 from dragdeck.study.model import Motion
-from dragdeck.study.rotation import Floats, Rotation, StepCounts
 from dragdeck.study.superposed.motion import SuperposedMotion
-
-
-class PathEntry(BaseModel):
-    """The simulated drag: speed of the workpiece's axis, its initial direction, and its path.
-
-    Attributes
-    ----------
-    kind : str
-        Of the path, which adds fields of its own.
-    axis_speed_m_s : float
-        Mean speed of the workpiece's axis relative to the bowl.
-    start_direction_rad : float
-        Direction of that motion when the drag begins, from x towards y.
-    orientation : str
-        With ``follow_path`` the workpiece turns with its path.
-    """
-
-    model_config = ConfigDict(frozen=True, allow_inf_nan=False, extra="allow")
-
-    kind: str
-    axis_speed_m_s: float = Field(gt=0)
-    start_direction_rad: float
-    orientation: Orientation = "fixed"
-
-
-class SuperposedEntry(BaseModel):
-    """A motion superposed on the path, in whole steps; its kind adds fields of its own."""
-
-    model_config = ConfigDict(frozen=True, allow_inf_nan=False, extra="allow")
-
-    kind: str
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,6 @@ from dragdeck.study.base import (
     Whole,
 )
 from dragdeck.study.contact_law import Contact, Pair
-from dragdeck.study.material import Material
 from dragdeck.study.paths.circle import CirclePath
 from dragdeck.study.paths.figure_eight import FigureEightPath
 from dragdeck.study.paths.line import LinePath
@@ -38,7 +37,7 @@ from dragdeck.study.remarks import Accepted, Assumption
 from dragdeck.study.superposed.motion import SuperposedMotion
 from dragdeck.study.superposed.oscillation import Oscillation
 from dragdeck.study.superposed.spin import Spin, SpinStage
-from dragdeck.study.workpiece import Carousel, Station, Workpiece
+from dragdeck.study.workpiece import Carousel, Material, Station, Workpiece
 
 Ranks = Annotated[
     Annotated[Literal["auto"], Tag("a-word")]

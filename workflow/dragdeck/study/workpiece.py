@@ -108,3 +108,11 @@ class Carousel(Model):
             return self.each
         count = self.count or 1
         return [Station(angle_deg=number * 360 / count) for number in range(count)]
+
+
+class Material(Model):
+    """An elastic material."""
+
+    youngs_modulus_pa: Positive = Field(description="physical Young's modulus, Pa")
+    poissons_ratio: Annotated[Number, Field(gt=-1, lt=0.5)] = Field(description="Poisson's ratio")
+    density_kg_m3: Positive = Field(description="density of the solid material, kg/m3")

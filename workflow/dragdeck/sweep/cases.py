@@ -1,18 +1,103 @@
 """The cases of a study file: one per combination of its sweep."""
 
 import copy
-from collections.abc import Callable, Iterable, Mapping
+import itertools
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, NamedTuple, Self, TypeVar
+
+from pydantic import Field, ValidationError
 
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError, choices, together
-from dragdeck.study.base import NAME, NAME_LIMIT, STUDY_FILE
-from dragdeck.study.check import validate
+from dragdeck.study.base import NAME, NAME_LIMIT, STUDY_FILE, Model
+from dragdeck.study.check import explained, validate
 from dragdeck.study.model import Tolerance
-from dragdeck.study.yaml import read_study
-from dragdeck.sweep.design import combinations
+from dragdeck.study.yaml import read_study, read_yaml
+
+Settings = Mapping[str, Any]
+"""Dotted name of a field to its value."""
+
+
+def combinations(vary: Mapping[str, Sequence[Any]]) -> Iterator[Settings]:
+    """Every combination of the values that fields take."""
+    for values in itertools.product(*vary.values()):
+        yield dict(zip(vary, values, strict=True))
+
+
+class DesignPoint(NamedTuple):
+    """A point of a design: what it sets, and the field that is varied alone there (or none)."""
+
+    axis: str
+    values: Settings
+
+
+class Variation(Model):
+    """Points that belong together: every combination of the values that vary."""
+
+    vary: dict[str, list[Any]] = Field(
+        default_factory=dict,
+        description="dotted field name: list of values; every combination is a design point",
+    )
+    one_by_one: dict[str, list[Any]] = Field(
+        default_factory=dict,
+        description="dotted field name: list of values that are varied one at a time, at every "
+        "combination of `vary`",
+    )
+    others: dict[str, Any] = Field(
+        default_factory=dict,
+        alias="with",
+        description="dotted field name: value at all these points",
+    )
+
+    def points(self) -> Iterator[DesignPoint]:
+        """The points, the last field of `vary` changing before the first."""
+        alone = [
+            (field, {field: value}) for field, values in self.one_by_one.items() for value in values
+        ]
+        for values in combinations(self.vary):
+            for axis, own in alone or [("", {})]:
+                yield DesignPoint(axis, {**self.others, **values, **own})
+
+
+Block = TypeVar("Block", bound=Variation)
+
+
+class Design(Model, Generic[Block]):
+    """Points with what all of them share and what they are compared with."""
+
+    base: dict[str, Any] = Field(
+        description="dotted field name: value at all points that do not set it"
+    )
+    reference: Block = Field(
+        description="reference settings, to which errors are relative; a single point"
+    )
+    points: list[Block] = Field(default_factory=list)
+
+    @classmethod
+    def read(cls, file: Path, name: str | None = None) -> Self:
+        """Read a design, or the one of this name among several in a file.
+
+        Raises
+        ------
+        InputError
+            The file cannot be used; the message names field, value and limit.
+        """
+        data = read_yaml(file)
+        if name is not None and name not in data:
+            problem = "the file has no such design"
+            raise InputError(problem, file=file, value=name, limit=choices(name, data))
+        try:
+            found = cls.model_validate(data if name is None else data[name])
+        except ValidationError as error:
+            raise explained(error, file) from None
+        if len(list(found.reference.points())) != 1:
+            raise InputError(
+                "the reference must be a single point", file=file, field="reference.vary"
+            )
+        return found
+
 
 Resolve = Callable[[Case, Tolerance], Case]
 """Finds the settings of a case for a tolerance: `dragdeck.advice.advise.resolve`."""

@@ -7,7 +7,7 @@ the reference that errors are measured against.
 
 import copy
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -16,13 +16,17 @@ from pydantic import Field
 
 from dragdeck.cases.case import SAID_BY_NAME, Case
 from dragdeck.errors import InputError
-from dragdeck.scenes.drop_test import DROP_TEST
-from dragdeck.scenes.process import PROCESS
 from dragdeck.scenes.scene import SceneType
 from dragdeck.study.base import Positive, Whole
 from dragdeck.study.model import Study
-from dragdeck.sweep.cases import Resolve, beside_each_other, settle_case
-from dragdeck.sweep.design import Design, Settings, Variation
+from dragdeck.sweep.cases import (
+    Design,
+    Resolve,
+    Settings,
+    Variation,
+    beside_each_other,
+    settle_case,
+)
 
 _LEAST_COUNTED = 0.5
 """Smallest fraction of a point's path that the statistics use."""
@@ -87,7 +91,13 @@ class Points:
         return self.drops if scene.single_particle else self.processes
 
 
-def plan_points(plan: Plan, plan_file: Path, base: Case, resolve: Resolve | None = None) -> Points:
+def plan_points(
+    plan: Plan,
+    plan_file: Path,
+    base: Case,
+    scenes: Mapping[str, SceneType],
+    resolve: Resolve | None = None,
+) -> Points:
     """The cases that a plan makes of a study.
 
     Parameters
@@ -97,6 +107,8 @@ def plan_points(plan: Plan, plan_file: Path, base: Case, resolve: Resolve | None
         For error messages.
     base : Case
         A case of the study: its scene, its first seed and its path are kept.
+    scenes : mapping
+        That a case has, by name: cases with the same run in one are the same point.
     resolve : callable, optional
         Finds the settings of points that ask for a tolerance.
 
@@ -112,14 +124,14 @@ def plan_points(plan: Plan, plan_file: Path, base: Case, resolve: Resolve | None
             shown = {**scene, **_unnamed(settings)}
             case = _case(base, {**plan.base, **scene, **settings}, shown, plan_file, resolve)
             _check_counted(case, plan_file)
-            found.setdefault(PROCESS.run_id(case), case)
+            found.setdefault(scenes["process"].run_id(case), case)
     drops: dict[str, Case] = {}
     for settings in [
         {},
         *({field: value} for field, all_ in plan.drop_test.items() for value in all_),
     ]:
         case = _case(base, {**plan.base, **settings}, settings, plan_file, resolve)
-        drops.setdefault(DROP_TEST.run_id(case), case)
+        drops.setdefault(scenes["drop_test"].run_id(case), case)
     return Points(beside_each_other(found.values()), list(drops.values()), plan.cost_rounds)
 
 

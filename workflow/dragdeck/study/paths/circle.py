@@ -8,9 +8,17 @@ import numpy as np
 from pydantic import Field
 
 from dragdeck.study.base import Json, Number, Positive
-from dragdeck.study.drive import Drive, EngineMotion, Orientation
+from dragdeck.study.drive import (
+    Drive,
+    EngineMotion,
+    Floats,
+    Orientation,
+    StepCounts,
+    about_vertical,
+    rotated,
+    wrap_angle,
+)
 from dragdeck.study.paths.path import AroundBowl, Point
-from dragdeck.study.rotation import Floats, StepCounts, about_vertical, rotated, wrap_angle
 
 
 class CirclePath(AroundBowl):

@@ -8,9 +8,8 @@ import numpy as np
 from pydantic import Field
 
 from dragdeck.study.base import Json, Number, Positive
-from dragdeck.study.drive import Drive, EngineMotion, Orientation
+from dragdeck.study.drive import Drive, EngineMotion, Floats, Orientation, StepCounts, wrap_angle
 from dragdeck.study.paths.path import Point, WorkpiecePath, as_rows, turned
-from dragdeck.study.rotation import Floats, StepCounts, wrap_angle
 
 
 class LinePath(WorkpiecePath):

@@ -12,8 +12,18 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 from dragdeck.study.base import Json, Model
-from dragdeck.study.drive import Drive, EngineMotion, Formula, Orientation, formula, rotating
-from dragdeck.study.rotation import Floats, StepCounts, about_vertical, wrap_angle
+from dragdeck.study.drive import (
+    Drive,
+    EngineMotion,
+    Floats,
+    Formula,
+    Orientation,
+    StepCounts,
+    about_vertical,
+    formula,
+    rotating,
+    wrap_angle,
+)
 
 Point = tuple[float, float]
 Vector = tuple[float, float, float]

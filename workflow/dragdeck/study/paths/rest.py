@@ -8,9 +8,8 @@ import numpy as np
 from pydantic import Field, field_validator
 
 from dragdeck.study.base import Json, Number, Positive
-from dragdeck.study.drive import Drive, EngineMotion, Orientation
+from dragdeck.study.drive import Drive, EngineMotion, Floats, Orientation, StepCounts
 from dragdeck.study.paths.path import AroundBowl
-from dragdeck.study.rotation import Floats, StepCounts
 
 
 class RestPath(AroundBowl):

@@ -12,17 +12,24 @@ from pydantic import Field, JsonValue, ValidationError, field_validator, model_v
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from dragdeck.study.base import Json, Line, Number
-from dragdeck.study.drive import Drive, EngineMotion, Orientation, rates_about_axes, rotating_by
-from dragdeck.study.paths.path import Point, Vector, WorkpiecePath, as_rows, turned
-from dragdeck.study.rotation import (
+from dragdeck.study.drive import (
+    Drive,
+    EngineMotion,
     Floats,
+    Orientation,
     StepCounts,
     by_vector,
+    chain,
+    in_steps,
+    integral,
+    rates_about_axes,
     rotated,
+    rotating_by,
     rotation_vector,
+    stage_at,
     wrap_angle,
 )
-from dragdeck.study.stages import chain, in_steps, integral, stage_at
+from dragdeck.study.paths.path import Point, Vector, WorkpiecePath, as_rows, turned
 
 MOST_POINTS = 100
 

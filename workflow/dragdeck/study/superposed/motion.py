@@ -7,8 +7,7 @@ import numpy as np
 from pydantic import Field, JsonValue
 
 from dragdeck.study.base import Model, NonNegative
-from dragdeck.study.drive import Drive, EngineMotion, SmoothStart
-from dragdeck.study.rotation import Floats, Rotation, StepCounts
+from dragdeck.study.drive import Drive, EngineMotion, Floats, Rotation, SmoothStart, StepCounts
 
 
 class SuperposedMotion(Model):

@@ -7,8 +7,7 @@ import numpy as np
 from pydantic import Field, JsonValue
 
 from dragdeck.study.base import Positive
-from dragdeck.study.drive import Drive, EngineMotion
-from dragdeck.study.rotation import Floats, Rotation, StepCounts
+from dragdeck.study.drive import Drive, EngineMotion, Floats, Rotation, StepCounts
 from dragdeck.study.superposed.motion import SuperposedMotion
 
 

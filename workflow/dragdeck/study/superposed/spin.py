@@ -9,9 +9,21 @@ import numpy as np
 from pydantic import Field, JsonValue, model_validator
 
 from dragdeck.study.base import Model, Number, Positive
-from dragdeck.study.drive import Drive, EngineMotion, rotating, rotating_by
-from dragdeck.study.rotation import Floats, Rotation, StepCounts, about_vertical, by_vector
-from dragdeck.study.stages import chain, in_steps, integral, stage_at
+from dragdeck.study.drive import (
+    Drive,
+    EngineMotion,
+    Floats,
+    Rotation,
+    StepCounts,
+    about_vertical,
+    by_vector,
+    chain,
+    in_steps,
+    integral,
+    rotating,
+    rotating_by,
+    stage_at,
+)
 from dragdeck.study.superposed.motion import SuperposedMotion
 
 

@@ -1,0 +1,125 @@
+"""``advice.json``: settings for a tolerance, and what they are expected to cost."""
+
+from collections.abc import Mapping
+
+from dragdeck.documents import Document, Part
+from dragdeck.records.advised import AdvisedSettings
+from dragdeck.study.base import Json
+from dragdeck.study.model import Fidelity
+
+
+class Speed(Part):
+    """Speed of LIGGGHTS measured on this machine.
+
+    Attributes
+    ----------
+    filling_steps_per_s, drag_steps_per_s : float
+    particles, ranks : int
+    engine_version : str
+    """
+
+    filling_steps_per_s: float
+    drag_steps_per_s: float
+    particles: int
+    ranks: int
+    engine_version: str
+
+    def of(self, particles: int) -> "Speed":
+        """The speed with another number of particles: a step takes a time a particle."""
+        ratio = self.particles / particles
+        filling, drag = ratio * self.filling_steps_per_s, ratio * self.drag_steps_per_s
+        return Speed(
+            filling_steps_per_s=filling,
+            drag_steps_per_s=drag,
+            particles=particles,
+            ranks=self.ranks,
+            engine_version=self.engine_version,
+        )
+
+
+class SettingsOfOption(Fidelity):
+    """The settings of an option, with the MPI ranks of its runs.
+
+    Attributes
+    ----------
+    ranks : int
+        MPI ranks.
+    """
+
+    ranks: int
+
+
+class OptionEntry(Part):
+    """An option of ``advice.json``: settings and their expected cost.
+
+    Attributes
+    ----------
+    role : str
+        ``advised`` or ``reference``.
+    settings : SettingsOfOption
+        Settings of filling and process.
+    drop_timestep_fraction : float or None
+        Time step of the drop test as a fraction of the Rayleigh time.
+    error : float or None
+        Largest measured error of a drop test.
+    relative_cost : float
+        CPU time / CPU time of a plain run at the physical modulus.
+    inputs : mapping
+        Inputs of the process run, as in its ``case.json``.
+    steps, wall_time_s, steps_per_s : mapping
+        Expected steps, wall-clock time (s) and speed, by scene.
+    source : str
+        Where the speed comes from.
+    """
+
+    role: str
+    settings: SettingsOfOption
+    drop_timestep_fraction: float | None
+    error: float | None
+    relative_cost: float
+    inputs: Json
+    steps: Mapping[str, int]
+    wall_time_s: Mapping[str, float]
+    steps_per_s: Mapping[str, float]
+    source: str
+
+
+class AdvisedCase(Part):
+    """A case of ``advice.json``: its process run and its options.
+
+    Attributes
+    ----------
+    case, run : str
+        Name of the case, and its run id.
+    asked : AdvisedSettings
+        The tolerance, and what it costs.
+    options : sequence of OptionEntry
+        The advised settings first.
+    """
+
+    case: str
+    run: str
+    asked: AdvisedSettings
+    options: tuple[OptionEntry, ...]
+
+
+class AdviceFile(Document):
+    """``advice.json``: settings for a tolerance, with their expected cost.
+
+    Attributes
+    ----------
+    date : str
+        Date on which it was written.
+    speed : Speed or None
+        Measured speed of LIGGGHTS on this machine.
+    cases : sequence of AdvisedCase
+        One entry per process run.
+    """
+
+    remedy = "make it with: dragdeck advise"
+
+    study: str
+    date: str
+    versions: Mapping[str, str | None]
+    speed: Speed | None
+    cases: tuple[AdvisedCase, ...]
