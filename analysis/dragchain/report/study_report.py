@@ -366,7 +366,7 @@ def _render(
         columns={str(name): table[name].tolist() for name in table},
         shown=_SHOWN,
         reliable_times=RELIABLE_TIMES,
-        asked=[(one, found) for one in cases if (found := answers(one))],
+        asked=[(one, answer) for one in cases for answer in answers(one)],
     )
 
 
