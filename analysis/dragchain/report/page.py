@@ -80,8 +80,10 @@ def in_percent(value: float | None, digits: int = 3) -> str:
     return DASH if value is None else number(100 * value, digits)
 
 
-def with_interval(estimate: Estimate, unit: str = "") -> str:
-    """A value with its 95 % interval, all three to the second digit of the half-width."""
+def with_interval(estimate: Estimate | None, unit: str = "") -> str:
+    """A value with its 95 % interval, all to the second digit of the half-width; else a dash."""
+    if estimate is None:
+        return DASH
     after = f" {unit}" if unit else ""
     if not estimate.known or estimate.ci95_high == estimate.ci95_low:
         return f"{measured(estimate.value)}{after}"

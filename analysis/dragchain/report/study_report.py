@@ -348,7 +348,7 @@ def _render(
 ) -> str:
     """The page: HTML that needs no other file and no network."""
     studies = [section.study for section in sections]
-    first = studies[0].process.case
+    first, runs = studies[0].process.case, _engine_runs(studies)
     return render_page(
         "report/report.html.j2",
         title=", ".join(dict.fromkeys(study.process.case.study for study in studies)),
@@ -358,12 +358,15 @@ def _render(
         cases=cases,
         network_pages=_network_pages(sections),
         missing=missing,
-        runs=_engine_runs(studies),
+        runs=runs,
+        checks=[(run, check) for run in runs for check in run.record.checks],
+        costs=[(one, row) for one in sections for row in one.costs],
+        compared=[(one, row) for one in cases for row in one.values.against],
         overview=_overview(cases) if len(cases) > 1 else None,
         columns={str(name): table[name].tolist() for name in table},
         shown=_SHOWN,
         reliable_times=RELIABLE_TIMES,
-        asked=[(one, found) for one in cases if (found := answers(one))],
+        asked=[(one, answer) for one in cases for answer in answers(one)],
     )
 
 

@@ -197,6 +197,12 @@ class Values:
         return found
 
     @property
+    def contacts(self) -> Estimate | None:
+        """Contacts on the workpiece at a time, None if they are not known."""
+        found = self.of("workpiece_contacts")
+        return found.value if found else None
+
+    @property
     def adjusted(self) -> bool:
         """Whether any value differs from the run's, or is missing."""
         return any(one.value != one.run for one in self.standings)

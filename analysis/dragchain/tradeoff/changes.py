@@ -160,6 +160,11 @@ class Gain:
         return len(self.factors) == 1
 
     @property
+    def over_product(self) -> float:
+        """The speed-up over the product of those of the single changes."""
+        return self.speed_up.value / self.product
+
+    @property
     def levels(self) -> tuple[object, object]:
         """Of its first factor, in the base and in the setting."""
         name = self.factors[0]

@@ -240,13 +240,6 @@ class Measures(PathQuantities, Document):
         return seed
 
     @property
-    def particle_diameter_m(self) -> float:
-        """Mean diameter of a particle, m."""
-        radius = self.inputs["media.radius_mean_m"]
-        assert isinstance(radius, float)
-        return 2.0 * radius
-
-    @property
     def telling_failure(self) -> AcceptanceCheck | None:
         """The acceptance check that says most about why the run failed, None if it did not."""
         by_code = {check.code: check for check in self.failure}

@@ -4,8 +4,8 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from dragchain.figures.style import drawing, png
-from dragchain.report.page import DASH, MINUS, data_uri, number, render_page, write_bundle
+from dragchain.report.campaign import write_report
+from dragchain.report.page import DASH, MINUS, number
 from dragchain.statistics.estimate import CONFIDENCE, Estimate
 from dragchain.tradeoff.changes import (
     RUINED,
@@ -17,7 +17,7 @@ from dragchain.tradeoff.changes import (
     step_costs,
 )
 from dragchain.tradeoff.compare import Error, read_plan_runs
-from dragchain.tradeoff.drops import ComparedDrop, choose_drop, compare_drops
+from dragchain.tradeoff.drops import choose_drop, compare_drops
 from dragchain.tradeoff.figures import draw_tradeoff
 from dragchain.tradeoff.measure_run import LONG_WAVE, SHORT_WAVE
 from dragchain.tradeoff.measures import MAIN
@@ -29,7 +29,7 @@ from dragchain.tradeoff.outcome import (
     errors_by_setting,
     run_table,
 )
-from dragchain.tradeoff.path_length import Reach, along, chance, reaches
+from dragchain.tradeoff.path_length import along, chance, reaches
 from dragchain.tradeoff.record import tradeoff_record
 
 # --- numbers -------------------------------------------------------------------------------------
@@ -46,6 +46,11 @@ def error_percent(value: float, sign: bool = True) -> str:
     text = f"{100.0 * value:{'+' if sign else ''}.{digits}f}"
     text = text if float(text) else "0"
     return text.replace("-", MINUS)
+
+
+def size_percent(value: float) -> str:
+    """As `error_percent`, of a size that has no sign."""
+    return error_percent(value, False)
 
 
 def error_size(error: Error) -> str:
@@ -83,7 +88,7 @@ def span(gain: Estimate) -> str:
 
 FILTERS: Mapping[str, Callable[..., str]] = {
     function.__name__: function
-    for function in (error_percent, error_size, error_interval, times, cheaper, span)
+    for function in (error_percent, size_percent, error_size, error_interval, times, cheaper, span)
 }
 """Filters of the page."""
 
@@ -148,51 +153,40 @@ def write_tradeoff(
     commands = [command] if command else []
     record = tradeoff_record(tradeoff, dropped, priced, plan, commands)
     known = reaches(tradeoff)
-    with drawing():
-        figures = {
-            name: png(drawn) for name, drawn in draw_tradeoff(tradeoff, known, dropped).items()
-        }
-    page = tradeoff_page(tradeoff, known, dropped, figures, record=record, costs=priced)
-    write_bundle(
+    write_report(
         out_dir,
-        tables={"runs": run_table(tradeoff), "errors": errors_by_setting(tradeoff)},
-        figures=figures,
-        documents={"tradeoff": record},
-        pages={"report": page},
-    )
-
-
-def tradeoff_page(
-    tradeoff: Tradeoff,
-    known: Sequence[Reach],
-    drops: Sequence[ComparedDrop],
-    figures: Mapping[str, bytes],
-    **content: object,
-) -> str:
-    """The page: HTML that needs no other file and no network."""
-    comparisons, levels = tradeoff.comparisons, modulus_levels(tradeoff)
-    named = [names for names in _CHOSEN if all(name in comparisons for name in names)]
-    return render_page(
         "tradeoff/tradeoff.html.j2",
-        FILTERS,
+        draw=lambda: draw_tradeoff(tradeoff, known, dropped),
+        tables={"runs": run_table(tradeoff), "errors": errors_by_setting(tradeoff)},
+        documents={"tradeoff": record},
+        filters=FILTERS,
         tradeoff=tradeoff,
-        **content,
-        drops=drops,
-        main=[comparisons[name] for name in MAIN if name in comparisons],
-        choices=[(names, [choose(tradeoff, names, one) for one in TOLERANCES]) for names in named],
-        drop_choices=[choose_drop(drops, one) for one in TOLERANCES],
-        levels=levels,
-        softness={
-            name: [softness(tradeoff, own, level) for level in levels]
-            for name, own in comparisons.items()
-        },
-        effects=modulus_effects(tradeoff),
-        gains=gains(tradeoff),
+        record=record,
+        costs=priced,
+        drops=dropped,
+        drop_choices=[choose_drop(dropped, one) for one in TOLERANCES],
         paths=[(reach, along(tradeoff, reach.quantity)) for reach in known],
-        chance=chance(tradeoff),
-        figures={name: data_uri(picture) for name, picture in figures.items()},
         tolerances=TOLERANCES,
         confidence=CONFIDENCE,
         ruined=RUINED,
         waves=(SHORT_WAVE, LONG_WAVE),
+        **_said(tradeoff),
     )
+
+
+def _said(tradeoff: Tradeoff) -> dict[str, object]:
+    """What the page says of the settings."""
+    comparisons, levels = tradeoff.comparisons, modulus_levels(tradeoff)
+    named = [names for names in _CHOSEN if all(name in comparisons for name in names)]
+    return {
+        "main": [comparisons[name] for name in MAIN if name in comparisons],
+        "choices": [(one, [choose(tradeoff, one, each) for each in TOLERANCES]) for one in named],
+        "levels": levels,
+        "softness": {
+            name: [softness(tradeoff, own, level) for level in levels]
+            for name, own in comparisons.items()
+        },
+        "effects": modulus_effects(tradeoff),
+        "gains": gains(tradeoff),
+        "chance": chance(tradeoff),
+    }

@@ -302,7 +302,7 @@ def test_a_machine_that_cannot_render_is_told_what_to_install(
 @pytest.fixture
 def filling(tmp_path: Path) -> Path:
     settle = [{"name": "settle", "start_step": 0, "end_step": LAST}]
-    case = case_json("filling", phases=settle, settled={"energy_ratio": 1e-5})
+    case = case_json("filling", phases=settle, settled={"energy_ratio": 1e-5, "highest_m": 0.1})
     write_documents(tmp_path, case)
     bed = {
         "schema": 2,
