@@ -11,7 +11,6 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from dragchain.arrays import Floats, Ints
-from dragchain.contact_law.hertz import sphere_mass
 from dragchain.errors import TableError
 from dragchain.run.case import friction_with
 from dragchain.run.kinematics import drag_phase, needed
@@ -25,7 +24,7 @@ from dragchain.tables.write import workpiece_force_rows
 from dragdeck.decks import CASE_FILE
 from dragdeck.decks.outputs import load_outputs
 from dragdeck.dumps.frame import Columns, Frame
-from dragdeck.physics.contact_mechanics import damping_ratio, largest_eigenvalue
+from dragdeck.physics.contact_mechanics import damping_ratio, largest_eigenvalue, sphere_mass
 from dragdeck.records.case import CaseOfRun
 from dragdeck.records.run import RunRecord
 from evidence.stability.points import Point, PointsFile

@@ -14,9 +14,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from dragchain.arrays import Floats, Ints
-from dragchain.contact_law.hertz import Elastic, contact_time, effective_modulus
 from dragchain.run.case import friction_with, input_of, number_of
 from dragchain.run.kinematics import surface_speed
+from dragdeck.physics.contact_mechanics import Elastic, effective_modulus, hertz_contact_time
 from dragdeck.records.case import CaseOfRun
 
 IMPACT, SLIDING, ROLLING, RESTING = TYPES = ("impact", "sliding", "rolling", "resting")
@@ -78,7 +78,7 @@ class Surfaces:
 def surfaces(case: CaseOfRun) -> Surfaces:
     """Return friction and contact time of particle and workpiece from the inputs of ``case.json``.
 
-    The time is that of an elastic impact on a plane; see `contact_time`.
+    The time is that of an elastic impact on a plane; see `hertz_contact_time`.
 
     Raises
     ------
@@ -88,14 +88,14 @@ def surfaces(case: CaseOfRun) -> Surfaces:
     friction = friction_with(case, "workpiece")
     bodies = [input_of(case, f"{body}.material") for body in ("media", "workpiece")]
     names = ("youngs_modulus_pa", "poissons_ratio")
-    materials = [
+    first, second = (
         Elastic(*(number_of(case, f"materials.{material}.{name}") for name in names))
         for material in bodies
-    ]
-    modulus = case.fidelity.youngs_modulus_scale * effective_modulus(*materials)
+    )
+    modulus = case.fidelity.youngs_modulus_scale * effective_modulus(first, second)
     radius = case.media.radius_mean_m
     mass = case.media.density_kg_m3 * 4.0 / 3.0 * np.pi * radius**3
-    time_s = contact_time(mass, radius, modulus, surface_speed(case))
+    time_s = hertz_contact_time(mass, radius, modulus, surface_speed(case))
     return Surfaces(friction, float(time_s))
 
 

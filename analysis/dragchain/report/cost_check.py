@@ -134,5 +134,4 @@ def _answer(name: str, case: ReportedCase, asked: AdvisedSettings) -> Answer:
     if len(known) < len(case.studies):
         return Answer(name, "", None, None, asked.tolerance)
     found = mean_over_packings([one.value for one in known if one.value])
-    width = abs((found.ci95_high - found.ci95_low) / 2.0 / found.value)
-    return Answer(known[0].label, known[0].unit, found, width, asked.tolerance)
+    return Answer(known[0].label, known[0].unit, found, found.relative_half_width, asked.tolerance)

@@ -44,11 +44,11 @@ from dragchain.run.kinematics import drag_start_s, needed, path_passed, process_
 from dragchain.run.reference import reference_drags
 from dragchain.statistics.correlated import estimate_mean
 from dragchain.statistics.estimate import CONFIDENCE, EstimateColumns
-from dragchain.tables.bed import Packing
 from dragchain.tables.by_step import read_table
 from dragchain.tables.impacts import effective_restitution
 from dragdeck.decks.outputs import load_outputs
 from dragdeck.records.case import CaseOfRun
+from dragdeck.records.packing import Packing
 
 
 class DragTrace(NamedTuple):

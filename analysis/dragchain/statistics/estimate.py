@@ -59,6 +59,11 @@ class Estimate:
     def _numbers(self) -> tuple[float, float, float]:
         return self.value, self.ci95_low, self.ci95_high
 
+    @property
+    def relative_half_width(self) -> float:
+        """Half-width of the interval over the magnitude of the value."""
+        return abs((self.ci95_high - self.ci95_low) / 2 / self.value)
+
     def contains(self, value: float) -> bool:
         """Whether a value is within the interval."""
         return self.ci95_low <= value <= self.ci95_high

@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dragchain.arrays import Floats, Ints, places
-from dragchain.contact_law.coulomb import within_friction
 from dragchain.errors import TableError
 from dragchain.tables.columns import CENTRE, FLOOR_FORCES, FORCES, SIDE_FORCES
 from dragchain.tables.workpiece_contacts import WallContacts, tangential_force
 from dragdeck.documents import Document
 from dragdeck.dumps.frame import Frame
+from dragdeck.physics.coulomb import within_friction
 
 KINDS = ("particle-particle", "particle-workpiece", "particle-floor", "particle-side")
 """Kinds of contact; their position is the code in `ContactRows.kind`."""

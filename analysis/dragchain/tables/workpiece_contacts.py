@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dragchain.arrays import Floats, Ints
-from dragchain.contact_law.coulomb import within_friction
 from dragchain.errors import TableError
 from dragchain.tables.columns import CENTRE, FORCES, POINT, SPIN, VELOCITY
 from dragdeck.dumps.frame import Columns, Frame
+from dragdeck.physics.coulomb import within_friction
 
 _NORMAL = ("normal_x", "normal_y", "normal_z")
 

@@ -16,12 +16,12 @@ from dragchain.loading.samples import Sampled, sample
 from dragchain.network.write import write_chains
 from dragchain.run.kinematics import drag_phase, needed
 from dragchain.statistics.estimate import finite
-from dragchain.tables.bed import Packing
 from dragchain.tables.by_step import read_groups, read_table
 from dragchain.tables.write import write_tables
 from dragchain.tradeoff.measures import FILE, Measures, PathQuantities, RunCost
 from dragdeck.decks.outputs import load_outputs
 from dragdeck.records.case import CaseOfRun, load_case
+from dragdeck.records.packing import Packing
 from dragdeck.records.run import RunRecord
 
 MAP_DEPTHS, MAP_AZIMUTHS = 4, 12

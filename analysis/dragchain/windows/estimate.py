@@ -126,11 +126,6 @@ class WindowedQuantity(Part):
     soft: float
     value: Estimate
 
-    @property
-    def half_width(self) -> float:
-        """Half-width of the interval, relative."""
-        return abs((self.value.ci95_high - self.value.ci95_low) / 2 / self.value.value)
-
 
 class Round(Document):
     """The content of ``round-<number>.json``.
@@ -251,9 +246,8 @@ def joined(windows: Sequence[float], stretches: Floats, known: Known) -> Joined:
 def of_one_run(blocks: Floats, value: float, known: Known) -> Estimate:
     """A run's value with its interval, from its blocks, (B,), and the scatter between packings."""
     own = estimate_mean(blocks).estimate if len(blocks) >= MIN_SAMPLES else mean_of(blocks)
-    half = abs((own.ci95_high - own.ci95_low) / 2 / own.value)
     return Estimate.around(
-        value, abs(value) * math.hypot(half, NORMAL_QUANTILE * known.packing_std)
+        value, abs(value) * math.hypot(own.relative_half_width, NORMAL_QUANTILE * known.packing_std)
     )
 
 

@@ -50,11 +50,7 @@ def _alone(run_dir: Path, case: CaseOfRun, record: WindowsRecord) -> Extrapolate
     asked = case.asked
     if asked is None or asked.error is not None:
         return Extrapolated(quantities=quantities)
-    widths = {
-        one.name: (one.value.ci95_high - one.value.ci95_low) / 2 / abs(one.value.value)
-        for one in quantities
-        if one.value
-    }
+    widths = {one.name: one.value.relative_half_width for one in quantities if one.value}
     worst = max(widths.get(name, math.inf) / asked.tolerance for name in asked.quantities)
     packings = math.ceil(worst**2) if math.isfinite(worst) else 1
     return Extrapolated(

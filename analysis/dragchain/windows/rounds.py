@@ -108,7 +108,7 @@ def judged(
         rows.append(row)
         if row.asked and found:
             needs.append(windows_needed(found, len(good), tolerance, most))
-    widths = {one.name: one.half_width for one in rows}
+    widths = {one.name: one.value.relative_half_width for one in rows}
     reached = len(good) >= _FEWEST and all(
         widths.get(name, math.inf) <= tolerance for name in asked
     )

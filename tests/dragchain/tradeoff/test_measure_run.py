@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from dragchain.errors import TableError
-from dragchain.tables.bed import Packing
 from dragchain.tradeoff.measure_run import CountedPath, band_pass, write_measures
 from dragchain.tradeoff.measures import QUANTITIES, Measures
+from dragdeck.records.packing import Packing
 from dragdeck.records.run import AcceptanceCheck
 
 SPACING, COUNT = 0.1, 600

@@ -36,7 +36,7 @@ def test_it_stops_when_the_tolerance_is_reached() -> None:
     found = judge([15.0, 15.5, 14.5], 0.2)
     assert found.reached and found.last and found.wanted == 3
     (contacts,) = found.quantities
-    assert contacts.half_width <= 0.2 and contacts.value.contains(15.0)
+    assert contacts.value.relative_half_width <= 0.2 and contacts.value.contains(15.0)
 
 
 def test_a_round_asks_for_the_windows_that_would_do_but_at_most_twice_as_many() -> None:

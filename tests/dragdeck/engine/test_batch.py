@@ -5,7 +5,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from dragdeck.engine.record import RunRecord
 
 from dragdeck.cases.case import Case
 from dragdeck.decks.deck import AnyScene
@@ -13,6 +12,7 @@ from dragdeck.decks.templates import environment
 from dragdeck.engine.batch import Batch
 from dragdeck.errors import InputError, RejectedRunError
 from dragdeck.project import Project
+from dragdeck.records.run import RunRecord
 from dragdeck.scenes.drop_test import drop_scene
 
 pytestmark = pytest.mark.engine

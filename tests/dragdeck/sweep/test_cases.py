@@ -14,7 +14,7 @@ from dragdeck.project import Project, by_run
 from dragdeck.scenes.drop_test import DROP_TEST
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import PROCESS, SCENES, process_scene
-from dragdeck.sweep.cases import load_cases, study_file
+from dragdeck.sweep.cases import load_cases, new_study, study_file
 
 
 @pytest.fixture

@@ -5,8 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from dragchain.contact_law.hertz import sphere_mass
-from dragdeck.physics.contact_mechanics import ContactConstants
+from dragdeck.physics.contact_mechanics import ContactConstants, sphere_mass
 from dragdeck.records.case import CaseOfRun, MediaOfRun
 from evidence.stability.measures import (
     BOWL,

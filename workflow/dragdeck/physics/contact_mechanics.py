@@ -1,4 +1,4 @@
-"""Numbers that follow from a study: moduli, time steps, contact times.
+"""Mechanics of contacts and beds: moduli, damping, time steps, contact times.
 
 Every function is plain arithmetic on SI values.
 """
@@ -6,11 +6,14 @@ Every function is plain arithmetic on SI values.
 import math
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dragdeck.study.workpiece import Material
+
+Size = TypeVar("Size", float, NDArray[np.float64])
 
 SOLID_FRACTION_ESTIMATE = 0.59
 """Solid fraction of a poured bed about twelve particles wide, an estimate used only
@@ -23,12 +26,22 @@ DENSEST_RANDOM_PACKING = 0.64
 """Random close packing of equal particles (Scott and Kilgour 1969, 0.6366)."""
 
 
-def shear_modulus(material: Material, scale: float = 1.0) -> float:
+@dataclass(frozen=True)
+class Elastic:
+    """Elastic constants of a material: Young's modulus, Pa, and Poisson's ratio."""
+
+    youngs_modulus_pa: float
+    poissons_ratio: float
+
+
+def shear_modulus(material: Material | Elastic, scale: float = 1.0) -> float:
     """Shear modulus G = E / (2 (1 + nu)), Pa, with E scaled by `scale`."""
     return scale * material.youngs_modulus_pa / (2 * (1 + material.poissons_ratio))
 
 
-def effective_modulus(first: Material, second: Material, scale: float = 1.0) -> float:
+def effective_modulus(
+    first: Material | Elastic, second: Material | Elastic, scale: float = 1.0
+) -> float:
     """Effective modulus of a contact, Pa (Johnson 1985, Contact Mechanics, eq. 4.21 ff.)."""
     compliance = sum(
         (1 - material.poissons_ratio**2) / (scale * material.youngs_modulus_pa)
@@ -37,7 +50,9 @@ def effective_modulus(first: Material, second: Material, scale: float = 1.0) -> 
     return 1 / compliance
 
 
-def effective_shear(first: Material, second: Material, scale: float = 1.0) -> float:
+def effective_shear(
+    first: Material | Elastic, second: Material | Elastic, scale: float = 1.0
+) -> float:
     """Effective shear modulus of a contact, Pa: 1 / G* sums (2 - nu) / G (Mindlin 1949)."""
     bodies = (first, second)
     return 1 / sum((2 - body.poissons_ratio) / shear_modulus(body, scale) for body in bodies)
@@ -56,15 +71,19 @@ def rayleigh_time(material: Material, radius_m: float, scale: float = 1.0) -> fl
 
 def particle_mass(material: Material, radius_m: float) -> float:
     """Mass of a particle, kg."""
-    return 4 / 3 * math.pi * radius_m**3 * material.density_kg_m3
+    return sphere_mass(radius_m, material.density_kg_m3)
+
+
+def sphere_mass(radius_m: Size, density_kg_m3: float) -> Size:
+    """Mass of solid spheres, kg."""
+    return 4 / 3 * math.pi * radius_m**3 * density_kg_m3
 
 
 def fall_energy(
     particles: int, density_kg_m3: float, radius_m: float, gravity_m_s2: float
 ) -> float:
     """Energy of particles that fall by their diameter, N m g d, J: the unit of a settling bed."""
-    mass = 4 / 3 * math.pi * radius_m**3 * density_kg_m3
-    return particles * mass * gravity_m_s2 * 2 * radius_m
+    return particles * sphere_mass(radius_m, density_kg_m3) * gravity_m_s2 * 2 * radius_m
 
 
 def hertz_contact_time(

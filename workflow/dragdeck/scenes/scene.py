@@ -9,7 +9,6 @@ from dragdeck import __version__
 from dragdeck.cases.bed import particle_material, skin
 from dragdeck.cases.case import Case, digest, slug
 from dragdeck.decks.deck import Materials, Scene, contact_law
-from dragdeck.documents import Document
 from dragdeck.errors import InputError
 from dragdeck.physics.contact_mechanics import (
     ENGINE_SOFTEST_PA,
@@ -20,6 +19,7 @@ from dragdeck.physics.contact_mechanics import (
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import round_to
 from dragdeck.records.case import AssumptionOfRun, BowlOfRun, CaseOfRun, FidelityOfRun, MediaOfRun
+from dragdeck.records.packing import Packing
 from dragdeck.study.base import Json, flat
 from dragdeck.study.model import Study
 
@@ -35,15 +35,6 @@ Regime = Literal["impact", "settle", "column", "drag"]
 """What the stability map tells apart: each has its own limit of the time step."""
 
 
-class PackingFile(Document):
-    """What is read of a filling's ``packing.json``."""
-
-    remedy = "make it with: dragchain tables FILLING_DIR"
-
-    bed_height_m: float
-    top_m: float
-
-
 def read_bed(file: Path) -> Bed:
     """The settled bed that a ``packing.json`` describes.
 
@@ -52,7 +43,7 @@ def read_bed(file: Path) -> Bed:
     InputError
         The file is missing or another version's.
     """
-    packing = PackingFile.read(file)
+    packing = Packing.read(file)
     return Bed(packing.bed_height_m, packing.top_m)
 
 

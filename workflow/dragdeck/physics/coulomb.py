@@ -1,8 +1,9 @@
 """Coulomb's limit of friction, to which the forces in dumps of contacts are cut."""
 
 import numpy as np
+from numpy.typing import NDArray
 
-from dragchain.arrays import Floats
+Floats = NDArray[np.float64]
 
 
 def within_friction(

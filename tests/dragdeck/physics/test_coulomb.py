@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from dragchain.contact_law.coulomb import within_friction
+from dragdeck.physics.coulomb import within_friction
 
 Z = np.array([[0.0, 0.0, 1.0]])
 

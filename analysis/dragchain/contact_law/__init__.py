@@ -1,1 +1,0 @@
-"""The Hertz-Mindlin contact law: Hertz contacts and the Coulomb limit."""
