@@ -1,12 +1,13 @@
 """The document of a scaling, ``scaling.json``: what the runs say of one field."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 from pydantic import Field
 
 from dragchain.statistics.estimate import CONFIDENCE, Estimate, Verdict
-from dragchain.statistics.power_law import TwoTerms
+from dragchain.statistics.power_law import Shifted, TwoTerms
 from dragdeck.documents import Document, Part
 from dragdeck.records.case import FidelityOfRun
 
@@ -118,14 +119,10 @@ class FittedLaw(Part):
     curve: tuple[BandPoint, ...]
 
 
-class ShiftedLaw(Part):
-    """The expected power of a shifted level; as `dragchain.statistics.power_law.Shifted`."""
+@dataclass(frozen=True)
+class ShiftedLaw(Shifted):
+    """The expected power of a shifted level, and its curve."""
 
-    power: float
-    root_slope: float
-    root_constant: float
-    offset: Estimate | None
-    lack_of_fit: float | None
     curve: tuple[CurvePoint, ...]
 
 

@@ -263,32 +263,14 @@ def fit_power_law(runs: RunMeans) -> PowerLaw:
     design = runs.line()
     scatter = estimate_scatter(runs, design)
     line = solve(design, runs.logarithms, runs.covariance(scatter), runs.degrees(2))
-    tested = compare_with_levels(runs, design, runs.logarithms)
-    if tested is None:
-        return PowerLaw(runs, line, _level_means(runs, scatter, line), scatter, None)
-    return PowerLaw(runs, line, tested.means, scatter, tested.lack_of_fit)
-
-
-@dataclass(frozen=True)
-class AgainstLevels:
-    """A law against a mean of its own for every level.
-
-    Attributes
-    ----------
-    means : Linear
-        The means of the levels.
-    lack_of_fit : float
-        Probability of so much disagreement with the law by chance alone, by an F test.
-    """
-
-    means: Linear
-    lack_of_fit: float
+    means, lack = compare_with_levels(runs, design, runs.logarithms)
+    return PowerLaw(runs, line, means or _level_means(runs, scatter, line), scatter, lack)
 
 
 def compare_with_levels(
     runs: RunMeans, design: Floats, values: Floats, scale: float = 1.0
-) -> AgainstLevels | None:
-    """Test a law of two effects by the means of the levels; None if too few runs repeat a level.
+) -> tuple[Linear, float] | tuple[None, None]:
+    """Test a law of two effects by the means of the levels.
 
     Parameters
     ----------
@@ -299,15 +281,22 @@ def compare_with_levels(
         What it is fitted to.
     scale : float
         Factor of the covariance of the runs' logarithms that is that of the values.
+
+    Returns
+    -------
+    means : Linear or None
+        A mean of its own for every level; None if too few runs repeat a level.
+    lack_of_fit : float or None
+        Probability of so much disagreement with the law by chance alone, by an F test.
     """
     free = runs.degrees(len(runs.levels))
     if free < 1:
-        return None
+        return None, None
     single = runs.each_level()
     covariance = scale * runs.covariance(estimate_scatter(runs, single))
     means = solve(single, values, covariance, free)
     straight = solve(design, values, covariance, runs.degrees(2))
-    return AgainstLevels(means, _lack_of_fit(straight, means, runs))
+    return means, _lack_of_fit(straight, means, runs)
 
 
 def _level_means(runs: RunMeans, scatter: Scatter, line: Linear) -> Linear:
@@ -425,8 +414,7 @@ def _fit_terms(law: PowerLaw, terms: Floats, root: float) -> tuple[Linear, float
     design, relative = terms / size[:, None], runs.values**root / size
     covariance = root**2 * runs.covariance(law.scatter)
     fit = solve(design, relative, covariance, runs.degrees(2))
-    tested = compare_with_levels(runs, design, relative, root**2)
-    return fit, None if tested is None else tested.lack_of_fit
+    return fit, compare_with_levels(runs, design, relative, root**2)[1]
 
 
 def _ratio(fit: Linear) -> Estimate | None:

@@ -23,7 +23,6 @@ from dragchain.tradeoff.measure_run import LONG_WAVE, SHORT_WAVE
 from dragchain.tradeoff.measures import MAIN
 from dragchain.tradeoff.outcome import (
     TOLERANCES,
-    Tradeoff,
     choose,
     compare_settings,
     errors_by_setting,
@@ -152,7 +151,8 @@ def write_tradeoff(
     )
     commands = [command] if command else []
     record = tradeoff_record(tradeoff, dropped, priced, plan, commands)
-    known = reaches(tradeoff)
+    known, comparisons, levels = reaches(tradeoff), tradeoff.comparisons, modulus_levels(tradeoff)
+    named = [names for names in _CHOSEN if all(name in comparisons for name in names)]
     write_report(
         out_dir,
         "tradeoff/tradeoff.html.j2",
@@ -163,6 +163,16 @@ def write_tradeoff(
         tradeoff=tradeoff,
         record=record,
         costs=priced,
+        main=[comparisons[name] for name in MAIN if name in comparisons],
+        choices=[(names, [choose(tradeoff, names, one) for one in TOLERANCES]) for names in named],
+        levels=levels,
+        softness={
+            name: [softness(tradeoff, own, level) for level in levels]
+            for name, own in comparisons.items()
+        },
+        effects=modulus_effects(tradeoff),
+        gains=gains(tradeoff),
+        chance=chance(tradeoff),
         drops=dropped,
         drop_choices=[choose_drop(dropped, one) for one in TOLERANCES],
         paths=[(reach, along(tradeoff, reach.quantity)) for reach in known],
@@ -170,23 +180,4 @@ def write_tradeoff(
         confidence=CONFIDENCE,
         ruined=RUINED,
         waves=(SHORT_WAVE, LONG_WAVE),
-        **_said(tradeoff),
     )
-
-
-def _said(tradeoff: Tradeoff) -> dict[str, object]:
-    """What the page says of the settings."""
-    comparisons, levels = tradeoff.comparisons, modulus_levels(tradeoff)
-    named = [names for names in _CHOSEN if all(name in comparisons for name in names)]
-    return {
-        "main": [comparisons[name] for name in MAIN if name in comparisons],
-        "choices": [(one, [choose(tradeoff, one, each) for each in TOLERANCES]) for one in named],
-        "levels": levels,
-        "softness": {
-            name: [softness(tradeoff, own, level) for level in levels]
-            for name, own in comparisons.items()
-        },
-        "effects": modulus_effects(tradeoff),
-        "gains": gains(tradeoff),
-        "chance": chance(tradeoff),
-    }
