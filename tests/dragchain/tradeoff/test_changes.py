@@ -23,11 +23,6 @@ from dragchain.tradeoff.compare import Setting
 from dragchain.tradeoff.outcome import Tradeoff
 
 
-@pytest.fixture
-def tradeoff(tmp_path: Path) -> Tradeoff:
-    return made(tmp_path, contents())
-
-
 def test_softness_alone_and_mixed_with_a_step(tmp_path: Path) -> None:
     tradeoff = made(tmp_path / "all", contents())
     alone = softness(tradeoff, tradeoff.comparisons["contact_force_mean"], 0.01)

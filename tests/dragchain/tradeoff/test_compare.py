@@ -40,11 +40,6 @@ from dragchain.tradeoff.outcome import (
 from dragdeck.errors import DocumentError
 
 
-@pytest.fixture
-def tradeoff(tmp_path: Path) -> Tradeoff:
-    return made(tmp_path, contents())
-
-
 def test_a_known_effect_is_found_and_resolved(tradeoff: Tradeoff) -> None:
     error = tradeoff.comparisons["drag_mean"].errors[Setting(*SOFT)]
     assert error.value == pytest.approx(0.1, abs=WITHIN) and error.significant

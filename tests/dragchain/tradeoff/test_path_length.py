@@ -13,11 +13,6 @@ from dragchain.tradeoff.outcome import Tradeoff
 from dragchain.tradeoff.path_length import along, reaches
 
 
-@pytest.fixture
-def tradeoff(tmp_path: Path) -> Tradeoff:
-    return made(tmp_path, contents())
-
-
 def test_reach_falls_with_the_root_of_the_path(tradeoff: Tradeoff) -> None:
     (reach,) = (one for one in reaches(tradeoff) if one.quantity.name == "drag_mean")
     assert reach.at(4.0 * reach.arc_m) == pytest.approx(0.5 * reach.halfwidth)

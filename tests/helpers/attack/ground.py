@@ -250,9 +250,6 @@ def _lasting(value: Any) -> Any:
 
 # --- what a resumed run must give -----------------------------------------------------
 
-INPUTS = ("in.liggghts", "case.json", "columns.json", "*.data", "*.stl")
-"""What a run folder holds before its run."""
-
 
 def resumed_at(run_dir: Path) -> list[int]:
     """Steps at which a finished run was resumed."""
