@@ -139,7 +139,7 @@ def two_parts(random: Random, length: int) -> tuple[Estimate, float]:
     return after.over(before), 1.0
 
 
-def mean_over_packings(random: Random, packings: int) -> tuple[Estimate, float]:
+def over_packings(random: Random, packings: int) -> tuple[Estimate, float]:
     """Mean over packings."""
     return mean_of(random.normal(size=packings)), 0.0
 
@@ -263,7 +263,7 @@ KINDS = (
     Simulated("bin of a profile", _EVENTS, (10, 25, 50, 200), profile),
     Simulated("load of a facet", _EVENTS, (10, 25, 50, 200), facet),
     Simulated("ratio of two parts of a run", _TIMES, (10, 20, 40, 80), two_parts),
-    Simulated("mean over packings", _PACKINGS, (2, 4, 8), mean_over_packings),
+    Simulated("mean over packings", _PACKINGS, (2, 4, 8), over_packings),
     Simulated("difference of two cases", _PACKINGS, (2, 3, 4, 8), difference),
     Simulated("effect of a setting", _PACKINGS, (2, 3, 4), effect),
     Simulated(

@@ -164,18 +164,14 @@ class FinishedRun(RunData):
         for column in set(columns or ()) - set(known):
             raise UnknownNameError(f"{file}: no column {column!r}", column, known)
         table = read_table(file, columns)
-        table.attrs.update(self._about(table.columns))
-        return table
-
-    def _about(self, columns: Iterable[str]) -> dict[str, Any]:
-        """What the attributes of a table state."""
         process = self.case.scene == "process"
-        return {
+        table.attrs |= {
             "study": self.case.study,
             "run": self.case.run,
-            "units": {name: self.units[name] for name in columns},
+            "units": {name: self.units[name] for name in table.columns},
             "basis": " ".join(notes(self.case)) if process else str(Basis.MEASURED),
         }
+        return table
 
     @cached_property
     def values(self) -> Values:

@@ -21,11 +21,11 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import NotRequired, TypedDict
 
 import pandas as pd
 import yaml
-from records import ROOT, chosen, pivoted, texts
+from records import ROOT, Join, chosen, pivoted, texts
 from reference import TEXTS, markdown_table
 
 VALUES, TABLES = ROOT / "docs/values.csv", ROOT / "docs/tables.yaml"
@@ -128,13 +128,30 @@ def _value(row: Mapping[str, str]) -> str:
     return shown.pop()
 
 
-def table_recipes() -> dict[str, dict[str, Any]]:
+class Pivot(TypedDict):
+    """Columns that name a row, and those whose values go side by side."""
+
+    index: list[str]
+    by: list[str]
+
+
+class Recipe(TypedDict):
+    """How a table is made: from which rows, and the format of each column by its heading."""
+
+    record: str | list[str]
+    rows: NotRequired[str]
+    join: NotRequired[Join]
+    pivot: NotRequired[Pivot]
+    columns: dict[str, str]
+
+
+def table_recipes() -> dict[str, Recipe]:
     """The recipe of each table."""
     return yaml.safe_load(TABLES.read_text(encoding="utf-8"))
 
 
-def made_table(recipe: Mapping[str, Any]) -> str:
-    """A table in Markdown from its recipe: record, join, rows, pivot, columns."""
+def made_table(recipe: Recipe) -> str:
+    """A table in Markdown from its recipe."""
     found = chosen(recipe["record"], recipe.get("rows", ""), recipe.get("join"))
     if "pivot" in recipe:
         found = pivoted(found, **recipe["pivot"])

@@ -11,17 +11,19 @@ expression over the columns::
 
 import json
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from pathlib import Path
 from string import Formatter
-from typing import Any
+from typing import Any, TypedDict
 
 import pandas as pd
 import paper_study
+from pydantic import JsonValue
 
 from dragchain.tradeoff.measures import QUANTITIES
 from dragdeck.project import Project
+from dragdeck.study.base import Json
 
 ROOT = Path(__file__).resolve().parents[2]
 DATA = ROOT / "docs/data"
@@ -73,7 +75,7 @@ def document(name: str) -> Any:
     return json.loads(RECORDS[name].read_text(encoding="utf-8"))
 
 
-def _rows(part: Any, keys: Sequence[str] = ()) -> Iterator[dict[str, Any]]:
+def _rows(part: Any, keys: Sequence[str] = ()) -> Iterator[dict[str, JsonValue]]:
     """One row per object of a list or mapping (column ``name``), with what stands above it."""
     if isinstance(part, list):
         for one in part:
@@ -91,9 +93,9 @@ def _rows(part: Any, keys: Sequence[str] = ()) -> Iterator[dict[str, Any]]:
         yield _flat(part)
 
 
-def _flat(part: Mapping[str, Any], lists: bool = True) -> dict[str, Any]:
+def _flat(part: Json, lists: bool = True) -> dict[str, JsonValue]:
     """The values of nested objects, their keys joined by ``_``."""
-    flat: dict[str, Any] = {}
+    flat: dict[str, JsonValue] = {}
     for key, one in part.items():
         if isinstance(one, dict):
             flat |= {f"{key}_{inner}": value for inner, value in _flat(one, lists).items()}
@@ -102,13 +104,15 @@ def _flat(part: Mapping[str, Any], lists: bool = True) -> dict[str, Any]:
     return flat
 
 
-def chosen(
-    records: str | Sequence[str], rows: str = "", join: Mapping[str, Any] | None = None
-) -> pd.DataFrame:
-    """Rows of a record, or of several below each other; ValueError if there is none.
+class Join(TypedDict):
+    """Another record, and the column or columns by which its columns are added."""
 
-    `join` names another record, and the column by which its columns are added.
-    """
+    record: str | list[str]
+    by: str | list[str]
+
+
+def chosen(records: str | Sequence[str], rows: str = "", join: Join | None = None) -> pd.DataFrame:
+    """Rows of a record, or of several below each other; ValueError if there is none."""
     several = [records] if isinstance(records, str) else records
     found = pd.concat([record_table(one) for one in several], ignore_index=True)
     if join is not None:

@@ -4,7 +4,7 @@ import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, get_args
+from typing import get_args
 
 from pydantic import TypeAdapter, ValidationError, model_validator
 
@@ -138,7 +138,7 @@ class PointsFile(Document):
     points: Sequence[Point]
 
 
-def _digest(content: Mapping[str, Any]) -> str:
+def _digest(content: Mapping[str, str | float]) -> str:
     text = json.dumps(content, sort_keys=True, allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()[:8]
 

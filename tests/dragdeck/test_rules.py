@@ -13,7 +13,7 @@ from snakemake_interface_common.exceptions import WorkflowError
 from dragdeck.project import Project
 from dragdeck.rules import Workflow, checked_settings, of_whole_run
 
-SCHEMA = yaml.safe_load((ROOT / "workflow/schemas/config.schema.yaml").read_text())
+SCHEMA = yaml.safe_load((ROOT / "workflow/schemas/config.schema.yaml").read_text())["properties"]
 
 
 def work(study: str, **changes: Any) -> Workflow:

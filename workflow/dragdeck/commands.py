@@ -27,7 +27,7 @@ from dragdeck.campaigns.restitution_drops import FitFile, confirmation, run_drop
 from dragdeck.cases.case import Case
 from dragdeck.cases.ranks import check_ranks, cores_here
 from dragdeck.decks.render import (
-    added_forces,
+    deck_added_forces,
     deck_text,
     effective,
     idle,
@@ -153,7 +153,7 @@ class _Findings:
 
 def _friction_unknown(script: str) -> list[str]:
     """A warning that contacts of a run cannot be analysed, if its contact law adds a force."""
-    added = added_forces(script)
+    added = deck_added_forces(script)
     if not added:
         return []
     return [

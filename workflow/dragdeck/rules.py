@@ -34,6 +34,7 @@ from dragdeck.project import (
 )
 from dragdeck.scenes.lead import FIRST_WINDOWS, led, windows_of, with_leads
 from dragdeck.scenes.process import SCENES
+from dragdeck.study.base import Json
 from dragdeck.sweep.plan import Points
 
 RECORD = {place: "outcome.json" if place in OUTCOMES else "run.json" for place in PLACES}
@@ -95,22 +96,21 @@ def _stop(error: DragdeckError) -> NoReturn:
     raise WorkflowError(str(error)) from None
 
 
-def checked_settings(config: Mapping[str, object], schema: Mapping[str, Any]) -> dict[str, str]:
-    """The keys of config/config.yaml and of --config as text.
+def checked_settings(config: Mapping[str, object], known: Mapping[str, Json]) -> dict[str, str]:
+    """The keys of config/config.yaml and of --config as text; `known` has the schema of each.
 
     Raises
     ------
     WorkflowError
         A key is unknown, or a value does not fit.
     """
-    known: Mapping[str, Mapping[str, Any]] = schema["properties"]
     texts = {key: "" if value is None else str(value) for key, value in config.items()}
     for key, text in texts.items():
         rule = known.get(key)
         if rule is None:
             problem, limit = "unknown key", choices(key, known)
         elif not Draft202012Validator(rule).is_valid(text):
-            problem, limit = rule["title"], rule["description"]
+            problem, limit = str(rule["title"]), str(rule["description"])
         else:
             continue
         raise WorkflowError(f"--config {key}={text}: {problem}\n  limit:  {limit}")

@@ -52,7 +52,7 @@ if workflow.is_main_process and workflow.local_exec and workflow.resource_settin
     os.environ[CORES_VARIABLE] = str(given)
 
 SCHEMA = yaml.safe_load(Path(workflow.source_path("../schemas/config.schema.yaml")).read_text())
-config.update(checked_settings(config, SCHEMA))
+config.update(checked_settings(config, SCHEMA["properties"]))
 STUDY, FIDELITY, PLAN, STABILITY_MAP, COLOURS = (
     config.get(key, "") for key in SCHEMA["properties"]
 )

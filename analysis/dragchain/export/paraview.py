@@ -20,7 +20,7 @@ from dragchain.figures.network_picture import segments
 from dragchain.network.chains import major_stress, particle_stress
 from dragchain.network.frame import PARTICLE, NetworkFrame
 from dragchain.network.statistics import contact_counts
-from dragchain.run.workpiece import placed, workpiece_mesh
+from dragchain.run.workpiece import placed, read_workpiece_mesh
 from dragchain.tables.run_folder import Run
 from dragdeck.documents import Document
 from dragdeck.files import write_text, write_vtp
@@ -139,7 +139,7 @@ def _loaded_workpiece(run: Run) -> Any:
 
     The facets of ``facets.parquet`` are in the order of the mesh unless VTK left one out.
     """
-    mesh = workpiece_mesh(run.folder, run.case)
+    mesh = read_workpiece_mesh(run.folder, run.case)
     file = run.table("facets.parquet")
     if file.is_file():
         facets = pd.read_parquet(file, columns=list(_LOADING))

@@ -27,7 +27,7 @@ from dragchain.figures.style import COLOURS, force_map
 from dragchain.network.chains import WidestPath, dominant_path, widest_paths
 from dragchain.network.frame import NetworkFrame, network_frames
 from dragchain.run.kinematics import needed, process_time
-from dragchain.run.workpiece import placed, workpiece_mesh
+from dragchain.run.workpiece import placed, read_workpiece_mesh
 from dragchain.tables.by_step import read_table
 from dragchain.tables.run_folder import workpiece_places
 from dragdeck.records.case import CaseOfRun
@@ -207,7 +207,7 @@ def render_view(
     plotter = new_plotter(*np.ceil(size_mm * pixels_per_mm).astype(int).tolist())
     plotter.enable_depth_peeling(number_of_peels=8)
     _add_bowl(plotter, case, view)
-    workpiece = placed(workpiece_mesh(run_dir, case), scene.workpiece_m, scene.rotation)
+    workpiece = placed(read_workpiece_mesh(run_dir, case), scene.workpiece_m, scene.rotation)
     plotter.add_mesh(workpiece, color=COLOURS["workpiece"], opacity=0.45)
     _add_contacts(plotter, scene.frame, case.media.radius_mean_m, part.contacts)
     image = photograph(plotter, _camera((low + high) / 2, view, case), float(high[1] - low[1]))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from dragchain.arrays import Floats, Ints
 from dragchain.run.case import friction_with, input_of, number_of
-from dragchain.run.kinematics import surface_speed
+from dragchain.run.kinematics import drag_surface_speed
 from dragdeck.physics.contact_mechanics import Elastic, effective_modulus, hertz_contact_time
 from dragdeck.records.case import CaseOfRun
 
@@ -95,7 +95,7 @@ def surfaces(case: CaseOfRun) -> Surfaces:
     modulus = case.fidelity.youngs_modulus_scale * effective_modulus(first, second)
     radius = case.media.radius_mean_m
     mass = case.media.density_kg_m3 * 4.0 / 3.0 * np.pi * radius**3
-    time_s = hertz_contact_time(mass, radius, modulus, surface_speed(case))
+    time_s = hertz_contact_time(mass, radius, modulus, drag_surface_speed(case))
     return Surfaces(friction, float(time_s))
 
 
@@ -220,7 +220,7 @@ def event_types(
     is seen, it passes for rolling.
     """
     longest = max(limits.impact_times * surfaces(case).contact_time_s, interval_s)
-    speed = surface_speed(case)
+    speed = drag_surface_speed(case)
     sliding, rolling = events["sliding_m"] / events["duration_s"], events["rolling_m_s"]
     short = events["complete"] & (events["duration_s"] <= longest * (1 + 1e-9))
     rests = sliding + rolling < limits.rest * speed

@@ -99,7 +99,7 @@ class Impulse(Part):
     vertical: float
 
 
-class Closure(Part):
+class LoadClosure(Part):
     """Agreement of the sums over facets and events with the total force on the workpiece.
 
     Attributes
@@ -146,7 +146,7 @@ class Loading(Totals, Document):
         By type: impact, sliding, rolling, resting.
     profiles : mapping of Profile
         By depth and azimuth.
-    closure : Closure
+    closure : LoadClosure
         Check of the sums.
     """
 
@@ -164,4 +164,4 @@ class Loading(Totals, Document):
     limits: Thresholds
     types: Mapping[str, ContactType]
     profiles: Mapping[str, Profile]
-    closure: Closure
+    closure: LoadClosure

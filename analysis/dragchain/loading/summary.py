@@ -18,9 +18,9 @@ from dragchain.loading.contact_events import (
     surfaces,
 )
 from dragchain.loading.document import (
-    Closure,
     ContactType,
     Impulse,
+    LoadClosure,
     Loading,
     Profile,
     Quantiles,
@@ -195,11 +195,11 @@ def _profile(sampled: Sampled, edges: Floats, halves: tuple[Ints, Ints]) -> Prof
 
 def _closure(
     sampled: Sampled, facets: pd.DataFrame, events: pd.DataFrame, off_facet_m: float
-) -> Closure:
+) -> LoadClosure:
     whole = {name: float(sampled.rows[name].sum()) for name in AMOUNTS}
     placed = facets[list(WORKPIECE)].to_numpy().sum(axis=0)
     missing = sampled.workpiece_impulse_n_s - placed
-    return Closure(
+    return LoadClosure(
         workpiece_impulse_n_s=_impulse(sampled.workpiece_impulse_n_s),
         facets_impulse_n_s=_impulse(placed),
         unplaced_impulse_n_s=_impulse(missing),

@@ -2,7 +2,6 @@
 
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
 
 from dragchain.network_page.scene import ROUNDING, PageScene, page_scene
 from dragchain.report.page import NETWORK_PAGE, file_uri, page_environment
@@ -72,7 +71,7 @@ def _own(name: str) -> str:
     return (files("dragchain.network_page") / name).read_text(encoding="utf-8")
 
 
-def _pictures(run_dir: Path) -> dict[str, Any]:
+def _pictures(run_dir: Path) -> dict[str, str | None]:
     return {name: file_uri(run_dir / "figures" / f"{name}.png") for name in _PICTURES}
 
 

@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.colors import to_hex
 from numpy.typing import NDArray
+from pydantic import JsonValue
 from scipy.spatial.transform import Rotation as Quaternion
 
 from dragchain.arrays import Floats, Ints
@@ -63,7 +64,7 @@ class PackedColumns:
         ``name``, ``kind`` and ``length`` of each, for the page.
     """
 
-    entries: list[dict[str, Any]] = field(default_factory=list)
+    entries: list[dict[str, str | int]] = field(default_factory=list)
     _parts: list[bytes] = field(default_factory=list)
 
     def add(self, name: str, kind: Kind, values: NDArray[Any]) -> None:
@@ -294,7 +295,7 @@ def _colours() -> list[str]:
 # --- frames ----------------------------------------------------------------------------------
 
 
-def _frames(columns: PackedColumns, shown: Shown, case: CaseOfRun) -> dict[str, Any]:
+def _frames(columns: PackedColumns, shown: Shown, case: CaseOfRun) -> dict[str, JsonValue]:
     """Add particles and contacts of all frames; where each frame starts, and the box of places."""
     particles, contacts, touching = shown.particles, shown.contacts, shown.touching()
     centre, point = (
@@ -313,7 +314,7 @@ def _frames(columns: PackedColumns, shown: Shown, case: CaseOfRun) -> dict[str, 
     columns.add("normal", "f24", contacts["normal_force_n"].to_numpy())
     columns.add("tangential", "f24", contacts["tangential_force_n"].to_numpy())
     tables = {"particles": particles, "contacts": contacts, "points": touching}
-    rows = {
+    rows: dict[str, JsonValue] = {
         name: np.bincount(table["frame"], minlength=len(shown.poses)).tolist()
         for name, table in tables.items()
     }
@@ -347,7 +348,7 @@ def _displacement(shown: Shown) -> float:
     return float(np.quantile(np.linalg.norm(moved, axis=1), _TOP)) if len(moved) else 0.0
 
 
-def _dominant_paths(run: Run, steps: Ints) -> list[dict[str, Any] | None]:
+def _dominant_paths(run: Run, steps: Ints) -> list[dict[str, JsonValue] | None]:
     """The dominant path of each frame: bottleneck in N, particles in order, where it ends."""
     names = ["step", "particle_ids", "bottleneck_n", "mean_force_n", "end_kind", "dominant"]
     table = read_table(run.table("chains.parquet"), names)
@@ -355,7 +356,7 @@ def _dominant_paths(run: Run, steps: Ints) -> list[dict[str, Any] | None]:
     return [_path(rows.get(step)) for step in steps.tolist()]
 
 
-def _path(row: Mapping[Any, Any] | None) -> dict[str, Any] | None:
+def _path(row: Mapping[Any, Any] | None) -> dict[str, JsonValue] | None:
     if row is None:
         return None
     return {
@@ -371,7 +372,7 @@ def _path(row: Mapping[Any, Any] | None) -> dict[str, Any] | None:
 
 def profiles(
     columns: PackedColumns, shown: Shown, headings: Floats, surface: float
-) -> dict[str, Any]:
+) -> dict[str, dict[str, JsonValue]]:
     """Add the profiles of the normal forces, frame by frame; limits and means of their bins.
 
     On the workpiece ``azimuth`` (limits in degrees; N), ``depth`` (mm; N/mm) and their ``map`` (N,
@@ -390,7 +391,7 @@ def profiles(
     for sector in parts(azimuth, AZIMUTH_BINS):
         np.add.at(cells, (frame, level, sector), 0.5 * force)
 
-    def profile(name: str, limits: Floats, values: Floats) -> dict[str, Any]:
+    def profile(name: str, limits: Floats, values: Floats) -> dict[str, JsonValue]:
         columns.add(f"{name}_profile", "f24", values)
         mean = values.mean(axis=0)
         return {"limits": limits.tolist(), "mean": mean.tolist(), "top": float(values.max()) or 1.0}
@@ -441,7 +442,7 @@ def _sizes(contacts: pd.DataFrame, frames: int) -> tuple[Floats, Floats]:
 # --- workpiece and force -----------------------------------------------------------------------
 
 
-def _workpiece(columns: PackedColumns, run: Run, shown: Shown) -> dict[str, Any]:
+def _workpiece(columns: PackedColumns, run: Run, shown: Shown) -> dict[str, JsonValue]:
     """Add the workpiece's facets in its own frame and their loads; its poses, frame by frame."""
     case = run.case
     surface = read_surface(run.folder, case)
@@ -455,12 +456,13 @@ def _workpiece(columns: PackedColumns, run: Run, shown: Shown) -> dict[str, Any]
     }
 
 
-def _loads(columns: PackedColumns, run: Run) -> list[dict[str, Any]]:
+def _loads(columns: PackedColumns, run: Run) -> list[JsonValue]:
     """Add the columns of ``facets.parquet`` that are shown, if the table was made."""
     file = run.table("facets.parquet")
     if not file.is_file():
         return []
-    table, loads = read_table(file, list(_LOADS)), []
+    table = read_table(file, list(_LOADS))
+    loads: list[JsonValue] = []
     for name, (label, unit) in _LOADS.items():
         values = table[name].to_numpy(np.float64)
         columns.add(name, "f24", values)
@@ -481,7 +483,7 @@ def _force(run: Run, names: list[str]) -> pd.DataFrame:
     return read_table(run.table("workpiece_force.parquet"), names)
 
 
-def _curve(columns: PackedColumns, run: Run) -> dict[str, Any]:
+def _curve(columns: PackedColumns, run: Run) -> dict[str, float]:
     """Add the force against the motion over the drag; its times, and how it is filtered."""
     table = _force(run, ["step", "time_s", "drag_n", "in_statistics"])
     table = table[table["step"] > drag_phase(run.case).start_step]
@@ -502,7 +504,7 @@ def _curve(columns: PackedColumns, run: Run) -> dict[str, Any]:
     }
 
 
-def _peaks(peaks: pd.DataFrame, times_s: Floats, case: CaseOfRun) -> list[dict[str, Any]]:
+def _peaks(peaks: pd.DataFrame, times_s: Floats, case: CaseOfRun) -> list[dict[str, float]]:
     """The highest peaks, each with its nearest frame."""
     times = process_time(peaks["time_s"].to_numpy(), case).tolist()
     return [

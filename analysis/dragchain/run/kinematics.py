@@ -217,7 +217,7 @@ def path_passed(time_s: Floats, case: CaseOfRun) -> Floats:
     return np.asarray(elapsed * axis_speed(case))
 
 
-def surface_speed(case: CaseOfRun) -> float:
+def drag_surface_speed(case: CaseOfRun) -> float:
     """Highest speed of the workpiece's surface in the drag, m/s: of its axis, and what is added."""
     return axis_speed(case) * (1.0 + case.numbers.get("superposed_speed", 0.0))
 

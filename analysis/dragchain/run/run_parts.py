@@ -17,7 +17,7 @@ from dragdeck.dumps.reader import read_frames, read_prints
 from dragdeck.errors import DumpError, TruncatedDumpError
 
 
-def part_files(run_dir: Path | str, output: OutputOfRun) -> list[Path]:
+def output_files(run_dir: Path | str, output: OutputOfRun) -> list[Path]:
     """Files of an output in the order of their part numbers.
 
     Parameters
@@ -175,7 +175,7 @@ class _Schedule:
 
 
 def _merged(run_dir: Path | str, output: OutputOfRun, read: _Reader) -> Iterator[_Piece]:
-    files = part_files(run_dir, output)
+    files = output_files(run_dir, output)
     limits = _limits([None, *(_first_step(file, read) for file in files[1:])])
     schedule = _Schedule(run_dir, output)
     for file, limit in zip(files, limits, strict=True):

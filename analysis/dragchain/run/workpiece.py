@@ -13,7 +13,7 @@ from dragdeck.records.case import CaseOfRun
 from dragdeck.study.drive import Rotation, rotated
 
 
-def workpiece_mesh(run_dir: Path, case: CaseOfRun) -> Any:
+def read_workpiece_mesh(run_dir: Path, case: CaseOfRun) -> Any:
     """Read the workpiece's mesh, as it lies in its file.
 
     Raises

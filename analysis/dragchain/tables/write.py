@@ -4,7 +4,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Protocol, TypeVar
 
 import numpy as np
 import pyarrow as pa
@@ -229,7 +229,7 @@ def _write_workpiece_contacts(run: Run, file: Path) -> None:
 
 def workpiece_contact_rows(
     steps: Ints, contacts: WallContacts, references: Floats, case: CaseOfRun
-) -> dict[str, Any]:
+) -> Rows:
     """Rows of ``workpiece_contacts.parquet``.
 
     Parameters

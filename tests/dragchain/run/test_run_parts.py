@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from dragchain.run.run_parts import iter_frames, iter_prints, part_files
+from dragchain.run.run_parts import iter_frames, iter_prints, output_files
 from dragdeck.decks.outputs import OutputOfRun
 from dragdeck.dumps.reader import read_frames, read_prints
 from dragdeck.errors import DumpError, TruncatedDumpError
@@ -242,13 +242,13 @@ def test_refuses_a_spoilt_print_file(tmp_path: Path, content, message, row, offs
 def test_parts_are_ordered_by_number(tmp_path: Path) -> None:
     for name in ("force.10.txt", "force.2.txt", "force.1.txt", "force.x.txt", "force.1.txt.bak"):
         (tmp_path / name).touch()
-    names = [file.name for file in part_files(tmp_path, FORCE)]
+    names = [file.name for file in output_files(tmp_path, FORCE)]
     assert names == ["force.1.txt", "force.2.txt", "force.10.txt"]
 
 
 def test_an_output_without_a_file_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(DumpError, match="no file of the output force"):
-        part_files(tmp_path, FORCE)
+        output_files(tmp_path, FORCE)
 
 
 def test_the_later_part_counts(tmp_path: Path, raw) -> None:

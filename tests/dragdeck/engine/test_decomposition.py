@@ -15,7 +15,7 @@ from dragdeck.engine.acceptance import ranks_check
 from dragdeck.engine.log import decomposition
 from dragdeck.errors import InputError
 from dragdeck.outlook.process import bed_notes
-from dragdeck.physics.domain_split import FilledBowl, split, warnings
+from dragdeck.physics.domain_split import FilledBowl, rank_warnings, split
 from dragdeck.physics.packing import pour, radii
 from dragdeck.project import Project
 from dragdeck.records.run import Decomposition, ParticlesPerRank
@@ -87,7 +87,7 @@ def test_room_above_the_bed_speaks_against_a_split_along_the_height() -> None:
 
 def test_a_rank_without_particles_gets_a_warning() -> None:
     roomy = FilledBowl(**{**vars(BOWL), "half_width_m": 0.9})
-    (caution,) = warnings(split(36, roomy))
+    (caution,) = rank_warnings(split(36, roomy))
     assert "ranks would have no particle" in caution.text and "fidelity.ranks" in caution.text
 
 
@@ -95,9 +95,13 @@ def test_an_uneven_split_gets_a_warning() -> None:
     roomy = FilledBowl(**{**vars(BOWL), "half_width_m": 0.38})
     found = split(6, roomy)
     assert found.idle == 0
-    (caution,) = warnings(found)
+    (caution,) = rank_warnings(found)
     assert f"{found.most_over_mean:.2g} times the mean" in caution.text
-    assert warnings(split(4, roomy)) == warnings(split(caution.settings["ranks"], roomy)) == []
+    assert (
+        rank_warnings(split(4, roomy))
+        == rank_warnings(split(caution.settings["ranks"], roomy))
+        == []
+    )
 
 
 def test_the_expected_share_is_that_of_the_poured_particles() -> None:

@@ -14,7 +14,7 @@ _OUTSIDE = re.compile(r"[/~].|.*(\.\.|\})/|.*\.gz$", re.DOTALL)
 
 
 @dataclass(frozen=True)
-class Command:
+class EngineCommand:
     """A command of an input script.
 
     Attributes
@@ -31,17 +31,17 @@ class Command:
     within: str = ""
 
 
-def commands(deck: str) -> Iterator[Command]:
+def commands(deck: str) -> Iterator[EngineCommand]:
     """The commands of an input script, those that another one carries after it."""
     for line in re.sub(r"&[ \t]*\r?\n", "", deck).splitlines():
         if not line.lstrip().startswith("#"):
             yield from _commands(line, "")
 
 
-def _commands(text: str, within: str) -> Iterator[Command]:
+def _commands(text: str, within: str) -> Iterator[EngineCommand]:
     words = [next(filter(None, found), "") for found in _WORD.findall(text)]
     if words:
-        yield Command(text, words, within)
+        yield EngineCommand(text, words, within)
         for inner in _inner(words):
             yield from _commands(inner, within or words[0])
 
@@ -82,11 +82,11 @@ def endless(deck: str) -> Iterator[tuple[str, str]]:
             yield command.text, "run for ever: no `next` and no `if` ends this loop"
 
 
-def _is_label(command: Command) -> bool:
+def _is_label(command: EngineCommand) -> bool:
     return command.words[0] == "label" and len(command.words) > 1
 
 
-def _ends_loop(command: Command) -> bool:
+def _ends_loop(command: EngineCommand) -> bool:
     way_out = command.words[0] in ("jump", "quit") and command.within == "if"
     return way_out or command.words[0] in ("next", "quit")
 

@@ -18,7 +18,7 @@ from dragdeck.decks.engine_commands import (
     leaving_folder,
 )
 from dragdeck.decks.outputs import WORKPIECE_FORCE, ColumnsFile, in_writing_order
-from dragdeck.decks.templates import explained, file_of, replaced, used, without
+from dragdeck.decks.templates import file_of, replaced, template_errors, used, without
 from dragdeck.errors import InputError
 from dragdeck.files import file_checksum, write_text
 from dragdeck.study import contact_law
@@ -57,14 +57,14 @@ def deck_text(scene: AnyScene, templates: jinja2.Environment) -> str:
 
 
 def _used(scene: AnyScene, templates: jinja2.Environment) -> list[str]:
-    with explained(scene.template):
+    with template_errors(scene.template):
         return used(templates, scene.template)
 
 
 def _rendered(scene: AnyScene, templates: jinja2.Environment, names: str = "") -> str:
     """A deck, whose header names these templates."""
     deck = replace(scene.deck, templates=names, outputs=in_writing_order(scene.deck.outputs))
-    with explained(scene.template):
+    with template_errors(scene.template):
         return templates.get_template(scene.template).render(deck=deck)
 
 
@@ -121,7 +121,7 @@ def idle(names: Iterable[str], templates: jinja2.Environment) -> Iterator[InputE
         )
 
 
-def added_forces(text: str) -> list[str]:
+def deck_added_forces(text: str) -> list[str]:
     """What the contact laws of a deck add to the force that limits friction."""
     found = (contact_law.added_forces(law) for law in contact_laws(text))
     return list(dict.fromkeys(force for each in found for force in each))
@@ -132,7 +132,7 @@ def _of_its_law(scene: AnyScene, templates: jinja2.Environment) -> dict[str, tup
     text, original = _rendered(scene, templates), _rendered(scene, without(templates))
     known = law_commands(original)
     changed = tuple(command for command in law_commands(text) if command not in known)
-    return {"added_forces": tuple(added_forces(text)), "changed_law": changed}
+    return {"added_forces": tuple(deck_added_forces(text)), "changed_law": changed}
 
 
 def write_workpiece(

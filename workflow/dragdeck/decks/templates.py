@@ -104,14 +104,14 @@ def environment(project: Path, study: Path | None = None) -> jinja2.Environment:
     )
     for name in _TRUSTING:
         del found.filters[name]
-    found.filters.update(num=number, nums=numbers, comment=comment)
+    found.filters.update(num=exact_number, nums=numbers, comment=comment)
     if folders and study is not None:
-        with explained(study):
+        with template_errors(study):
             _check_own(found, study, project)
     return found
 
 
-def number(value: float) -> str:
+def exact_number(value: float) -> str:
     """A number that reads back exactly."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         raise TypeError(f"{value!r} is not a number")
@@ -120,7 +120,7 @@ def number(value: float) -> str:
 
 def numbers(values: Iterable[float]) -> str:
     """Numbers that read back exactly, with spaces between."""
-    return " ".join(number(value) for value in values)
+    return " ".join(exact_number(value) for value in values)
 
 
 def comment(text: str) -> str:
@@ -141,7 +141,7 @@ def quoted(value: object) -> Markup:
     if isinstance(value, Markup):
         return value  # the text of a template
     if not isinstance(value, str):
-        return Markup(number(value))  # type: ignore[arg-type]
+        return Markup(exact_number(value))  # type: ignore[arg-type]
     bad = {char for char in value if char in _NOT_IN_A_VALUE or not char.isprintable()}
     if bad:
         shown = " ".join(ascii(char) for char in sorted(bad))
@@ -156,7 +156,7 @@ def _inserted(context: Context, value: object) -> Markup:
 
 
 @contextlib.contextmanager
-def explained(template: Path | str) -> Iterator[None]:
+def template_errors(template: Path | str) -> Iterator[None]:
     """Limit what templates take, and turn what they raise into an error with file and line.
 
     Parameters
@@ -315,7 +315,7 @@ def template_files(templates: jinja2.Environment, scene: str) -> list[Path]:
     InputError
         One of them is missing or cannot be parsed.
     """
-    with explained(f"{scene}.in.j2"):
+    with template_errors(f"{scene}.in.j2"):
         return sorted({file_of(templates, name) for name in used(templates, f"{scene}.in.j2")})
 
 

@@ -29,7 +29,7 @@ _NAMED = re.compile(r"CONVERSION_BASED_UNIT\s*\(\s*'([^']*)'")
 _PREFIX = re.compile(r"SI_UNIT\s*\(\s*(\$|\.\w+\.)\s*,\s*\.METRE\.")
 
 
-def mesh_step(path: Path, unit: str, size: float, edge_size: float) -> dict[str, Any]:
+def mesh_step(path: Path, unit: str, size: float, edge_size: float) -> step_mesher.Meshed:
     """Mesh the surface of the part in a STEP file, in a process of its own.
 
     The same file gives the same mesh with the same version of gmsh.
@@ -44,7 +44,7 @@ def mesh_step(path: Path, unit: str, size: float, edge_size: float) -> dict[str,
 
     Returns
     -------
-    dict
+    Meshed
         `points`, (N, 3), and `volume` of the part itself, in the unit; `triangles`, (M, 3).
 
     Raises
@@ -62,10 +62,11 @@ def mesh_step(path: Path, unit: str, size: float, edge_size: float) -> dict[str,
         done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, check=False)
         if done.returncode or not answer.is_file():
             raise _broken(path, done.returncode, done.stderr.decode("ascii", "replace"))
-        found: dict[str, Any] = json.loads(answer.read_text(encoding="ascii"))
+        found: Any = json.loads(answer.read_text(encoding="ascii"))
     if "refused" in found:
         raise _refused(path, *found["refused"])
-    return found
+    meshed: step_mesher.Meshed = found
+    return meshed
 
 
 def _refused(path: Path, problem: str, value: str, limit: str, remedy: str) -> InputError:

@@ -11,7 +11,7 @@ import json
 import resource
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 
@@ -44,6 +44,14 @@ _INSTALL = (
 )
 
 
+class Meshed(TypedDict):
+    """Nodes, (N, 3), facets as rows of them, (M, 3), and the volume of the part itself."""
+
+    points: list[list[float]]
+    triangles: list[list[int]]
+    volume: float
+
+
 class Refusal(Exception):
     """What is wrong with a part: problem, value, limit and remedy of the message."""
 
@@ -61,7 +69,7 @@ def main(file: str, answer: str, unit: str, size: str, edge_size: str) -> None:
         Target edge length of the facets, and of those at sharp edges, in that unit.
     """
     resource.setrlimit(resource.RLIMIT_CPU, (CPU_LIMIT_S, CPU_LIMIT_S))
-    found: dict[str, Any]
+    found: Meshed | dict[str, tuple[object, ...]]
     try:
         found = _mesh(_gmsh(), file, unit, float(size), float(edge_size))
     except Refusal as refusal:
@@ -78,8 +86,8 @@ def _gmsh() -> Any:
     return gmsh
 
 
-def _mesh(gmsh: Any, file: str, unit: str, size: float, edge_size: float) -> dict[str, Any]:
-    """Nodes, facets and the volume of the part itself, in the unit."""
+def _mesh(gmsh: Any, file: str, unit: str, size: float, edge_size: float) -> Meshed:
+    """The mesh of the only solid of a file, in the unit."""
     gmsh.initialize(readConfigFiles=False, interruptible=False)
     try:
         for name, value in _OPTIONS.items():
@@ -88,7 +96,9 @@ def _mesh(gmsh: Any, file: str, unit: str, size: float, edge_size: float) -> dic
         solid = _solid(gmsh, file)
         _refuse_too_many(gmsh, size)
         _set_sizes(gmsh, size, edge_size)
-        return {**_surface(gmsh), "volume": gmsh.model.occ.getMass(3, solid)}
+        points, triangles = _surface(gmsh)
+        volume = gmsh.model.occ.getMass(3, solid)
+        return {"points": points, "triangles": triangles, "volume": volume}
     finally:
         gmsh.finalize()
 
@@ -149,7 +159,7 @@ def _is_sharp(gmsh: Any, curve: int) -> bool:
     return bool(np.dot(one, other) < np.cos(np.radians(_SHARP_DEG)))
 
 
-def _surface(gmsh: Any) -> dict[str, Any]:
+def _surface(gmsh: Any) -> tuple[list[list[float]], list[list[int]]]:
     """Nodes, (N, 3), and rows of them, (M, 3), of the meshed faces."""
     try:
         gmsh.model.mesh.generate(2)
@@ -162,10 +172,7 @@ def _surface(gmsh: Any) -> dict[str, Any]:
     order = np.argsort(tags)
     _, corners = gmsh.model.mesh.getElementsByType(2)
     rows = order[np.searchsorted(tags[order], corners)]
-    return {
-        "points": coordinates.reshape(-1, 3).tolist(),
-        "triangles": rows.reshape(-1, 3).tolist(),
-    }
+    return coordinates.reshape(-1, 3).tolist(), rows.reshape(-1, 3).tolist()
 
 
 if __name__ == "__main__":

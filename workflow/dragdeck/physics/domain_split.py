@@ -155,7 +155,7 @@ def _edges(count: int, low: float, high: float) -> _Fractions:
     return np.linspace(low, high, count + 1)
 
 
-def warnings(found: Split) -> list[Caution]:
+def rank_warnings(found: Split) -> list[Caution]:
     """What a user should know of a split before the run; a single rank has none."""
     ranks, text = len(found.particles), ""
     if found.idle:

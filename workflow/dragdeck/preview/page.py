@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jinja2
 import numpy as np
+from pydantic import JsonValue
 
 from dragdeck.preview.layout import COLOURS, CaseLayout, Floats, MovingWorkpiece, Projection, views
 from dragdeck.preview.swept import below_and_above, drawn
@@ -220,9 +221,9 @@ def page(layout: CaseLayout, swept: Sequence["Trimesh"], words: Words, png: byte
     )
 
 
-def _scene(layout: CaseLayout, swept: Sequence["Trimesh"]) -> dict[str, Any]:
+def _scene(layout: CaseLayout, swept: Sequence["Trimesh"]) -> dict[str, JsonValue]:
     """What the viewer draws, as plain data; lengths in mm."""
-    fixed = [*(_surface(one, "swept", 0.35) for one in swept)]
+    fixed: list[JsonValue] = [*(_surface(one, "swept", 0.35) for one in swept)]
     fixed += [_surface(layout.bed, "bed", 0.3), _surface(layout.bowl, "bowl", 0.35)]
     return {
         "height": 1e3 * layout.bowl_height_m,
@@ -236,9 +237,10 @@ def _scene(layout: CaseLayout, swept: Sequence["Trimesh"]) -> dict[str, Any]:
     }
 
 
-def _moving(body: MovingWorkpiece) -> dict[str, Any]:
+def _moving(body: MovingWorkpiece) -> dict[str, JsonValue]:
     """A workpiece with the frames of the slider, and the lines of its path."""
-    frames, lines = [], []
+    frames: list[JsonValue] = []
+    lines: list[JsonValue] = []
     for stage in body.stages:
         last = len(stage.poses) - 1
         rows = np.unique(np.linspace(0, last, _FRAMES_PER_LEG).round().astype(int))
@@ -251,7 +253,7 @@ def _moving(body: MovingWorkpiece) -> dict[str, Any]:
     return {**_surface(drawn(body.mesh), "workpiece", 1.0), "frames": frames, "lines": lines}
 
 
-def _surface(mesh: "Trimesh", name: str, opacity: float) -> dict[str, Any]:
+def _surface(mesh: "Trimesh", name: str, opacity: float) -> dict[str, JsonValue]:
     triangles = mesh.faces.ravel().tolist()
     return {
         "points": _rounded(mesh.vertices),
@@ -260,10 +262,10 @@ def _surface(mesh: "Trimesh", name: str, opacity: float) -> dict[str, Any]:
     }
 
 
-def _rounded(points: Floats) -> list[float]:
-    return (1e3 * points).round(3).ravel().tolist()
+def _rounded(points: Floats) -> list[JsonValue]:
+    return list((1e3 * points).round(3).ravel().tolist())
 
 
-def _rgb(name: str, opacity: float) -> list[float]:
+def _rgb(name: str, opacity: float) -> list[JsonValue]:
     channels = bytes.fromhex(COLOURS[name].removeprefix("#"))
     return [*(round(channel / 255, 3) for channel in channels), opacity]

@@ -33,8 +33,7 @@ from dragdeck.physics.contact_mechanics import (
     fall_speed,
     particle_mass,
 )
-from dragdeck.physics.domain_split import FilledBowl, Split, split
-from dragdeck.physics.domain_split import warnings as rank_warnings
+from dragdeck.physics.domain_split import FilledBowl, Split, rank_warnings, split
 from dragdeck.physics.packing import Bed, Particles, pour
 from dragdeck.physics.rounding import rounded
 from dragdeck.physics.run_limits import RunLimits, run_limits

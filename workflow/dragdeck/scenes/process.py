@@ -14,7 +14,7 @@ from dragdeck.errors import Caution
 from dragdeck.files import file_checksum
 from dragdeck.mesh import bowl, stl_text
 from dragdeck.physics.contact_mechanics import ENGINE_NEIGHBOURS
-from dragdeck.physics.domain_split import warnings as rank_warnings
+from dragdeck.physics.domain_split import rank_warnings
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import round_to
 from dragdeck.physics.run_limits import RunLimits
@@ -50,7 +50,7 @@ from dragdeck.scenes.workpiece import (
     workpiece_reach,
 )
 from dragdeck.study.base import Json
-from dragdeck.study.contact_law import explained
+from dragdeck.study.contact_law import coefficient_words
 from dragdeck.study.model import Study
 from dragdeck.study.workpiece import CylinderShape, MeshShape, Shape
 
@@ -296,7 +296,7 @@ def _bowl_files(study: Study, top_m: float) -> dict[str, Callable[[], str]]:
 
 
 def _models(study: Study) -> dict[str, str]:
-    optional, superposed = explained(study.pairs.values())[0], study.motion.superposed()
+    optional, superposed = coefficient_words(study.pairs.values())[0], study.motion.superposed()
     exact, why = study.bowl_facet_size_m is None, "facets, as requested"
     if study.motion.bowl_rad_s:
         why = "facets, whose surface moves with the rotation"
@@ -315,7 +315,7 @@ def _models(study: Study) -> dict[str, str]:
 
 
 def _leaves_out(study: Study) -> dict[str, LeftOut]:
-    _, absent = explained(study.pairs.values())
+    _, absent = coefficient_words(study.pairs.values())
     workpiece, network = study.outputs.workpiece_contacts_hz, study.outputs.network_hz
     found = {
         "positions, torques, areas of contacts": LeftOut(

@@ -1,6 +1,6 @@
 """What a scene is to the rest of the project, and what all scenes share."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, TypeVar
@@ -127,7 +127,7 @@ def case_of_study(
     timestep_s: float,
     rayleigh_time_s: float,
     *,
-    settings: Mapping[str, Any] | None = None,
+    settings: Json | None = None,
     **own: Any,
 ) -> C:
     """The content of ``case.json`` of a run of a study's case.

@@ -100,9 +100,9 @@ class Model(BaseModel):
         }
 
 
-def flat(data: Mapping[str, Any], prefix: str = "") -> Mapping[str, Any]:
+def flat(data: Json, prefix: str = "") -> Json:
     """Nested mappings as one mapping of dotted names."""
-    values: dict[str, Any] = {}
+    values: dict[str, JsonValue] = {}
     for key, value in data.items():
         if isinstance(value, Mapping):
             values.update(flat(value, f"{prefix}{key}."))

@@ -4,13 +4,13 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import product
 from pathlib import Path
-from typing import Any, get_args
+from typing import get_args
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from dragdeck.errors import Caution, InputError, choices, near, together
-from dragdeck.study.base import Model, flat
+from dragdeck.study.base import Json, Model, flat
 from dragdeck.study.model import BUILT_IN_FIDELITIES, AnyPath, Scaling, Study
 from dragdeck.study.plausible import implausible
 from dragdeck.study.recorded import Places, with_recording
@@ -182,7 +182,7 @@ def _level(value: object) -> float:
         return math.nan
 
 
-def validate(data: Mapping[str, Any], file: Path | str, *, whole: bool = False) -> Study:
+def validate(data: Json, file: Path | str, *, whole: bool = False) -> Study:
     """Check plain data against the study model, and its values against each other.
 
     Parameters

@@ -149,7 +149,7 @@ def added_forces(law: Sequence[str]) -> list[str]:
     return found
 
 
-def explained(pairs: Iterable[Pair]) -> tuple[list[str], list[str]]:
+def coefficient_words(pairs: Iterable[Pair]) -> tuple[list[str], list[str]]:
     """Words for the optional coefficients that a scene models, and for those it leaves out."""
     there = present(pairs)
     optional = {name: row for name, row in coefficients().items() if row.model}

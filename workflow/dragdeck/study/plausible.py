@@ -5,10 +5,9 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from fnmatch import fnmatch
-from typing import Any
 
 from dragdeck.errors import InputError
-from dragdeck.study.base import flat
+from dragdeck.study.base import Json, flat
 
 _LENGTH = {"mm": 1e-3, "um": 1e-6, "cm": 1e-2}
 _SPEED = {"mm/s": 1e-3, "m/min": 1 / 60}
@@ -110,7 +109,7 @@ _RANGES = {
 laboratory and industrial processes, and more."""
 
 
-def implausible(data: Mapping[str, Any]) -> Iterator[tuple[InputError, bool]]:
+def implausible(data: Json) -> Iterator[tuple[InputError, bool]]:
     """Every value of a study's plain data that is hardly meant, and whether it is refused.
 
     Parameters
@@ -128,7 +127,7 @@ def implausible(data: Mapping[str, Any]) -> Iterator[tuple[InputError, bool]]:
         yield InputError(problem, field=field, value=value, limit=limit, remedy=remedy), refused
 
 
-def _numbers(values: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
+def _numbers(values: Json) -> Iterator[tuple[str, float]]:
     for field, value in values.items():
         if isinstance(value, list | tuple):
             yield from _numbers({f"{field}.{index}": item for index, item in enumerate(value)})

@@ -7,7 +7,10 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
+from pydantic import JsonValue
+
 from dragdeck.errors import InputError
+from dragdeck.study.base import Json
 from dragdeck.study.paths.waypoints import MOST_POINTS, Waypoint
 from dragdeck.study.yaml import located, study_folders
 
@@ -18,7 +21,7 @@ Places = Mapping[str | None, _Place]
 """File, line and column of fields that do not stand in the study's own file."""
 
 
-def with_recording(data: Mapping[str, Any], study: Path) -> tuple[Mapping[str, Any], Places]:
+def with_recording(data: Json, study: Path) -> tuple[Json, Places]:
     """Plain data of a study with the waypoints instead of the name of their file, if it has one.
 
     Raises
@@ -26,12 +29,11 @@ def with_recording(data: Mapping[str, Any], study: Path) -> tuple[Mapping[str, A
     InputError
         There is no such file, or it is no table of waypoints.
     """
-    try:
-        motion, path = data["motion"], data["motion"]["path"]
-        recorded = path["kind"] == "waypoints" and not path.get("points")
-        name = path["file"]
-    except (KeyError, TypeError):
+    motion = data.get("motion")
+    path = motion.get("path") if isinstance(motion, dict) else None
+    if not isinstance(motion, dict) or not isinstance(path, dict):
         return data, {}
+    name, recorded = path.get("file"), path.get("kind") == "waypoints" and not path.get("points")
     if not recorded or not isinstance(name, str):
         return data, {}
     points, places = _read(_found(name, study))
@@ -54,7 +56,7 @@ def _found(name: str, study: Path) -> Path:
     )
 
 
-def _read(file: Path) -> tuple[list[list[Any]], Places]:
+def _read(file: Path) -> tuple[list[JsonValue], Places]:
     """Waypoints as a study may have them, numbers or not, and where they stand.
 
     Of too long a file, no more is read than shows that it is.
@@ -74,7 +76,9 @@ def _read(file: Path) -> tuple[list[list[Any]], Places]:
         value = ",".join(header)[:200] if set(needed) & set(header) else None  # quote only a table
         raise InputError(problem, file=file, field="line 1", value=value, limit=limit)
     surplus: Any = None  # the key of values beyond the header
-    points = [[*(row.get(key, "0") for key in _COLUMNS), *row.get(surplus, ())] for _, row in rows]
+    points: list[JsonValue] = [
+        [*(row.get(key, "0") for key in _COLUMNS), *row.get(surplus, ())] for _, row in rows
+    ]
     places: dict[str | None, _Place] = {_POINTS: (file, None, None)}
     for number, (line, _) in enumerate(rows):
         places[f"{_POINTS}.{number}"] = file, line, None

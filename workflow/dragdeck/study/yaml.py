@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Any, cast
 
 import yaml
+from pydantic import JsonValue
 
 from dragdeck.errors import InputError, choices
-from dragdeck.study.base import DECIMAL, NAME, STUDY_FILE
+from dragdeck.study.base import DECIMAL, NAME, STUDY_FILE, Json
 
 
 class _Loader(yaml.SafeLoader):
@@ -68,7 +69,7 @@ for _tag in ("bool", "float", "int", "timestamp"):
     _Loader.add_constructor(f"tag:yaml.org,2002:{_tag}", _scalar)
 
 
-def read_yaml(file: Path) -> dict[str, Any]:
+def read_yaml(file: Path) -> dict[str, JsonValue]:
     """Read a study file, or another one of its kind, as plain data.
 
     Raises
@@ -112,7 +113,7 @@ def _studies_nearby(file: Path) -> str:
     return f"choose one of: {', '.join(names)}" if names else "check the path"
 
 
-def read_study(file: Path) -> dict[str, Any]:
+def read_study(file: Path) -> dict[str, JsonValue]:
     """Read a study as plain data, with all that it takes from the studies it extends.
 
     Raises
@@ -120,14 +121,14 @@ def read_study(file: Path) -> dict[str, Any]:
     InputError
         As of `read_yaml` and `lineage`.
     """
-    data: dict[str, Any] = {}
+    data: dict[str, JsonValue] = {}
     for _, own in reversed(lineage(file)):
         data = _merged(data, own)
     data.pop("extends", None)
     return data
 
 
-def lineage(file: Path) -> list[tuple[Path, dict[str, Any]]]:
+def lineage(file: Path) -> list[tuple[Path, Json]]:
     """The file of a study and its content, then those of each study it extends, nearest first.
 
     Raises
@@ -135,7 +136,7 @@ def lineage(file: Path) -> list[tuple[Path, dict[str, Any]]]:
     InputError
         A file cannot be read, a study extends one that there is not, or itself.
     """
-    found = [(file, read_yaml(file))]
+    found: list[tuple[Path, Json]] = [(file, read_yaml(file))]
     while (name := found[-1][1].get("extends")) is not None:
         studies, place = file.parent.parent, found[-1][0]
         base = studies / str(name) / STUDY_FILE
@@ -170,7 +171,7 @@ _WHOLE = ("fidelity", "sweep")
 """Blocks that a study takes or replaces as a whole."""
 
 
-def _merged(base: Mapping[str, Any], own: Mapping[str, Any], top: bool = True) -> dict[str, Any]:
+def _merged(base: Json, own: Json, top: bool = True) -> dict[str, JsonValue]:
     """A study's content with another's changes.
 
     A part of another `kind` is replaced, and ``null`` leaves out a part of the base. A ``null``
@@ -182,8 +183,9 @@ def _merged(base: Mapping[str, Any], own: Mapping[str, Any], top: bool = True) -
         if value is None and key in base:
             del found[key]
         elif isinstance(value, dict) and not (top and key in _WHOLE):
-            same = isinstance(there, dict) and value.get("kind") in (None, there.get("kind"))
-            found[key] = _merged(there if same and there else {}, value, top=False)
+            if not isinstance(there, dict) or value.get("kind") not in (None, there.get("kind")):
+                there = {}
+            found[key] = _merged(there, value, top=False)
         else:
             found[key] = value
     return found

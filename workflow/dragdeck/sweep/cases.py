@@ -7,11 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Generic, NamedTuple, Self, TypeVar
 
-from pydantic import Field, ValidationError
+from pydantic import Field, JsonValue, ValidationError
 
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError, choices, together
-from dragdeck.study.base import NAME, NAME_LIMIT, STUDY_FILE, Model
+from dragdeck.study.base import NAME, NAME_LIMIT, STUDY_FILE, Json, Model
 from dragdeck.study.check import explained, validate
 from dragdeck.study.model import Tolerance
 from dragdeck.study.yaml import read_study, read_yaml
@@ -159,9 +159,9 @@ def beside_each_other(cases: Iterable[Case]) -> list[Case]:
 
 def settle_case(
     file: Path,
-    data: Mapping[str, Any],
-    values: Mapping[str, Any],
-    shown: Mapping[str, Any] | None = None,
+    data: Json,
+    values: Json,
+    shown: Json | None = None,
     named_in: Path | None = None,
     resolve: Resolve | None = None,
 ) -> Case:
@@ -267,16 +267,17 @@ def new_study(studies: Path, name: str, base: str) -> Path:
     return file
 
 
-def _set(data: dict[str, Any], field: str, value: Any, file: Path) -> None:
+def _set(data: dict[str, JsonValue], field: str, value: JsonValue, file: Path) -> None:
     *parents, last = field.split(".")
     place = data
     for name in parents:
-        place = place.setdefault(name, {})
-        if not isinstance(place, dict):
+        below = place.setdefault(name, {})
+        if not isinstance(below, dict):
             raise InputError(
                 "the field would lie below a single value",
                 file=file,
                 field=field,
                 remedy="give the dotted name of one field",
             )
+        place = below
     place[last] = value
