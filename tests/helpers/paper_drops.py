@@ -6,14 +6,8 @@ from typing import Literal
 
 import numpy as np
 
-from dragchain.calibration.simulated_drops import (
-    Drop,
-    DropRun,
-    Drops,
-    DropTest,
-    Purpose,
-    Waveform,
-)
+from dragchain.calibration.simulated_drops import DropRun, Drops, Waveform
+from dragdeck.records.calibration import DropOfList, DropTest, Purpose
 
 G, HEIGHT = 9.81, 0.010
 FALL_S = math.sqrt(2 * HEIGHT / G)
@@ -49,7 +43,7 @@ def paper_drop(
         impacts.append(Waveform(time, force, down, down + contact_s, middle, peak))
         down += contact_s + 2 * float(after) / G
     modulus = 1.0 if purpose != "production" else 0.01
-    drop = Drop(
+    drop = DropOfList(
         folder="",
         purpose=purpose,
         restitution=deck,

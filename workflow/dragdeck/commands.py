@@ -23,7 +23,7 @@ from dragdeck.advice.forecast import (
     roles,
 )
 from dragdeck.campaigns.machine_speed import measure_machine_speed
-from dragdeck.campaigns.restitution_drops import FitFile, confirmation, run_drops, sweep
+from dragdeck.campaigns.restitution_drops import confirmation, run_drops, sweep
 from dragdeck.cases.case import Case
 from dragdeck.cases.ranks import check_ranks, cores_here
 from dragdeck.decks.render import (
@@ -58,6 +58,7 @@ from dragdeck.preview.page import Words, page, picture, small_picture
 from dragdeck.preview.swept import swept_volume
 from dragdeck.project import Project, by_folder, by_run, find_project, study_templates
 from dragdeck.records.advice import AdviceFile, Speed
+from dragdeck.records.calibration import FitFile
 from dragdeck.records.tradeoff import TradeoffRecord, measured_tradeoff, tradeoff_if_measured
 from dragdeck.scenes.lead import with_leads
 from dragdeck.scenes.process import SCENES

@@ -20,11 +20,11 @@ from scipy.stats import chi2
 
 from dragchain.arrays import Floats
 from dragchain.calibration.force_record import read_record
-from dragchain.calibration.measured_impacts import IMPACTS, Impact, Measured, measure_impacts, pulse
+from dragchain.calibration.measured_impacts import Impact, Measured, measure_impacts, pulse
 from dragchain.calibration.simulated_drops import DropRun, Drops, Emulator, Sweep, Waveform, prepare
 from dragchain.errors import RecordError
-from dragchain.statistics.estimate import CONFIDENCE, Estimate
-from dragdeck.documents import Part
+from dragchain.statistics.estimate import CONFIDENCE
+from dragdeck.records.calibration import IMPACTS, Fit
 
 # --- sampling ------------------------------------------------------------------------------------
 
@@ -161,49 +161,6 @@ _RISE = float(chi2.ppf(CONFIDENCE, 1))
 WIDTH_LIMIT = 1.25
 """A measured impact wider than this times the simulated one, seen at the same
 rate, shows the sensor and not the contact: its peaks are not compared."""
-
-
-class Fit(Part):
-    """The fitted coefficient of restitution for the input script.
-
-    Attributes
-    ----------
-    restitution, ci95_low, ci95_high : float
-        Best value and its 95 % interval.
-    height_m : float
-        Drop height that fits best, m.
-    chi2 : float
-        Weighted sum of squares at the best value.
-    degrees : int
-        Degrees of freedom; 0: the fit cannot be tested.
-    p_value : float or None
-        Probability of a larger `chi2` if the model is right.
-    inflation : float
-        Factor by which the interval is widened if the residuals exceed their uncertainties:
-        sqrt(chi2 / degrees), at least 1.
-    residuals : tuple of float
-        (Measured - simulated) / standard uncertainty.
-    """
-
-    restitution: float
-    ci95_low: float
-    ci95_high: float
-    height_m: float
-    chi2: float
-    degrees: int
-    p_value: float | None
-    inflation: float
-    residuals: tuple[float, ...]
-
-    @property
-    def interval(self) -> Estimate:
-        """The restitution with its interval."""
-        return Estimate(self.restitution, self.ci95_low, self.ci95_high)
-
-    @property
-    def rise(self) -> float:
-        """How far the misfit has risen where the interval ends."""
-        return _RISE * self.inflation**2
 
 
 @dataclass(frozen=True)
@@ -351,6 +308,11 @@ class RecordFit:
     def with_peaks(self) -> bool:
         """Whether the peaks are compared."""
         return len(self.observed.log_peaks) > 0
+
+    @property
+    def rise(self) -> float:
+        """How far the misfit has risen where the interval of `fit` ends."""
+        return _RISE * self.fit.inflation**2
 
 
 def calibrate_file(record: Path, drops: Drops) -> RecordFit:

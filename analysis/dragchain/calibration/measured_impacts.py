@@ -13,9 +13,7 @@ from dragchain.arrays import Floats
 from dragchain.calibration.force_record import Note, Record, quiet_line
 from dragchain.errors import RecordError
 from dragdeck.documents import Document, Part
-
-IMPACTS = 3
-"""Impacts compared at the most (Uhlmann et al. 2015, section 4)."""
+from dragdeck.records.calibration import IMPACTS
 
 _QUIET_SAMPLES = 20
 """Samples needed before the first impact, to know baseline and noise."""

@@ -1,5 +1,6 @@
 """The report on a calibration: figures and one self-contained page."""
 
+from collections.abc import Hashable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +16,8 @@ from dragchain.calibration.results import PURPOSES, CalibrationFile, confirmed
 from dragchain.calibration.simulated_drops import DropRun, Drops, read_drops
 from dragchain.errors import TableError
 from dragchain.figures.panels import legend_below, new_figure, new_panels, row_names
-from dragchain.figures.style import BLUE, COLOURS, GREEN, GREY, ORANGE, RED, drawing, png
-from dragchain.report.page import data_uri, render_page, write_bundle
+from dragchain.figures.style import BLUE, COLOURS, GREEN, GREY, ORANGE, RED
+from dragchain.report.campaign import write_report
 
 # --- figures -------------------------------------------------------------------------------------
 
@@ -92,11 +93,11 @@ def _misfit(axes: Axes, found: RecordFit) -> None:
     half = 2.2 * max(high - best, best - low)
     values = np.linspace(max(best - half, model.low), min(best + half, model.high), 201)
     axes.plot(values, [found.misfit(value) - fit.chi2 for value in values], color=BLUE)
-    axes.axhline(fit.rise, color=GREY, linestyle="--", linewidth=0.9)
+    axes.axhline(found.rise, color=GREY, linestyle="--", linewidth=0.9)
     axes.axvspan(low, high, color=BLUE, alpha=0.12, linewidth=0)
     axes.axvline(best, color=RED)
     axes.set(xlabel="input restitution", ylabel="misfit minus its minimum")
-    axes.set(ylim=(0, 3 * fit.rise), title=f"{best:.4f} (95 % CI {low:.4f} to {high:.4f})")
+    axes.set(ylim=(0, 3 * found.rise), title=f"{best:.4f} (95 % CI {low:.4f} to {high:.4f})")
 
 
 def _residuals(axes: Axes, found: RecordFit) -> None:
@@ -166,21 +167,19 @@ def write_calibration_report(record: Path, folder: Path) -> None:
     sweep, confirm = (read_drops(folder / name / "drops.json") for name in ("sweep", "confirm"))
     found = calibrate_file(record, sweep)
     impacts, bias = (_csv(folder / f"{name}.csv") for name in ("impacts", "bias"))
-    with drawing():
-        figures = {
-            "impacts": png(draw_impacts(read_record(record), found, confirm)),
-            "fit": png(draw_fit(found)),
-            "bias": png(draw_bias(bias, result)),
-        }
-    page = render_page(
+    write_report(
+        folder,
         "calibration/calibration.html.j2",
+        draw=lambda: {
+            "impacts": draw_impacts(read_record(record), found, confirm),
+            "fit": draw_fit(found),
+            "bias": draw_bias(bias, result),
+        },
         result=result,
         impacts=impacts.to_dict("records"),
         bias=_by_deck_value(bias),
         confirm=confirmed(confirm),
-        pictures={name: data_uri(picture) for name, picture in figures.items()},
     )
-    write_bundle(folder, figures=figures, pages={"report": page})
 
 
 def _csv(file: Path) -> pd.DataFrame:
@@ -189,10 +188,10 @@ def _csv(file: Path) -> pd.DataFrame:
     return pd.read_csv(file)
 
 
-def _by_deck_value(bias: pd.DataFrame) -> pd.DataFrame:
-    """Effective restitution, one row per deck value, one column per purpose and contact option."""
-    return bias.pivot(
-        index="restitution_deck",
-        columns=["purpose", "limit_force"],
-        values="restitution_effective",
+def _by_deck_value(bias: pd.DataFrame) -> Sequence[Mapping[Hashable, object]]:
+    """Effective restitution, one row per deck value, one key per purpose and contact option."""
+    setting = bias["purpose"] + bias["limit_force"].map({True: "_on", False: "_off"})
+    wide = bias.assign(setting=setting).pivot(
+        index="restitution_deck", columns="setting", values="restitution_effective"
     )
+    return wide.astype(object).where(wide.notna(), None).reset_index().to_dict("records")

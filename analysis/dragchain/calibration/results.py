@@ -9,21 +9,15 @@ from typing import Literal
 import numpy as np
 import pandas as pd
 
-from dragchain.calibration.fit import Fit, RecordFit, calibrate_file
+from dragchain.calibration.fit import RecordFit, calibrate_file
 from dragchain.calibration.force_record import read_record
 from dragchain.calibration.measured_impacts import Measured, measure_impacts
-from dragchain.calibration.simulated_drops import (
-    Drops,
-    DropTest,
-    Emulator,
-    Settings,
-    emulator_of,
-    read_drops,
-)
+from dragchain.calibration.simulated_drops import Drops, Emulator, emulator_of, read_drops
 from dragchain.errors import TableError
 from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate
-from dragdeck.documents import Document, Part
+from dragdeck.documents import Part
 from dragdeck.files import write_text
+from dragdeck.records.calibration import DropTest, Fit, FitFile, Settings
 
 SweepPurpose = Literal["production", "reference"]
 PURPOSES: tuple[SweepPurpose, ...] = ("production", "reference")
@@ -86,7 +80,7 @@ class PutFor(Part):
     ci95_high: float | None
 
 
-class CalibrationFile(Document):
+class CalibrationFile(FitFile):
     """The content of ``result.json``; docs/evidence/calibration.md explains it.
 
     Attributes
@@ -95,8 +89,6 @@ class CalibrationFile(Document):
         Measured coefficient of restitution.
     effective : float
         Effective restitution of the production drop at the fitted value.
-    fit, fit_full : Fit
-        Fits at the production settings and at the physical modulus.
     width_ratio : float
         Ratio of the widths of the first impact, measured / simulated with the same sampling.
     correction : float
@@ -119,14 +111,10 @@ class CalibrationFile(Document):
         Impacts of the measured record.
     """
 
-    remedy = "make it with: snakemake calibrate"
-
     known: DropTest
     put: Put
     measured: Estimate
     effective: float
-    fit: Fit
-    fit_full: Fit
     peaks_compared: bool
     width_ratio: float
     direct: Direct
@@ -181,7 +169,9 @@ def write_csv(file: Path, table: pd.DataFrame) -> None:
 
 def result(found: RecordFit, drops: Drops) -> CalibrationFile:
     """Content of ``result.json``."""
-    measured = found.fit_reference.interval.mapped(found.sweep.reference.rebound)
+    full = found.fit_reference
+    put_at_full = Estimate(full.restitution, full.ci95_low, full.ci95_high)
+    measured = put_at_full.mapped(found.sweep.reference.rebound)
     deck, known = found.fit.restitution, drops.known
     return CalibrationFile(
         known=known,

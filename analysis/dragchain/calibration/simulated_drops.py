@@ -4,99 +4,22 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 import pandas as pd
 from numpy.polynomial import Polynomial
-from pydantic import PositiveFloat
 from scipy.optimize import brentq
 
 from dragchain.arrays import Floats
-from dragchain.calibration.measured_impacts import IMPACTS
 from dragchain.errors import TableError
 from dragchain.run.run_parts import iter_prints
 from dragchain.tables.impacts import speed_at_plate
 from dragdeck.decks.outputs import load_outputs
-from dragdeck.documents import Document, Part
+from dragdeck.records.calibration import IMPACTS, DropOfList, DropsFile, DropTest, Purpose
 from dragdeck.records.case import load_case
-
-Purpose = Literal["production", "reference", "confirm"]
 
 _SAMPLES = ("step", "time_s", "z_m", "vz_m_s", "force_n")
 """Columns of a drop's output around its impacts."""
-
-
-class DropTest(Document):
-    """The drop test of the study, as in ``drops.json``.
-
-    Attributes
-    ----------
-    pair : str
-        Particle and plate, as the study names their pair.
-    record : str
-        The CSV of the measured drop test.
-    height_m, height_std_m : float
-        Drop height (gap below the particle) and its standard uncertainty, m.
-    peaks : str
-        Whether to compare peak forces.
-    limit_force : bool
-        Whether tensile normal forces are suppressed, as in the study.
-    restitution_now : float
-        Coefficient of restitution of the study.
-    fall_time_s, contact_time_s : float
-        Time of the fall before the first impact, and contact time of an elastic impact, s.
-    """
-
-    remedy = "make it with: snakemake calibrate"
-
-    study: str
-    title: str
-    pair: str
-    fidelity: str
-    record: str
-    height_m: PositiveFloat
-    height_std_m: PositiveFloat
-    peaks: Literal["auto", "yes", "no"]
-    gravity_m_s2: PositiveFloat
-    limit_force: bool
-    restitution_now: float
-    fall_time_s: PositiveFloat
-    contact_time_s: float
-
-
-class Settings(Part):
-    """Modulus and step of a drop; the fraction is that of this particle's Rayleigh time."""
-
-    youngs_modulus_scale: PositiveFloat
-    timestep_s: PositiveFloat
-    timestep_fraction: PositiveFloat
-
-
-class Drop(Settings):
-    """A drop that ``drops.json`` lists.
-
-    Attributes
-    ----------
-    folder : str
-        Beside the list.
-    purpose : str
-        ``production``, ``reference`` or ``confirm``.
-    restitution : float
-        In the deck.
-    """
-
-    folder: str
-    purpose: Purpose
-    restitution: PositiveFloat
-    limit_force: bool
-    height_m: PositiveFloat
-
-
-class DropsFile(DropTest):
-    """The content of ``drops.json``."""
-
-    drops: tuple[Drop, ...]
 
 
 @dataclass(frozen=True)
@@ -129,7 +52,7 @@ class DropRun:
 
     Attributes
     ----------
-    drop : Drop
+    drop : DropOfList
         As it is listed.
     speeds_m_s : (K + 1,) ndarray
         Speed at the plate's surface before the first impact and after each.
@@ -137,7 +60,7 @@ class DropRun:
         K of them.
     """
 
-    drop: Drop
+    drop: DropOfList
     speeds_m_s: Floats
     impacts: tuple[Waveform, ...]
 
@@ -184,7 +107,7 @@ def read_drops(file: Path) -> Drops:
     )
 
 
-def _read_drop(folder: Path, drop: Drop) -> DropRun:
+def _read_drop(folder: Path, drop: DropOfList) -> DropRun:
     if not (folder / "run.json").is_file():
         raise TableError(f"{folder}: this drop is not complete; run `snakemake calibrate` again")
     case = load_case(folder)

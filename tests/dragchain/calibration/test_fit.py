@@ -12,16 +12,10 @@ from paper_drops import BIAS, FALL_S, HEIGHT, G, paper_drop, paper_drops, reboun
 from dragchain.calibration.fit import WIDTH_LIMIT, calibrate, observe, sample_impact
 from dragchain.calibration.measured_impacts import Measured, measure_impacts
 from dragchain.calibration.results import bias_table, read_off, result
-from dragchain.calibration.simulated_drops import (
-    Purpose,
-    Sweep,
-    emulate,
-    emulator_of,
-    prepare,
-    waveform,
-)
+from dragchain.calibration.simulated_drops import Sweep, emulate, emulator_of, prepare, waveform
 from dragchain.errors import RecordError, TableError
 from dragchain.statistics.estimate import Estimate
+from dragdeck.records.calibration import Purpose
 
 
 @pytest.fixture(scope="module")

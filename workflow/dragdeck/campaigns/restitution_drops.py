@@ -8,22 +8,17 @@ those are stands here; what they say is for dragchain to find out.
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 from dragdeck.cases.bed import bed_rayleigh_time, particle_material
 from dragdeck.cases.case import Case
-from dragdeck.documents import Document, Part
 from dragdeck.engine.batch import Batch
 from dragdeck.engine.reports import Report
 from dragdeck.errors import InputError
 from dragdeck.physics import contact_mechanics as mechanics
 from dragdeck.physics.rounding import timestep
+from dragdeck.records.calibration import IMPACTS, DropOfList, DropsFile, Purpose
 from dragdeck.scenes.drop_test import DropFidelity, drop_scene
 from dragdeck.study.model import Calibration, Study
-
-_DROPS_FILE = "drops.json"
-IMPACTS = 3
-"""Impacts compared (Uhlmann et al. 2015, section 4)."""
 
 _RESTITUTIONS = tuple(round(0.05 * k, 2) for k in range(8, 21))
 """Deck values of the sweep: 0.40, 0.45, ... 1.00."""
@@ -40,55 +35,6 @@ _REFERENCE_FRACTION = 0.01
 
 _GOLDEN = 0.618
 """Fraction of a step between the phases of reference drops, one a deck value."""
-
-Purpose = Literal["production", "reference", "confirm"]
-
-
-class FittedRestitution(Part):
-    """A restitution of the input script that a drop test asks for."""
-
-    restitution: float
-
-
-class FitFile(Document):
-    """What is read of a calibration's ``result.json``."""
-
-    remedy = "make it with: snakemake calibrate"
-
-    fit: FittedRestitution
-    fit_full: FittedRestitution
-
-
-class DropOfList(Part):
-    """A drop that was run: its folder and how it differs from the others."""
-
-    folder: str
-    purpose: Purpose
-    restitution: float
-    limit_force: bool
-    height_m: float
-    youngs_modulus_scale: float
-    timestep_s: float
-    timestep_fraction: float
-
-
-class DropsFile(Document):
-    """``drops.json``: drops, and what dragchain has to know of the study."""
-
-    study: str
-    title: str
-    pair: str
-    fidelity: str
-    record: str
-    height_m: float
-    height_std_m: float
-    peaks: Literal["auto", "yes", "no"]
-    gravity_m_s2: float
-    limit_force: bool
-    restitution_now: float
-    fall_time_s: float
-    contact_time_s: float
-    drops: Sequence[DropOfList]
 
 
 @dataclass(frozen=True)
@@ -256,10 +202,10 @@ def run_drops(case: Case, drops: Sequence[Drop], batch: Batch, report: Report) -
         step = scene.case.timestep_s
         steps = {"timestep_s": step, "timestep_fraction": step / scene.case.rayleigh_time_s}
         known = {**vars(drop), **vars(drop.fidelity), **steps, "folder": drop.name}
-        rows.append(DropOfList.model_validate({n: known[n] for n in DropOfList.model_fields}))
+        rows.append(DropOfList.model_validate(known))
         if number % 20 == 0 or number == len(drops):
             report(f"{number} of {len(drops)} drops done")
-    file = batch.folder / _DROPS_FILE
+    file = batch.folder / "drops.json"
     _listed(case, rows).write(file)
     return file
 
@@ -285,5 +231,5 @@ def _listed(case: Case, rows: Sequence[DropOfList]) -> DropsFile:
         restitution_now=study.pair(particle, plate).restitution,
         fall_time_s=mechanics.fall_time(height, gravity),
         contact_time_s=mechanics.hertz_contact_time(mass, radius, modulus, speed),
-        drops=rows,
+        drops=tuple(rows),
     )
