@@ -18,7 +18,6 @@ from dragdeck.cases.case import Case
 from dragdeck.decks.deck import Deck
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import round_to
-from dragdeck.scenes.periods import output_periods
 from dragdeck.study.drive import Drive, EngineMotion, Floats, Rotation, rotation_vector
 from dragdeck.study.driven import DrivenMotion
 from dragdeck.study.model import Motion, Study
@@ -96,9 +95,8 @@ def plunge_point(motion: Motion) -> Point:
 
 def farthest_reach(motion: Motion) -> float:
     """Largest distance of the workpiece's axis from the bowl's, m."""
-    aside = sum(one.horizontal_reach_m for one in motion.superposed().values())
     places = [plunge_point(motion), *motion.path.corners[:, :2].tolist()]
-    return max(math.hypot(x, y) for x, y in places) + aside
+    return max(math.hypot(x, y) for x, y in places)
 
 
 def surface_speed(motion: Motion, radius_m: float) -> float:
@@ -149,6 +147,25 @@ def vertical_range(motion: Motion) -> tuple[float, float]:
 def deepest(motion: Motion) -> float:
     """Largest depth of the tip below the surface in the drag, m."""
     return motion.immersion_depth_m - vertical_range(motion)[0]
+
+
+@dataclass(frozen=True)
+class Periods:
+    """Steps between frames of each output, each a multiple of the one before."""
+
+    force: int
+    contacts: int
+    network: int
+
+
+def output_periods(study: Study, timestep_s: float) -> Periods:
+    """Steps between frames: at least the asked rates, each a multiple of the faster one."""
+    rates, factor = study.outputs, study.chosen_fidelity().speed_factor
+    per_second = factor * timestep_s
+    force = max(1, math.floor(1 / (rates.workpiece_force_hz * per_second)))
+    contacts = force * max(1, math.floor(1 / (rates.workpiece_contacts_hz * per_second * force)))
+    network = contacts * max(1, math.floor(1 / (rates.network_hz * per_second * contacts)))
+    return Periods(force, contacts, network)
 
 
 @dataclass(frozen=True)

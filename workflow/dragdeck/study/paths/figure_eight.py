@@ -72,7 +72,3 @@ class FigureEightPath(WorkpiecePath):
                 "direction_deg": self.direction_deg + angle_deg,
             }
         )
-
-    def with_length(self, length_m: float) -> Self:
-        """As many loops as give the length."""
-        return self.model_copy(update={"loops": self.loops * length_m / self.path_length_m})

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from dragdeck.study.base import Json, Number, Positive
-from dragdeck.study.drive import Drive, EngineMotion, Floats, Orientation, StepCounts, wrap_angle
+from dragdeck.study.drive import Drive, EngineMotion, Floats, StepCounts, wrap_angle
 from dragdeck.study.paths.path import Point, WorkpiecePath, as_rows, turned
 
 
@@ -16,6 +16,7 @@ class LinePath(WorkpiecePath):
     """A straight line."""
 
     length_field: ClassVar[str] = "length_m"
+    one_direction: ClassVar[bool] = True
 
     kind: Literal["line"] = Field(description="line: the path is a straight line")
     start_m: tuple[Number, Number] = Field(
@@ -77,14 +78,6 @@ class LinePath(WorkpiecePath):
     def with_length(self, length_m: float) -> Self:
         """As long as that."""
         return self.model_copy(update={"length_m": length_m})
-
-    def turns(self, orientation: Orientation) -> bool:
-        """It has one direction."""
-        return False
-
-    def keeps_direction(self, orientation: Orientation) -> bool:
-        """It has one direction."""
-        return True
 
     def places(self, drive: Drive, since: StepCounts, begun: Floats) -> Floats:
         """As far as its velocity takes it."""
