@@ -217,13 +217,6 @@ def driven_surface_speed(study: Study, radius_m: float) -> float:
     return way.fastest_m_s + added_speed(study.motion, radius_m, way.factor)
 
 
-def workpiece_turn(study: Study) -> float:
-    """A mesh looks along +x in its own file: turn it into the direction of motion, rad."""
-    if not isinstance(study.workpiece.shape, MeshShape) and not study.motion.leans:
-        return 0.0
-    return study.motion.path.direction_rad
-
-
 def course(study: Study, bed: Bed, reference_m: float = 0.0) -> Course:
     """The motion of a workpiece in a bed.
 
@@ -254,7 +247,9 @@ def course(study: Study, bed: Bed, reference_m: float = 0.0) -> Course:
         )
     )
     start = (*plunge_point(motion), clear + reference_m)
-    return Course(start_m=start, turn_rad=workpiece_turn(study), legs=found, driven=way)
+    has_front = isinstance(study.workpiece.shape, MeshShape) or motion.leans
+    turn = path.direction_rad if has_front else 0.0  # a mesh looks along +x in its own file
+    return Course(start_m=start, turn_rad=turn, legs=found, driven=way)
 
 
 def _entry(

@@ -320,13 +320,12 @@ def check_fit(case: Case, surface_m: float, timestep_s: float) -> None:
         Names every field that has to change.
     """
     gaps = clearances(case, surface_m)
-    problems = (
-        _beside(case, gaps.wall_m),
-        _below(case, gaps.tip_m),
-        _up_and_down(case, gaps.tip_m),
-        _per_step(case, timestep_s),
-    )
-    found = [error for group in problems for error in group]
+    found = [
+        *_beside(case, gaps.wall_m),
+        *_below(case, gaps.tip_m),
+        *_up_and_down(case, gaps.tip_m),
+        *_per_step(case, timestep_s),
+    ]
     if found:
         raise together(found)
 
