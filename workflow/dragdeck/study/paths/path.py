@@ -309,6 +309,26 @@ def _measured(path: WorkpiecePath) -> tuple[float, float]:
     return length, float(speed.max()) / length
 
 
+class FromPlace(WorkpiecePath):
+    """Block of a study: a path from a place in a direction.
+
+    Attributes
+    ----------
+    place_field : str
+        The field of that place, m.
+    """
+
+    place_field: ClassVar[str]
+
+    if TYPE_CHECKING:
+        direction_deg: float
+
+    def turned(self, angle_deg: float) -> Self:
+        """From another place in another direction."""
+        place = {self.place_field: turned(getattr(self, self.place_field), angle_deg)}
+        return self.model_copy(update={**place, "direction_deg": self.direction_deg + angle_deg})
+
+
 class AroundBowl(WorkpiecePath):
     """Block of a study: a path on a circle about the bowl's axis."""
 
