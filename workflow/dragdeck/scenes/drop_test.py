@@ -9,7 +9,6 @@ from dragdeck.decks import outputs
 from dragdeck.decks.deck import Deck, LeftOut, Scene
 from dragdeck.decks.render import Body, data_file
 from dragdeck.physics.contact_mechanics import fall_speed, rayleigh_time
-from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import timestep
 from dragdeck.records.case import DropTestCase
 from dragdeck.scenes.scene import SceneType, case_of_study, material_table
@@ -163,15 +162,11 @@ def _content(case: Case) -> Json:
     }
 
 
-def _build(case: Case, bed: Bed | None) -> Scene[DropTestCase]:
-    return drop_scene(case)
-
-
 DROP_TEST = SceneType(
     name="drop_test",
     slug=lambda case: f"{case.study.media.material}-on-{case.study.workpiece.material}",
     content=_content,
-    build=_build,
+    build=lambda case, _: drop_scene(case),
     inputs=("particle.data",),
     tables=("impacts.parquet",),
     figures=("drop_test",),

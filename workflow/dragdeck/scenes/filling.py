@@ -339,15 +339,11 @@ def partners_in_bed(case: Case) -> list[tuple[str, str, float]]:
     ]
 
 
-def _build(case: Case, bed: Bed | None) -> Scene[FillingCase]:
-    return filling_scene(case.of_filling)
-
-
 FILLING = SceneType(
     name="filling",
     slug=lambda case: f"{case.study.media.count}-particles",
     content=filling_content,
-    build=_build,
+    build=lambda case, _: filling_scene(case.of_filling),
     inputs=("particles.data",),
     tables=("packing.json", "thermo.parquet"),
     figures=("filling",),

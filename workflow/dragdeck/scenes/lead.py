@@ -13,8 +13,7 @@ from dragdeck.cases.bed import bed_timestep
 from dragdeck.cases.case import Case, Stretch, of_each_workpiece
 from dragdeck.errors import InputError
 from dragdeck.physics.rounding import round_to
-from dragdeck.scenes.motion import Stop, driven
-from dragdeck.scenes.periods import output_periods
+from dragdeck.scenes.motion import Stop, driven, output_periods
 from dragdeck.study.drive import Drive
 from dragdeck.study.model import SoftStart, Study
 
@@ -235,7 +234,7 @@ def _window_study(study: Study) -> Study:
     chosen = study.chosen_fidelity()
     assert chosen.windows is not None
     often = _FRAMES / _block_s(study)
-    rates = study.outputs
+    rates = {name: max(rate, often) for name, rate in study.outputs if name.endswith("_hz")}
     fidelity = chosen.model_copy(
         update={
             "youngs_modulus_scale": 1.0,
@@ -248,13 +247,7 @@ def _window_study(study: Study) -> Study:
             "windows": None,
         }
     )
-    outputs = rates.model_copy(
-        update={
-            "network_hz": max(rates.network_hz, often),
-            "workpiece_contacts_hz": max(rates.workpiece_contacts_hz, often),
-            "workpiece_force_hz": max(rates.workpiece_force_hz, often),
-        }
-    )
+    outputs = study.outputs.model_copy(update=rates)
     return study.model_copy(update={"fidelity": fidelity, "outputs": outputs})
 
 

@@ -18,7 +18,6 @@ from dragdeck.cases.case import Case
 from dragdeck.decks.deck import Deck
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import round_to
-from dragdeck.scenes.periods import output_periods
 from dragdeck.study.drive import Drive, EngineMotion, Floats, Rotation, rotation_vector
 from dragdeck.study.driven import DrivenMotion
 from dragdeck.study.model import Motion, Study
@@ -96,9 +95,8 @@ def plunge_point(motion: Motion) -> Point:
 
 def farthest_reach(motion: Motion) -> float:
     """Largest distance of the workpiece's axis from the bowl's, m."""
-    aside = sum(one.horizontal_reach_m for one in motion.superposed().values())
     places = [plunge_point(motion), *motion.path.corners[:, :2].tolist()]
-    return max(math.hypot(x, y) for x, y in places) + aside
+    return max(math.hypot(x, y) for x, y in places)
 
 
 def surface_speed(motion: Motion, radius_m: float) -> float:
@@ -152,6 +150,25 @@ def deepest(motion: Motion) -> float:
 
 
 @dataclass(frozen=True)
+class Periods:
+    """Steps between frames of each output, each a multiple of the one before."""
+
+    force: int
+    contacts: int
+    network: int
+
+
+def output_periods(study: Study, timestep_s: float) -> Periods:
+    """Steps between frames: at least the asked rates, each a multiple of the faster one."""
+    rates, factor = study.outputs, study.chosen_fidelity().speed_factor
+    per_second = factor * timestep_s
+    force = max(1, math.floor(1 / (rates.workpiece_force_hz * per_second)))
+    contacts = force * max(1, math.floor(1 / (rates.workpiece_contacts_hz * per_second * force)))
+    network = contacts * max(1, math.floor(1 / (rates.network_hz * per_second * contacts)))
+    return Periods(force, contacts, network)
+
+
+@dataclass(frozen=True)
 class Course:
     """The whole motion of a workpiece.
 
@@ -200,13 +217,6 @@ def driven_surface_speed(study: Study, radius_m: float) -> float:
     return way.fastest_m_s + added_speed(study.motion, radius_m, way.factor)
 
 
-def workpiece_turn(study: Study) -> float:
-    """A mesh looks along +x in its own file: turn it into the direction of motion, rad."""
-    if not isinstance(study.workpiece.shape, MeshShape) and not study.motion.leans:
-        return 0.0
-    return study.motion.path.direction_rad
-
-
 def course(study: Study, bed: Bed, reference_m: float = 0.0) -> Course:
     """The motion of a workpiece in a bed.
 
@@ -237,7 +247,9 @@ def course(study: Study, bed: Bed, reference_m: float = 0.0) -> Course:
         )
     )
     start = (*plunge_point(motion), clear + reference_m)
-    return Course(start_m=start, turn_rad=workpiece_turn(study), legs=found, driven=way)
+    has_front = isinstance(study.workpiece.shape, MeshShape) or motion.leans
+    turn = path.direction_rad if has_front else 0.0  # a mesh looks along +x in its own file
+    return Course(start_m=start, turn_rad=turn, legs=found, driven=way)
 
 
 def _entry(

@@ -31,8 +31,14 @@ from dragdeck.scenes.filling import (
     rank_split,
 )
 from dragdeck.scenes.lead import Covered, covered, led, mark_file, stops
-from dragdeck.scenes.motion import Course, ProcessDeck, course, moved_workpiece
-from dragdeck.scenes.periods import Periods, output_periods
+from dragdeck.scenes.motion import (
+    Course,
+    Periods,
+    ProcessDeck,
+    course,
+    moved_workpiece,
+    output_periods,
+)
 from dragdeck.scenes.scene import SceneType, case_of_study, material_table
 from dragdeck.scenes.workpiece import (
     PARTICLE_STEPS_PER_S,
@@ -241,10 +247,7 @@ def _process_case(
             for leg in way.legs
         ],
         statistics=StatisticsOfRun(transient_s=transient_s),
-        steady=SteadyCriterion(
-            from_step=steps.counted,
-            energy_drift=_ENERGY_DRIFT,
-        )
+        steady=SteadyCriterion(from_step=steps.counted, energy_drift=_ENERGY_DRIFT)
         if motion.bowl_rad_s
         else None,
         limits=limits,
@@ -349,11 +352,6 @@ def _partners(case: Case) -> list[tuple[str, str, float]]:
     return [*partners_in_bed(case), workpiece]
 
 
-def _carousel(study: Study) -> Json:
-    plain = study.plain()
-    return {"workpieces": plain["workpieces"]} if "workpieces" in plain else {}
-
-
 def _stretches(case: Case) -> Json:
     """What a run covers, unless that is all, and from which run it goes on."""
     found = {} if case.stretch == Stretch() else {"stretch": asdict(case.stretch)}
@@ -375,7 +373,7 @@ def _content(case: Case) -> Json:
         "facet_size_m": study.bowl.facet_size_m,
         "workpiece": study.workpiece.plain(),
         "motion": study.motion.plain(),
-        **_carousel(study),
+        **{name: value for name, value in study.plain().items() if name == "workpieces"},
         "outputs": study.outputs.plain(),
         "fidelity": study.chosen_fidelity().model_copy(update={"windows": None}).plain(),
         **mesh,

@@ -1,17 +1,30 @@
 """The workpiece of a case, generated or from the user's mesh."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
+from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dragdeck.cases.bed import bed_timestep
-from dragdeck.cases.case import Case, mesh_file
-from dragdeck.errors import Caution
+from dragdeck.cases.bed import (
+    JUST_BEYOND,
+    bed_radii,
+    bed_timestep,
+    full_stiffness_number,
+    impact_time,
+    outrun,
+    particle_material,
+    skin,
+    smallest_radius,
+    tip_pressure,
+)
+from dragdeck.cases.case import Case, mesh_file, of_each_workpiece
+from dragdeck.errors import Caution, InputError, together
 from dragdeck.mesh import (
     Finding,
     Surroundings,
@@ -28,42 +41,27 @@ from dragdeck.mesh import (
     tilted,
     upright,
 )
+from dragdeck.physics.contact_mechanics import fall_speed, inertial_number
+from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import round_to, rounded
-from dragdeck.scenes.motion import deepest, farthest_reach, plunge_point, surface_speed
+from dragdeck.physics.run_limits import SPEED_FACTOR
+from dragdeck.scenes.motion import (
+    course,
+    deepest,
+    driven_surface_speed,
+    farthest_reach,
+    path_heights,
+    plunge_point,
+    surface_speed,
+    vertical_range,
+)
+from dragdeck.study.contact_law import compared_numbers
 from dragdeck.study.drive import by_vector
 from dragdeck.study.driven import DrivenMotion
 from dragdeck.study.workpiece import CylinderShape, MeshShape
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
-
-from collections.abc import Sequence
-from dataclasses import dataclass
-from itertools import combinations
-
-from dragdeck.cases.bed import (
-    JUST_BEYOND,
-    bed_radii,
-    full_stiffness_number,
-    impact_time,
-    outrun,
-    particle_material,
-    skin,
-    smallest_radius,
-    tip_pressure,
-)
-from dragdeck.cases.case import of_each_workpiece
-from dragdeck.errors import InputError, together
-from dragdeck.physics.contact_mechanics import fall_speed, inertial_number
-from dragdeck.physics.packing import Bed
-from dragdeck.physics.run_limits import SPEED_FACTOR
-from dragdeck.scenes.motion import (
-    course,
-    driven_surface_speed,
-    path_heights,
-    vertical_range,
-)
-from dragdeck.study.contact_law import compared_numbers
 
 PARTICLE_STEPS_PER_S = 7e6
 """Particles times steps per second of a process, one rank, with a few facets."""
@@ -133,8 +131,7 @@ def _postures(case: Case) -> Iterator[NDArray[np.float64]]:
     since = np.linspace(0.0, way.drive.steps, _LOOKS)
     own = motion.path.own(way.drive, since)
     if motion.turns_about_inclined_axis:
-        tilt, angle = math.radians(way.drive.tilt_deg), np.linspace(0.0, math.tau, 25)[:, None]
-        own = by_vector(angle * [math.sin(tilt), 0.0, math.cos(tilt)])
+        own = by_vector(np.linspace(0.0, math.tau, 25)[:, None] * way.drive.own_axis)
     for rotation in np.eye(3)[None] if own is None else own:
         yield mesh.vertices @ rotation.T
 
@@ -323,13 +320,12 @@ def check_fit(case: Case, surface_m: float, timestep_s: float) -> None:
         Names every field that has to change.
     """
     gaps = clearances(case, surface_m)
-    problems = (
-        _beside(case, gaps.wall_m),
-        _below(case, gaps.tip_m),
-        _up_and_down(case, gaps.tip_m),
-        _per_step(case, timestep_s),
-    )
-    found = [error for group in problems for error in group]
+    found = [
+        *_beside(case, gaps.wall_m),
+        *_below(case, gaps.tip_m),
+        *_up_and_down(case, gaps.tip_m),
+        *_per_step(case, timestep_s),
+    ]
     if found:
         raise together(found)
 
@@ -562,11 +558,11 @@ def describe(case: Case) -> dict[str, float]:
     rate = speed / diameter
     added = speed / motion.axis_speed_m_s - 1
     superposed = {"superposed_speed": added} if motion.superposed() or added > 1e-9 else {}
-    froude = motion.bowl_rad_s**2 * study.bowl.radius_m / study.gravity_m_s2
-    rotation = {"bowl_froude_number": froude} if froude else {}
-    tilt = {"tilt_deg": abs(motion.tilt_deg)} if motion.tilt_deg else {}
-    others = len(of_each_workpiece(case.all_workpieces)) - 1
-    further = {"further_workpieces": float(others)} if others else {}
+    optional = {
+        "bowl_froude_number": motion.bowl_rad_s**2 * study.bowl.radius_m / study.gravity_m_s2,
+        "tilt_deg": abs(motion.tilt_deg or 0.0),
+        "further_workpieces": float(len(of_each_workpiece(case.all_workpieces)) - 1),
+    }
     names = study.media.material, study.workpiece.material
     return {
         "stiffness_number": full_stiffness_number(study),
@@ -580,8 +576,6 @@ def describe(case: Case) -> dict[str, float]:
             study.pair(names[0], names[0]), study.pair(*names), study.pairs.values()
         ),
         **superposed,
-        **rotation,
-        **tilt,
-        **further,
+        **{name: value for name, value in optional.items() if value},
         "particles": study.media.count,
     }

@@ -91,12 +91,11 @@ class Model(BaseModel):
 
     def absent(self) -> set[str]:
         """Fields whose value says that there is nothing: None, or what the field excludes."""
-        values = {name: getattr(self, name) for name in type(self).model_fields}
-        excluded = {name: field.exclude_if for name, field in type(self).model_fields.items()}
         return {
             name
-            for name, value in values.items()
-            if value is None or ((excludes := excluded[name]) is not None and excludes(value))
+            for name, field in type(self).model_fields.items()
+            if (value := getattr(self, name)) is None
+            or (field.exclude_if is not None and field.exclude_if(value))
         }
 
 

@@ -4,6 +4,7 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partialmethod
 from itertools import takewhile
 from typing import Any, Literal
 
@@ -13,7 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 Orientation = Literal["follow_path", "fixed"]
-_Array = NDArray[np.float64]
+Floats = NDArray[np.float64]
+StepCounts = NDArray[np.float64] | NDArray[np.int64]
 
 LIVE_REFERENCE = Markup("${reference_x} ${reference_y} ${reference_z}")
 """The reference point where the engine has it when the drag begins or is resumed."""
@@ -28,13 +30,13 @@ class SmoothStart:
 
     steps: int = 0
 
-    def advance(self, since: ArrayLike) -> _Array:
+    def advance(self, since: ArrayLike) -> Floats:
         """Steps at full speed that get the motion as far as so many from its start."""
         since, ramp = np.asarray(since, dtype=np.float64), max(self.steps, 1)
         begun = np.minimum(since, self.steps)
         return np.asarray(begun**3 / ramp**2 * (1.0 - begun / (2.0 * ramp)) + (since - begun))
 
-    def pace(self, since: ArrayLike) -> _Array:
+    def pace(self, since: ArrayLike) -> Floats:
         """Speed after so many steps over the full one."""
         since = np.asarray(since)
         x = np.minimum(since / max(self.steps, 1), 1.0) if self.steps else np.ones(1)
@@ -106,15 +108,21 @@ class Drive:
         """The same speed as ``case.json`` has it."""
         return self.length_m / self.full_duration_s
 
+    @property
+    def own_axis(self) -> Floats:
+        """The workpiece's axis in the frame of its front, (3,)."""
+        tilt = math.radians(self.tilt_deg)
+        return np.array([math.sin(tilt), 0.0, math.cos(tilt)])
+
     def time_to(self, path_m: float) -> float:
         """Time after which the workpiece is so far along its path, and no longer starts, s."""
         return path_m / self.speed_m_s + self.begin.steps / 2 * self.timestep_s
 
-    def time_s(self, since: ArrayLike) -> _Array:
+    def time_s(self, since: ArrayLike) -> Floats:
         """Time that the way of so many steps takes at full speed."""
         return np.asarray(self.begin.advance(since) * self.full_duration_s / self.full_steps)
 
-    def share(self, since: ArrayLike) -> _Array:
+    def share(self, since: ArrayLike) -> Floats:
         """Part of the path's time that has passed after so many steps."""
         return np.asarray(self.begin.advance(since) / self.full_steps)
 
@@ -136,29 +144,10 @@ class Formula:
         first, second = (self, other)[:: -1 if swapped else 1]
         return Formula(f"({formula(first)}{sign}{formula(second)})")
 
-    def __add__(self, other: Any) -> "Formula":
-        return self._joined("+", other)
-
-    def __radd__(self, other: Any) -> "Formula":
-        return self._joined("+", other, swapped=True)
-
-    def __sub__(self, other: Any) -> "Formula":
-        return self._joined("-", other)
-
-    def __rsub__(self, other: Any) -> "Formula":
-        return self._joined("-", other, swapped=True)
-
-    def __mul__(self, other: Any) -> "Formula":
-        return self._joined("*", other)
-
-    def __rmul__(self, other: Any) -> "Formula":
-        return self._joined("*", other, swapped=True)
-
-    def __truediv__(self, other: Any) -> "Formula":
-        return self._joined("/", other)
-
-    def __ge__(self, other: Any) -> "Formula":
-        return self._joined(">=", other)
+    __add__, __radd__ = partialmethod(_joined, "+"), partialmethod(_joined, "+", swapped=True)
+    __sub__, __rsub__ = partialmethod(_joined, "-"), partialmethod(_joined, "-", swapped=True)
+    __mul__, __rmul__ = partialmethod(_joined, "*"), partialmethod(_joined, "*", swapped=True)
+    __truediv__, __ge__ = partialmethod(_joined, "/"), partialmethod(_joined, ">=")
 
     def sin(self) -> "Formula":
         """What ``np.sin`` calls."""
@@ -235,15 +224,11 @@ def rotating_by(names: Sequence[str]) -> dict[str, str]:
     return {part: rotating(name, axis) for (part, axis), name in turns}
 
 
-def rates_about_axes(matrix: _Array, drive: Drive) -> tuple[float, float, float]:
+def rates_about_axes(matrix: Floats, drive: Drive) -> tuple[float, float, float]:
     """Angular speeds about x, y and z that make a rotation, (3, 3), in a step, rad/s."""
     x = math.atan2(-matrix[1, 2], matrix[2, 2])
     y, z = math.asin(matrix[0, 2]), math.atan2(-matrix[0, 1], matrix[0, 0])
     return x / drive.timestep_s, y / drive.timestep_s, z / drive.timestep_s
-
-
-Floats = NDArray[np.float64]
-StepCounts = NDArray[np.float64] | NDArray[np.int64]
 
 
 def wrap_angle(angle_rad: ArrayLike) -> Floats:
@@ -386,13 +371,13 @@ def in_steps(
             begun, begin_s = end, end_s
 
 
-def integral(stages: Sequence[tuple[float, float]], time_s: float) -> float:
+def integral(stages: Sequence[tuple[float, Any]], time_s: float) -> Any:
     """What a rate adds up to from the beginning of the first stage to a time.
 
     Parameters
     ----------
     stages : sequence
-        End of each stage, s, and its rate.
+        End of each stage, s, and its rate: a number or an array.
     time_s : float
     """
     *others, (_, last) = stages

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from pydantic import JsonValue
 
 from dragdeck.study.drive import (
     Drive,
@@ -158,7 +157,5 @@ class DrivenMotion:
 
     def superposed_entries(self) -> list[SuperposedEntry]:
         """What is superposed in ``case.json``."""
-        entries: list[dict[str, JsonValue]] = [
-            one.entry(self.drive) for one in self.superposed.values()
-        ]
-        return [SuperposedEntry.model_validate(entry) for entry in entries]
+        moving = self.superposed.values()
+        return [SuperposedEntry.model_validate(one.entry(self.drive)) for one in moving]

@@ -8,12 +8,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import (
-    Discriminator,
-    Field,
-    Tag,
-    model_validator,
-)
+from pydantic import Discriminator, Field, Tag, model_validator
 
 from dragdeck.study.base import (
     Line,
@@ -33,7 +28,6 @@ from dragdeck.study.paths.path import turned
 from dragdeck.study.paths.rest import RestPath
 from dragdeck.study.paths.waypoints import WaypointsPath
 from dragdeck.study.reference import Reference
-from dragdeck.study.remarks import Accepted, Assumption
 from dragdeck.study.superposed.motion import SuperposedMotion
 from dragdeck.study.superposed.oscillation import Oscillation
 from dragdeck.study.superposed.spin import Spin, SpinStage
@@ -414,23 +408,18 @@ class Fidelity(Model):
     )
 
     @model_validator(mode="after")
-    def _windows_are_stiffer(self) -> Self:
-        if self.windows is None:
-            return self
-        if self.youngs_modulus_scale == 1 or self.speed_factor != 1 or self.soft_start is not None:
+    def _parts_fit(self) -> Self:
+        start, scale = self.soft_start, self.youngs_modulus_scale
+        whole = scale < 1 and self.speed_factor == 1 and start is None
+        if self.windows is not None and not whole:
             raise ValueError(
                 "windows require a youngs_modulus_scale below 1, a speed_factor of 1 and no "
                 "soft_start"
             )
-        return self
-
-    @model_validator(mode="after")
-    def _soft_start_is_softer(self) -> Self:
-        start = self.soft_start
-        if start is not None and start.youngs_modulus_scale >= self.youngs_modulus_scale:
+        if start is not None and start.youngs_modulus_scale >= scale:
             raise ValueError(
                 f"soft_start has a youngs_modulus_scale of {start.youngs_modulus_scale:g}, not "
-                f"below {self.youngs_modulus_scale:g}"
+                f"below {scale:g}"
             )
         return self
 
@@ -500,6 +489,26 @@ class Scaling(Model):
                 f"{self.fit_range[1]:g}"
             )
         return self
+
+
+class Assumption(Model):
+    """A value that the source of the study does not give."""
+
+    field: str = Field(description="dotted name of the field whose value is assumed")
+    why: str = Field(description="what the source reports, and the reason for the value")
+
+
+class Accepted(Model):
+    """Limits that a study goes beyond on purpose."""
+
+    unsafe_timestep: Line | None = Field(
+        default=None,
+        description="reason for a process time step that is forecast to be unstable, and "
+        "for accepting its run; shown among assumptions and acceptance checks of the report",
+    )
+    cases: Annotated[Whole, Field(ge=1)] = Field(
+        default=200, description="largest accepted number of cases of `sweep`"
+    )
 
 
 BUILT_IN_FIDELITIES: Mapping[str, Fidelity] = {

@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
-from dragdeck.study.base import Json, Number, Positive
+from dragdeck.study.base import Json, Positive
 from dragdeck.study.drive import (
     Drive,
     EngineMotion,
@@ -18,7 +18,7 @@ from dragdeck.study.drive import (
     rotated,
     wrap_angle,
 )
-from dragdeck.study.paths.path import AroundBowl, Point
+from dragdeck.study.paths.path import AroundBowl, Point, StartAngle
 
 
 class CirclePath(AroundBowl):
@@ -28,11 +28,7 @@ class CirclePath(AroundBowl):
         description="circle: the path is a circle about the bowl's axis"
     )
     radius_m: Positive = Field(description="radius of the path of the workpiece's axis, m")
-    start_deg: Number = Field(
-        default=0.0,
-        description="polar angle of the start of the path about the bowl's axis, from +x, degrees",
-        exclude_if=lambda value: value == 0,
-    )
+    start_deg: StartAngle = 0.0
     revolutions: Positive = Field(default=1.0, description="length of the path in revolutions")
     direction: Literal["ccw", "cw"] = Field(
         default="ccw",

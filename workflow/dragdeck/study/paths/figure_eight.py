@@ -2,19 +2,20 @@
 
 import math
 from collections.abc import Callable
-from typing import Any, ClassVar, Literal, Self
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
 
 from dragdeck.study.base import Number, Positive
-from dragdeck.study.paths.path import WorkpiecePath, turned
+from dragdeck.study.paths.path import FromPlace
 
 
-class FigureEightPath(WorkpiecePath):
+class FigureEightPath(FromPlace):
     """Two circles of one radius that touch: one counter-clockwise, the other clockwise."""
 
     length_field: ClassVar[str] = "loops"
+    place_field: ClassVar[str] = "middle_m"
 
     kind: Literal["figure_eight"] = Field(
         description="figure_eight: the path is two circles that touch, one gone round "
@@ -63,16 +64,3 @@ class FigureEightPath(WorkpiecePath):
         heading = math.radians(self.direction_deg)
         c, s = math.cos(heading), math.sin(heading)
         return c * ahead - s * left, s * ahead + c * left
-
-    def turned(self, angle_deg: float) -> Self:
-        """With another middle and direction."""
-        return self.model_copy(
-            update={
-                "middle_m": turned(self.middle_m, angle_deg),
-                "direction_deg": self.direction_deg + angle_deg,
-            }
-        )
-
-    def with_length(self, length_m: float) -> Self:
-        """As many loops as give the length."""
-        return self.model_copy(update={"loops": self.loops * length_m / self.path_length_m})

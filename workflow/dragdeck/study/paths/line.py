@@ -8,14 +8,16 @@ import numpy as np
 from pydantic import Field
 
 from dragdeck.study.base import Json, Number, Positive
-from dragdeck.study.drive import Drive, EngineMotion, Floats, Orientation, StepCounts, wrap_angle
-from dragdeck.study.paths.path import Point, WorkpiecePath, as_rows, turned
+from dragdeck.study.drive import Drive, EngineMotion, Floats, StepCounts, wrap_angle
+from dragdeck.study.paths.path import FromPlace, Point, as_rows
 
 
-class LinePath(WorkpiecePath):
+class LinePath(FromPlace):
     """A straight line."""
 
     length_field: ClassVar[str] = "length_m"
+    place_field: ClassVar[str] = "start_m"
+    one_direction: ClassVar[bool] = True
 
     kind: Literal["line"] = Field(description="line: the path is a straight line")
     start_m: tuple[Number, Number] = Field(
@@ -65,26 +67,9 @@ class LinePath(WorkpiecePath):
         heading = self.direction_rad
         return self.length_m * math.cos(heading), self.length_m * math.sin(heading), 0.0
 
-    def turned(self, angle_deg: float) -> Self:
-        """From another place in another direction."""
-        return self.model_copy(
-            update={
-                "start_m": turned(self.start_m, angle_deg),
-                "direction_deg": self.direction_deg + angle_deg,
-            }
-        )
-
     def with_length(self, length_m: float) -> Self:
         """As long as that."""
         return self.model_copy(update={"length_m": length_m})
-
-    def turns(self, orientation: Orientation) -> bool:
-        """It has one direction."""
-        return False
-
-    def keeps_direction(self, orientation: Orientation) -> bool:
-        """It has one direction."""
-        return True
 
     def places(self, drive: Drive, since: StepCounts, begun: Floats) -> Floats:
         """As far as its velocity takes it."""

@@ -7,11 +7,12 @@ says better.
 import math
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 import numpy as np
+from pydantic import Field
 
-from dragdeck.study.base import Json, Model
+from dragdeck.study.base import Json, Model, Number
 from dragdeck.study.drive import (
     Drive,
     EngineMotion,
@@ -25,6 +26,13 @@ from dragdeck.study.drive import (
     wrap_angle,
 )
 
+StartAngle = Annotated[
+    Number,
+    Field(
+        description="polar angle of the start of the path about the bowl's axis, from +x, degrees",
+        exclude_if=lambda value: value == 0,
+    ),
+]
 Point = tuple[float, float]
 Vector = tuple[float, float, float]
 
@@ -51,9 +59,12 @@ class WorkpiecePath(Model):
     ----------
     length_field : str
         The field below ``motion.path`` that its length is proportional to.
+    one_direction : bool
+        Whether it has one direction: the workpiece never turns with it.
     """
 
     length_field: ClassVar[str]
+    one_direction: ClassVar[bool] = False
 
     if TYPE_CHECKING:
         kind: str
@@ -171,19 +182,20 @@ class WorkpiecePath(Model):
     def turned(self, angle_deg: float) -> Self:
         """The same path turned about the bowl's axis."""
 
-    @abstractmethod
     def with_length(self, length_m: float) -> Self:
         """The same path with another length."""
+        longer = getattr(self, self.length_field) * length_m / self.path_length_m
+        return self.model_copy(update={self.length_field: longer})
 
     # --- as a run drives it --------------------------------------------------------------------
 
     def turns(self, orientation: Orientation) -> bool:
         """Whether the workpiece turns with its path."""
-        return orientation == "follow_path"
+        return orientation == "follow_path" and not self.one_direction
 
     def keeps_direction(self, orientation: Orientation) -> bool:
         """Whether the direction of motion is always the same in the workpiece's own frame."""
-        return self.turns(orientation)
+        return self.one_direction or self.turns(orientation)
 
     def fastest_m_s(self, drive: Drive) -> float:
         """Highest speed of the axis."""
@@ -295,6 +307,26 @@ def _measured(path: WorkpiecePath) -> tuple[float, float]:
     speed = np.linalg.norm(as_rows(path.tangent((middle + _NODES / 2) / _PANELS)), axis=-1)
     length = float((speed * _WEIGHTS).sum() / 2 / _PANELS)
     return length, float(speed.max()) / length
+
+
+class FromPlace(WorkpiecePath):
+    """Block of a study: a path from a place in a direction.
+
+    Attributes
+    ----------
+    place_field : str
+        The field of that place, m.
+    """
+
+    place_field: ClassVar[str]
+
+    if TYPE_CHECKING:
+        direction_deg: float
+
+    def turned(self, angle_deg: float) -> Self:
+        """From another place in another direction."""
+        place = {self.place_field: turned(getattr(self, self.place_field), angle_deg)}
+        return self.model_copy(update={**place, "direction_deg": self.direction_deg + angle_deg})
 
 
 class AroundBowl(WorkpiecePath):

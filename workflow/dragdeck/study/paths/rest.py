@@ -2,14 +2,14 @@
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Any, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, field_validator
 
 from dragdeck.study.base import Json, Number, Positive
 from dragdeck.study.drive import Drive, EngineMotion, Floats, Orientation, StepCounts
-from dragdeck.study.paths.path import AroundBowl
+from dragdeck.study.paths.path import AroundBowl, StartAngle
 
 
 class RestPath(AroundBowl):
@@ -17,6 +17,8 @@ class RestPath(AroundBowl):
 
     Seen from the bowl, the workpiece goes round against the rotation.
     """
+
+    one_direction: ClassVar[bool] = True
 
     kind: Literal["rest"] = Field(
         description="rest: the workpiece stands still and the bowl rotates"
@@ -26,11 +28,7 @@ class RestPath(AroundBowl):
         description="rotational speed of the bowl, 1/min; positive: counter-clockwise seen from "
         "above"
     )
-    start_deg: Number = Field(
-        default=0.0,
-        description="polar angle of the start of the path about the bowl's axis, from +x, degrees",
-        exclude_if=lambda value: value == 0,
-    )
+    start_deg: StartAngle = 0.0
     revolutions: Positive = Field(
         default=1.0, description="length of the drag in revolutions of the bowl"
     )
@@ -81,14 +79,6 @@ class RestPath(AroundBowl):
         """None."""
         return 0.0, 0.0, 0.0
 
-    def turns(self, orientation: Orientation) -> bool:
-        """It stands still."""
-        return False
-
-    def keeps_direction(self, orientation: Orientation) -> bool:
-        """It has one direction."""
-        return True
-
     def places(self, drive: Drive, since: StepCounts, begun: Floats) -> Floats:
         """Where it begins."""
         return np.tile(begun, (len(since), 1))
@@ -96,10 +86,6 @@ class RestPath(AroundBowl):
     def directions(self, drive: Drive, since: StepCounts, ref_xy_m: Floats) -> Floats:
         """The same at all times."""
         return np.full(len(ref_xy_m), self.direction_rad)
-
-    def velocity(self, drive: Drive, since: StepCounts, point_m: Floats, ref_m: Floats) -> Floats:
-        """None."""
-        return np.zeros_like(point_m)
 
     def on_engine(self, drive: Drive) -> EngineMotion:
         """No motion."""

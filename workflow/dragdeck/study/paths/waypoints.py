@@ -29,7 +29,7 @@ from dragdeck.study.drive import (
     stage_at,
     wrap_angle,
 )
-from dragdeck.study.paths.path import Point, Vector, WorkpiecePath, as_rows, turned
+from dragdeck.study.paths.path import Vector, WorkpiecePath, as_rows, turned
 
 MOST_POINTS = 100
 
@@ -163,19 +163,9 @@ class WaypointsPath(WorkpiecePath):
         return self.fraction * sum(math.hypot(*shift) for _, *shift in self._stretches())
 
     @property
-    def start_point(self) -> Point:
-        """The first waypoint."""
-        return self.points[0][1:3]
-
-    @property
     def direction_rad(self) -> float:
         """That of the first stretch that is not vertical or a pause."""
         return next(math.atan2(y, x) for _, x, y, _ in self._stretches() if x or y)
-
-    @property
-    def start_height_m(self) -> float:
-        """That of the first waypoint."""
-        return self.points[0].z_m
 
     @property
     def own_speed_m_s(self) -> float:
@@ -208,10 +198,6 @@ class WaypointsPath(WorkpiecePath):
         points = [point._replace(time_s=point.time_s / factor) for point in self.points]
         return self.model_copy(update={"points": points})
 
-    def with_length(self, length_m: float) -> Self:
-        """The fraction that has this length at the mean speed."""
-        return self.model_copy(update={"fraction": self.fraction * length_m / self.path_length_m})
-
     # --- as a run drives it --------------------------------------------------------------------
 
     def place(self, share: Any) -> tuple[Any, Any, Any]:
@@ -243,14 +229,12 @@ class WaypointsPath(WorkpiecePath):
         """The stretches in whole steps; each ends where it should."""
         pace = drive.full_speed_m_s / self.own_speed_m_s
         ends = [(point.time_s - self.points[0].time_s) / pace for point in self.points[1:]]
-        rates = [
-            [(end, pace * shift / s) for end, (s, shift) in zip(ends, axis, strict=True)]
-            for axis in ([(s, one[axis]) for s, *one in self._stretches()] for axis in range(3))
-        ]
+        stretches = zip(ends, self._stretches(), strict=True)
+        rates = [(end, pace * np.array(shift) / time) for end, (time, *shift) in stretches]
         found = []
         for count, begin, end in in_steps(ends, drive.steps, drive.timestep_s):
-            moved = (integral(rate, end) - integral(rate, begin) for rate in rates)
-            x, y, z = (shift / (count * drive.timestep_s) for shift in moved)
+            moved = integral(rates, end) - integral(rates, begin)
+            x, y, z = (moved / (count * drive.timestep_s)).tolist()
             found.append(
                 DrivenStage(count, (x, y, z), self._turned(begin * pace, end * pace, drive))
             )
@@ -291,30 +275,24 @@ class WaypointsPath(WorkpiecePath):
     def places(self, drive: Drive, since: StepCounts, begun: Floats) -> Floats:
         """As far as its stages take it."""
         timestep, stages = drive.full_duration_s / drive.steps, self.stages(drive)
-        ends = [end * timestep for end in accumulate(stage.steps for stage in stages)]
-        moved = (
-            integral(
-                [(end, one.velocity_m_s[axis]) for end, one in zip(ends, stages, strict=True)], time
-            )
-            for time in drive.time_s(since)
-            for axis in range(3)
-        )
-        return np.asarray(begun + np.array(list(moved)).reshape(-1, 3))
+        ends = (end * timestep for end in accumulate(stage.steps for stage in stages))
+        velocities = (np.array(stage.velocity_m_s) for stage in stages)
+        rates = list(zip(ends, velocities, strict=True))
+        moved = [integral(rates, time) for time in drive.time_s(since)]
+        return np.asarray(begun + np.reshape(moved, (-1, 3)))
 
     def own(self, drive: Drive, since: StepCounts) -> Floats | None:
         """The rotations of its stages, one after another."""
         if not self._inclined(drive):
             return None
         stages = self.stages(drive)
-        begun, before = [np.eye(3)], [0]
-        for stage in stages:
-            begun.append(by_vector(np.array(stage.rotation_rad)) @ begun[-1])
-            before.append(before[-1] + stage.steps)
-        number = _at(stages, since)
-        vectors = np.array([stage.rotation_rad for stage in stages])[number]
-        lengths = np.array([stage.steps for stage in stages])[number]
-        done = np.clip((since - np.array(before)[number]) / lengths, 0.0, 1.0)
-        return np.asarray(by_vector(done[:, None] * vectors) @ np.array(begun)[number])
+        number, lengths = _at(stages, since), np.array([stage.steps for stage in stages])
+        vectors = np.array([stage.rotation_rad for stage in stages])
+        turns = map(by_vector, vectors)
+        begun = accumulate(turns, lambda before, turn: turn @ before, initial=np.eye(3))
+        starts = np.cumsum(lengths) - lengths
+        done = np.clip((since - starts[number]) / lengths[number], 0.0, 1.0)
+        return np.asarray(by_vector(done[:, None] * vectors[number]) @ np.array([*begun])[number])
 
     def directions(self, drive: Drive, since: StepCounts, ref_xy_m: Floats) -> Floats:
         """That of the stage; in a vertical one or a pause, the last direction before."""

@@ -41,11 +41,6 @@ class SuperposedMotion(Model):
         """What it adds at most to the speed of a surface point of a workpiece of this radius."""
 
     @property
-    def horizontal_reach_m(self) -> float:
-        """How far it takes the workpiece aside from its path."""
-        return 0.0
-
-    @property
     def vertical_reach_m(self) -> float:
         """How far it takes the workpiece below, and above, its path."""
         return 0.0

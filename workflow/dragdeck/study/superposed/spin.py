@@ -69,15 +69,12 @@ class Spin(SuperposedMotion):
 
     def faster(self, factor: float) -> Self:
         """The spin at that factor, its stages as much shorter."""
-        ramp = self.ramp_s / factor
-        if self.schedule is None:
-            rpm = factor * self._stages()[0].rpm
-            return self.model_copy(update={"rpm": rpm, "ramp_s": ramp})
         stages = [
-            SpinStage(until_s=stage.until_s / factor, rpm=factor * stage.rpm)
-            for stage in self.schedule
+            one.model_copy(update={"until_s": one.until_s / factor, "rpm": factor * one.rpm})
+            for one in self._stages()
         ]
-        return self.model_copy(update={"schedule": stages, "ramp_s": ramp})
+        spin = {"rpm": stages[0].rpm} if self.schedule is None else {"schedule": stages}
+        return self.model_copy(update={**spin, "ramp_s": self.ramp_s / factor})
 
     def surface_speed_m_s(self, radius_m: float) -> float:
         """Circumferential speed."""
@@ -113,7 +110,7 @@ class Spin(SuperposedMotion):
         angle = self.turn(drive, since)
         if not drive.tilt_deg:
             return Rotation(before.turn_rad + angle, before.own)
-        return Rotation(before.turn_rad, by_vector(angle[:, None] * _axis(drive)))
+        return Rotation(before.turn_rad, by_vector(angle[:, None] * drive.own_axis))
 
     def velocity(self, drive: Drive, since: StepCounts, arm_m: Floats, before: Rotation) -> Floats:
         """The rate of the stage that a step belongs to, cross the arm."""
@@ -123,7 +120,7 @@ class Spin(SuperposedMotion):
         rate = rate * self.begin(drive).pace(since)
         if not drive.tilt_deg:
             return about_vertical(rate, arm_m)
-        axis = before.out_of(np.tile(_axis(drive), (len(since), 1)))
+        axis = before.out_of(np.tile(drive.own_axis, (len(since), 1)))
         return np.cross(rate[:, None] * axis, arm_m)
 
     def on_engine(self, drive: Drive, heading: str | float) -> EngineMotion:
@@ -144,12 +141,6 @@ class Spin(SuperposedMotion):
         return super().entry(drive) | {"stages": stages} | tilt
 
 
-def _axis(drive: Drive) -> Floats:
-    """Axis of a tilted workpiece in the frame of its front, (3,)."""
-    tilt = math.radians(drive.tilt_deg)
-    return np.array([math.sin(tilt), 0.0, math.cos(tilt)])
-
-
 def _about_own_axis(drive: Drive, heading: str | float, rates: dict[str, str]) -> EngineMotion:
     """A rotation with the last of some rates about the axis of the workpiece.
 
@@ -160,7 +151,7 @@ def _about_own_axis(drive: Drive, heading: str | float, rates: dict[str, str]) -
     omega = [*rates][-1]
     if not drive.tilt_deg:
         return EngineMotion({"": rotating(omega)}, rates)
-    sine, _, cosine = _axis(drive).tolist()
+    sine, _, cosine = drive.own_axis.tolist()
     if isinstance(heading, float):
         x, y = sine * math.cos(heading), sine * math.sin(heading)
         axis = f"{x!r} {y!r} {cosine!r}"
