@@ -233,9 +233,8 @@ def _columns(names: Sequence[str], found: Mapping[str, object]) -> dict[str, obj
 
 
 def _measured(run: PointRun) -> Row | None:
-    if run.case is None or not run.measurable:
-        return None
-    return MEASURES[run.point.regime].row(run, run.case)
+    ended = run.ended
+    return MEASURES[run.point.regime].row(run, ended) if ended else None
 
 
 def _height_scatter(runs: Sequence[PointRun], measured: Sequence[Row | None]) -> float:

@@ -1,7 +1,7 @@
 """What is measured of a run of the map: contacts, energy, and deviations from the fine step."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -14,17 +14,21 @@ from dragchain.arrays import Floats, Ints
 from dragchain.errors import TableError
 from dragchain.run.case import friction_with
 from dragchain.run.kinematics import drag_phase, needed
-from dragchain.run.run_parts import iter_frames, iter_prints
 from dragchain.statistics.correlated import estimate_mean
 from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate
-from dragchain.tables.network_contacts import KINDS, contact_rows
+from dragchain.tables.network_contacts import contact_rows
 from dragchain.tables.run_folder import Run
 from dragchain.tables.workpiece_contacts import WorkpieceFrames
 from dragchain.tables.write import workpiece_force_rows
 from dragdeck.decks import CASE_FILE
 from dragdeck.decks.outputs import load_outputs
-from dragdeck.dumps.frame import Columns, Frame
-from dragdeck.physics.contact_mechanics import damping_ratio, largest_eigenvalue, sphere_mass
+from dragdeck.dumps.frame import Frame
+from dragdeck.physics.contact_mechanics import (
+    damping_ratio,
+    fall_energy,
+    largest_eigenvalue,
+    sphere_mass,
+)
 from dragdeck.records.case import CaseOfRun
 from dragdeck.records.run import RunRecord
 from evidence.stability.points import Point, PointsFile
@@ -71,14 +75,6 @@ class PointRun:
         """How its bodies meet; None outside single impacts."""
         return self.case.impact if isinstance(self.case, ImpactCase) else None
 
-    def frames(self, name: str) -> Iterator[Frame]:
-        """Frames of a dump."""
-        return iter_frames(self.folder, load_outputs(self.folder)[name])
-
-    def prints(self, name: str) -> Iterator[Columns]:
-        """Blocks of rows of a ``fix print`` output."""
-        return iter_prints(self.folder, load_outputs(self.folder)[name])
-
     @cached_property
     def record(self) -> RunRecord | None:
         """How the run ended; None of a point that was not run.
@@ -114,6 +110,13 @@ class PointRun:
             return False
         failed = {check.code for check in self.record.failed_checks}
         return self.record.complete or set() < failed <= {"neighbour_builds", "stable_timestep"}
+
+    @property
+    def ended(self) -> Run | None:
+        """The run folder; None of a run that did not come to its end."""
+        if self.case is None or not self.measurable:
+            return None
+        return Run(self.folder, self.case, load_outputs(self.folder))
 
 
 def read_points(lists: Sequence[Path]) -> list[PointRun]:
@@ -224,12 +227,8 @@ PARTNERS = ("particle", "bowl", "workpiece")
 
 PARTICLE, BOWL, WORKPIECE = range(len(PARTNERS))
 
-_PARTNER = {
-    "particle-particle": PARTICLE,
-    "particle-workpiece": WORKPIECE,
-    "particle-floor": BOWL,
-    "particle-side": BOWL,
-}
+_PARTNERS = np.array([PARTICLE, WORKPIECE, BOWL, BOWL])
+"""Partners in the contacts of `KINDS`."""
 
 
 @dataclass(frozen=True)
@@ -341,29 +340,27 @@ _LAST_SAMPLES = 50
 """Samples at the end of a resting bed's run whose mean energy counts: a quarter of them."""
 
 
-def _measure_settled(point: PointRun, case: CaseOfRun) -> Row:
+def _measure_settled(point: PointRun, run: Run) -> Row:
     """A bed that settled, and its largest kinetic energy while it did."""
-    *_, last = point.frames("particles")
+    *_, last = run.frames("particles")
     return {
-        **_bed(point, case, last),
+        **_bed(point, run.case, last),
         "height_m": float(last.columns["z_m"].mean()),
-        "peak_energy_j": float(_bed_energy(point).max()),
+        "peak_energy_j": float(_bed_energy(run).max()),
     }
 
 
-def _measure_resting(point: PointRun, case: CaseOfRun) -> Row:
+def _measure_resting(point: PointRun, run: Run) -> Row:
     """A bed at rest, and its kinetic energy at the end over N m g d.
 
     Its contacts are those before the step under test begins.
     """
-    first, *_, last = point.frames("particles")
-    media = case.media
-    mass = sphere_mass(media.radius_mean_m, media.density_kg_m3)
-    unit = media.count * mass * case.gravity_m_s2 * 2.0 * media.radius_mean_m
+    first, *_, last = run.frames("particles")
+    unit = _fall_energy(run.case, run.case.media.count)
     return {
-        **_bed(point, case, first),
+        **_bed(point, run.case, first),
         "height_m": float(last.columns["z_m"].mean()),
-        "rest_energy_ratio": float(_bed_energy(point)[-_LAST_SAMPLES:].mean()) / unit,
+        "rest_energy_ratio": float(_bed_energy(run)[-_LAST_SAMPLES:].mean()) / unit,
     }
 
 
@@ -376,9 +373,14 @@ def _bed(point: PointRun, case: CaseOfRun, frame: Frame) -> Row:
     }
 
 
-def _bed_energy(point: PointRun) -> Floats:
+def _fall_energy(case: CaseOfRun, particles: int) -> float:
+    media = case.media
+    return fall_energy(particles, media.density_kg_m3, media.radius_mean_m, case.gravity_m_s2)
+
+
+def _bed_energy(run: Run) -> Floats:
     """Kinetic energy with that of the spins over time, J."""
-    blocks = point.prints("thermo")
+    blocks = run.prints("thermo")
     return np.concatenate(
         [rows["kinetic_energy_j"] + rows["rotational_energy_j"] for rows in blocks]
     )
@@ -403,11 +405,11 @@ def _resting_energy(own: Row, fine: Row | None) -> float | None:
 # --- impacts, met at different moments within a step -------------------------------------------
 
 
-def _measure_impacts(point: PointRun, case: CaseOfRun) -> Row:
+def _measure_impacts(point: PointRun, run: Run) -> Row:
     """Mean, smallest and largest of the impacts of a run; speeds are over that of the impact."""
     impact = needed(point.impact, "impact")
     plate = impact.size_ratio == 0.0
-    frames = [_in_id_order(frame) for frame in point.frames("particles")]
+    frames = [_in_id_order(frame) for frame in run.frames("particles")]
     first, last = frames[0], frames[-1]
     striking = slice(None) if plate else slice(0, None, 2)
     velocity = last.vectors("vx_m_s", "vy_m_s", "vz_m_s")
@@ -416,7 +418,7 @@ def _measure_impacts(point: PointRun, case: CaseOfRun) -> Row:
     force = np.stack([np.linalg.norm(vectors, axis=1) for vectors in forces])
     overlap = max(float(_overlap(frame, plate).max()) for frame in frames)
     before, after = (
-        _energy(frame, case.media.density_kg_m3).reshape(-1, 1 if plate else 2).sum(axis=1)
+        _energy(frame, run.case.media.density_kg_m3).reshape(-1, 1 if plate else 2).sum(axis=1)
         for frame in (first, last)
     )
     deepest = Contacts(
@@ -430,7 +432,7 @@ def _measure_impacts(point: PointRun, case: CaseOfRun) -> Row:
     peaks = _spread("peak_force", force.max(axis=0))
     return {
         "overlap_ratio": overlap / float(_radii(first).min()),
-        "frequency_rad_s": network_frequency(case, point.sticks, bodies, deepest, effective),
+        "frequency_rad_s": network_frequency(run.case, point.sticks, bodies, deepest, effective),
         **_spread("restitution", speed[:, 2] / impact.normal_speed_m_s),
         **peaks,
         "peak_force_n": peaks["peak_force_mean"],
@@ -487,14 +489,13 @@ _NETWORK_FRAMES = 8
 """Frames of a reference whose networks are looked at; the stiffest counts."""
 
 
-def _measure_drag(point: PointRun, case: CaseOfRun) -> Row:
+def _measure_drag(point: PointRun, run: Run) -> Row:
     """Mean force along the motion with the half-width of its interval, and the energy.
 
     The half-width is infinite if it is not to be relied on. ``motion_ratio`` is the median kinetic
     energy without spin, over that of all particles moving as the workpiece and one as after a
     fall through its diameter.
     """
-    run = Run.open(point.folder)
     blocks = [workpiece_force_rows(rows, run.case) for rows in run.prints("workpiece_force")]
     drag, counted = (
         np.concatenate([np.asarray(block[name]) for block in blocks])
@@ -503,7 +504,7 @@ def _measure_drag(point: PointRun, case: CaseOfRun) -> Row:
     mean = estimate_mean(drag[counted])
     speed = point.point.number("workpiece_speed_m_s")
     return {
-        **_drag_contacts(point, run, case),
+        **_drag_contacts(point, run),
         "drag_mean_n": mean.mean,
         "drag_half_width_n": mean.ci95_high - mean.mean if mean.reliable else math.inf,
         "motion_ratio": _median_motion_j(run) / _usual_motion_j(run.case, speed),
@@ -522,11 +523,10 @@ def _median_motion_j(run: Run) -> float:
 def _usual_motion_j(case: CaseOfRun, speed_m_s: float) -> float:
     media = case.media
     mass = sphere_mass(media.radius_mean_m, media.density_kg_m3)
-    thrown = mass * case.gravity_m_s2 * 2.0 * media.radius_mean_m
-    return media.count * 0.5 * mass * speed_m_s**2 + thrown
+    return media.count * 0.5 * mass * speed_m_s**2 + _fall_energy(case, 1)
 
 
-def _drag_contacts(point: PointRun, run: Run, case: CaseOfRun) -> Row:
+def _drag_contacts(point: PointRun, run: Run) -> Row:
     """Largest overlap of the drag, and frequency of the stiffest of some frames."""
     particles = {frame.step: frame for frame in run.frames("particles")}
     pairs = {frame.step: frame for frame in run.frames("contacts")}
@@ -542,7 +542,7 @@ def _drag_contacts(point: PointRun, run: Run, case: CaseOfRun) -> Row:
         contacts = _engine_contacts(frame, pairs[on_workpiece.step], workpiece, run.case)
         largest = max(largest, contacts.overlap_ratio(_radii(frame)))
         if on_workpiece.step in some:
-            own = network_frequency(case, point.sticks, _radii(frame), contacts)
+            own = network_frequency(run.case, point.sticks, _radii(frame), contacts)
             frequency = max(frequency, own)
     return {"overlap_ratio": largest, "frequency_rad_s": frequency}
 
@@ -557,11 +557,10 @@ def _engine_contacts(
     ids = np.asarray(frame.columns["particle_id"], dtype=np.int64)
     a = np.searchsorted(ids, rows.a_id)
     b = np.where(rows.b_id > 0, np.searchsorted(ids, rows.b_id), -1)
-    partner = np.array([_PARTNER[kind] for kind in KINDS])[rows.kind]
     towards = rows.point_m - _centres(frame)[a]
     normal = towards / np.linalg.norm(towards, axis=1, keepdims=True)
     hit = rows.overlap_m > 0.0
-    return Contacts(a[hit], b[hit], partner[hit], normal[hit], rows.overlap_m[hit])
+    return Contacts(a[hit], b[hit], _PARTNERS[rows.kind[hit]], normal[hit], rows.overlap_m[hit])
 
 
 def _drag_errors(own: Row, fine: Row) -> dict[str, Estimate]:
@@ -592,7 +591,7 @@ class Measure(NamedTuple):
         Ratio of energies of a row and that of the fine step; None where that is needed.
     """
 
-    row: Callable[[PointRun, CaseOfRun], Row]
+    row: Callable[[PointRun, Run], Row]
     errors: Callable[[Row, Row], dict[str, Estimate]]
     energy_ratio: Callable[[Row, Row | None], float | None]
 

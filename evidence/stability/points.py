@@ -110,11 +110,6 @@ class Point(Part):
         """The run's folder in the results."""
         return f"{self.regime}/{self.name}"
 
-    @property
-    def packing(self) -> str:
-        """What a column or a drag starts from."""
-        return str(self.settings.get("packing", "bed"))
-
     def number(self, name: str) -> float:
         """A setting that is a number."""
         return float(self.settings[name])
@@ -151,26 +146,20 @@ def load_points(file: Path, regime: str) -> list[Point]:
     InputError
         The file is no such map, or lacks the regime.
     """
-    design = _Regime.read(file, regime)
+    design, known = _Regime.read(file, regime), dict[str, Point]()
     try:
-        return list(_points(design, regime))
+        for axis, settings in design.conditions():
+            if axis != "base" and settings == design.base:
+                continue
+            condition = _digest({"regime": regime, **settings})
+            shared = {"regime": regime, "axis": axis, "condition": condition, "settings": settings}
+            for fraction, reference in design.steps():
+                own = {"fraction": fraction, "reference": reference}
+                point = Point.model_validate({**shared, **own})
+                known.setdefault(point.name, point)
     except ValidationError as error:
         raise explained(error, file) from None
-
-
-def _points(design: _Regime, regime: str) -> Iterator[Point]:
-    known: dict[str, Point] = {}
-    for axis, settings in design.conditions():
-        if axis != "base" and settings == design.base:
-            continue
-        for fraction, reference in design.steps():
-            own = {"settings": settings, "fraction": fraction, "reference": reference}
-            condition = _digest({"regime": regime, **settings})
-            point = Point.model_validate(
-                {"regime": regime, "axis": axis, "condition": condition, **own}
-            )
-            known.setdefault(point.name, point)
-    yield from known.values()
+    return list(known.values())
 
 
 # --- the beds that columns and drags start from ----------------------------------------------
@@ -184,7 +173,7 @@ def bed_settings(map_file: Path) -> dict[str, Settings]:
         for regime in ("column", "drag")
         if regime in known
         for point in load_points(map_file, regime)
-        if point.packing == "bed"
+        if point.settings.get("packing", "bed") == "bed"
     ]
     return {bed_name(point.settings): _bed(point.settings) for point in points}
 

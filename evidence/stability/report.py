@@ -118,6 +118,9 @@ COLOURS = {
 """Of the classes."""
 
 _LETTERS = {STABLE: "", INACCURATE: "i", OVERLAP: "o", ENERGY: "e", LOST: "L", REFUSED: "x"}
+_CRITICAL = {"-": "critical step of the contact network", ":": "critical step, damped"}
+"""Lines of the maps."""
+
 _TITLES = {
     "impact": "Single impacts ({} per run, at different phases within a time step)",
     "settle": "Settling of {} particles in a bowl",
@@ -162,7 +165,8 @@ def _map(points: pd.DataFrame, conditions: pd.DataFrame, title: str) -> Figure:
         column = int(np.searchsorted(steps, point["fraction"]))
         _cell(axes, column, lines.index(point["condition"]), point["class"])
     for line, condition in enumerate(conditions.to_dict("records")):
-        for fraction, style in ((1.0, "-"), (condition["damped_fraction"], ":")):
+        fractions = 1.0, condition["damped_fraction"]
+        for fraction, style in zip(fractions, _CRITICAL, strict=True):
             _mark(axes, line, condition["critical_over_rayleigh"] * fraction, steps, style)
     axes.set(xlim=(-0.5, len(steps) - 0.5))
     axes.set_xticks(range(len(steps)), [f"{100 * step:g}" for step in steps])
@@ -173,10 +177,7 @@ def _map(points: pd.DataFrame, conditions: pd.DataFrame, title: str) -> Figure:
     axes.tick_params(length=0)
     axes.tick_params("y", labelsize=7.5)
     _class_keys(axes, points, _LETTERS)
-    for name, style in (
-        ("critical step of the contact network", "-"),
-        ("critical step, damped", ":"),
-    ):
+    for style, name in _CRITICAL.items():
         key(axes, name, marker="", ls=style, color=INK, lw=1.6)
     return legend_below(figure)
 

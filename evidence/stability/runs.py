@@ -7,6 +7,7 @@ from pathlib import Path
 
 import jinja2
 
+from dragdeck.cases.bed import particle_material
 from dragdeck.cases.case import Case
 from dragdeck.decks import PACKING_FILE
 from dragdeck.decks.deck import AnyScene
@@ -14,6 +15,7 @@ from dragdeck.decks.templates import environment
 from dragdeck.engine.batch import Batch
 from dragdeck.engine.reports import Report, say
 from dragdeck.errors import InputError
+from dragdeck.physics.packing import Bed
 from dragdeck.project import find_project
 from dragdeck.scenes.filling import filling_scene
 from dragdeck.scenes.process import process_scene
@@ -51,22 +53,18 @@ def point_case(base: Case, settings: Settings, fraction: float) -> Case:
     """
     study = base.study
     pair = {"restitution": settings["restitution"], "friction": settings["friction"]}
-    particles = study.materials[study.media.material]
-    fidelity = study.chosen_fidelity().model_copy(
-        update={
-            "youngs_modulus_scale": (
-                float(settings["youngs_modulus_pa"]) / particles.youngs_modulus_pa
-            ),
-            "timestep_fraction": fraction,
-            "filling_timestep_fraction": fraction,
-            "speed_factor": 1.0,
-            "ranks": 1,
-        }
-    )
+    modulus, own = float(settings["youngs_modulus_pa"]), particle_material(study).youngs_modulus_pa
+    fidelity = {
+        "youngs_modulus_scale": modulus / own,
+        "timestep_fraction": fraction,
+        "filling_timestep_fraction": fraction,
+        "speed_factor": 1.0,
+        "ranks": 1,
+    }
     speed = settings.get("workpiece_speed_m_s")
     changes = {
         "pairs": {name: old.model_copy(update=pair) for name, old in study.pairs.items()},
-        "fidelity": fidelity,
+        "fidelity": study.chosen_fidelity().model_copy(update=fidelity),
         "motion": study.motion if speed is None else _motion(study, float(speed)),
     }
     return Case(base.file, {}, study.model_copy(update=changes))
@@ -141,39 +139,26 @@ class MapRuns:
 
     def _scene(self, point: Point) -> Callable[[], AnyScene]:
         """What makes the scene of a point; the bed of a drag has to be there before."""
-        make = {"impact": _impact, "settle": _settle, "column": _column}.get(point.regime)
-        if make is not None:
-            return partial(make, self.base, point)
-        folder = self.results / "filling" / bed_name(point.settings)
-        bed = read_bed(folder / "tables" / "packing.json")
-
-        def drag() -> AnyScene:
-            scene = process_scene(_case(self.base, point), bed)
-            source = f"../../filling/{folder.name}/{PACKING_FILE}"
-            return replace(scene, deck=replace(scene.deck, source=source))
-
-        return drag
+        bed = None
+        if point.regime == "drag":
+            folder = self.results / "filling" / bed_name(point.settings)
+            bed = read_bed(folder / "tables" / "packing.json")
+        return partial(_scene_of, point, self.base, bed)
 
 
-def _case(base: Case, point: Point) -> Case:
-    return point_case(base, point.settings, point.fraction)
-
-
-def _impact(base: Case, point: Point) -> AnyScene:
-    how = ImpactSettings(*map(point.number, ("speed_m_s", "angle_deg", "size_ratio")))
-    return impact_scene(_case(base, point), point.name, how, point.fraction)
-
-
-def _settle(base: Case, point: Point) -> AnyScene:
-    return filling_scene(_case(base, point))
-
-
-def _column(base: Case, point: Point) -> AnyScene:
-    load = LoadedPacking.model_validate(
-        {"packing": point.packing, "load_factor": point.number("load_factor")}
-    )
-    bed = bed_name(point.settings)
-    return column_scene(_case(base, point), point.name, load, point.fraction, bed)
+def _scene_of(point: Point, base: Case, bed: Bed | None) -> AnyScene:
+    case, source = point_case(base, point.settings, point.fraction), bed_name(point.settings)
+    if point.regime == "impact":
+        how = ImpactSettings(*map(point.number, ("speed_m_s", "angle_deg", "size_ratio")))
+        return impact_scene(case, point.name, how, point.fraction)
+    if point.regime == "settle":
+        return filling_scene(case)
+    if point.regime == "column":
+        load = LoadedPacking.model_validate({"packing": "bed", **point.settings})
+        return column_scene(case, point.name, load, point.fraction, source)
+    scene = process_scene(case, bed)
+    deck = replace(scene.deck, source=f"../../filling/{source}/{PACKING_FILE}")
+    return replace(scene, deck=deck)
 
 
 def map_runs(study_file: Path, results: Path, templates: Path, report: Report) -> MapRuns:
