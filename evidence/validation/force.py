@@ -9,20 +9,24 @@ from pydantic import JsonValue
 from scipy import signal, stats
 
 from dragchain.arrays import Floats
-from dragchain.drag import find_drag_peaks, peak_separation_s, read_counted
+from dragchain.drag import (
+    FORCES,
+    find_drag_peaks,
+    peak_separation_s,
+    read_counted,
+    summarise_forces,
+)
 from dragchain.loading.contact_events import Thresholds
 from dragchain.loading.document import FILE, ContactType, Loading
 from dragchain.run.kinematics import drag_start_s
 from dragchain.run.reference import reference_drags
 from dragchain.statistics.bed_effects import fit_effects
-from dragchain.statistics.correlated import MeanEstimate, estimate_mean
+from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import Estimate, Real
 from dragchain.tables.by_step import read_table
 from dragdeck.documents import Part
 from dragdeck.records.case import CaseOfRun
 from evidence.validation.runs import MeasuredRun, RunsByBed, packing_mean
-
-_COMPONENTS = ("drag_n", "lateral_n", "vertical_n")
 
 _PROMINENCES = (0.5, 1.0, 2.0)
 """Least prominence of a peak in standard deviations of the drag; the middle one is the rule."""
@@ -142,7 +146,7 @@ def force_of_packings(packings: Sequence[MeasuredRun]) -> Force:
     rows = [_packing_force(run) for run in packings]
     return Force(
         packings=tuple(rows),
-        together={name: _together([getattr(row, name) for row in rows]) for name in _COMPONENTS},
+        together={name: _together([getattr(row, name) for row in rows]) for name in FORCES},
         alike=_alike([row.drag_n for row in rows]),
         peaks=_peaks(packings),
         spectrum=spectrum(packings),
@@ -150,8 +154,7 @@ def force_of_packings(packings: Sequence[MeasuredRun]) -> Force:
 
 
 def _packing_force(run: MeasuredRun) -> PackingForce:
-    samples, own = read_counted(run.folder, _COMPONENTS), run.measures
-    forces = {name: estimate_mean(samples[name].to_numpy()) for name in _COMPONENTS}
+    forces, own = summarise_forces(read_counted(run.folder, FORCES)), run.measures
     numbers = {"seed": run.seed, "bed_height_m": own.single["bed_height"]}
     return PackingForce.model_validate({**dict(own), **dict(own.cost), **numbers, **forces})
 
@@ -243,9 +246,7 @@ def compare_drag(drag: Together, case: CaseOfRun) -> tuple[Compared, ...]:
     """Mean and standard deviation of the drag beside every reference figure of the study."""
     return tuple(
         Compared(
-            label=reference.label,
-            mean_n=reference.mean_n,
-            std_n=reference.std_n,
+            **vars(reference),
             difference=reference.difference(drag.mean),
             std_ratio=drag.std.over(reference.std_n) if reference.std_n else None,
         )

@@ -423,7 +423,8 @@ def _difference(runs: Sequence[ChainSeries], shifts: Ints, name: str) -> PeakTes
     by_shift = [standardised(one, mean) for one, mean in zip(series, means, strict=True)]
     at_peaks, expected = _mean([mean[:1] for mean in means]), _mean(series)
     found = shift_test(by_shift, shifts)
-    return _test(name, DESCRIPTORS[name], at_peaks, expected, found)
+    names = {"test": name, "statement": DESCRIPTORS[name]}
+    return _test(found, **names, at_peaks=at_peaks, expected=expected)
 
 
 def _fraction(
@@ -435,22 +436,13 @@ def _fraction(
         for run, own, others in events
     ]
     found = shift_test(by_shift, shifts)
-    return _test(statement, statement, found.value, _mean(by_shift), found)
+    names = {"test": statement, "statement": statement}
+    return _test(found, **names, at_peaks=found.value, expected=_mean(by_shift))
 
 
-def _test(
-    name: str, statement: Statement, at_peaks: float, expected: float, found: ShiftTest
-) -> PeakTest:
-    return PeakTest(
-        test=name,
-        statement=statement,
-        at_peaks=at_peaks,
-        expected=expected,
-        effect=found.value,
-        ci95_low=found.ci95_low,
-        ci95_high=found.ci95_high,
-        p=found.p_greater,
-    )
+def _test(found: ShiftTest, **known: str | float) -> PeakTest:
+    numbers = {**vars(found), "effect": found.value, "p": found.p_greater}
+    return PeakTest.model_validate({**known, **numbers})
 
 
 def _mean(series: Sequence[Floats]) -> float:
@@ -461,7 +453,5 @@ def _mean(series: Sequence[Floats]) -> float:
 
 def near_any(time_s: Floats, events_s: Floats, reach_s: float) -> NDArray[np.bool_]:
     """Which times lie within `reach_s` of an event."""
-    if not len(events_s):
-        return np.zeros(time_s.shape, dtype=bool)
-    gaps = np.abs(time_s[:, None] - events_s[None, :]).min(axis=1)
+    gaps = np.abs(time_s[:, None] - events_s[None, :]).min(axis=1, initial=np.inf)
     return np.asarray(gaps <= reach_s)

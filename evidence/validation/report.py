@@ -248,10 +248,7 @@ def _comparison(force: Force, compared: Sequence[Compared], effects: Sequence[Ef
     rows: list[_Row] = [
         (one.label, Estimate.around(one.mean_n, 0.0), COLOURS[one.label]) for one in compared
     ]
-    for packing in force.packings:
-        own = packing.drag_n
-        estimate = Estimate(own.mean, own.ci95_low, own.ci95_high)
-        rows.append((f"packing {packing.seed}", estimate, BLUE))
+    rows += [(f"packing {one.seed}", one.drag_n.estimate, BLUE) for one in force.packings]
     rows.append(("all packings", together, "black"))
     for one in effects:
         if one.quantity == "drag_mean" and not one.field:

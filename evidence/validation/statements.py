@@ -108,8 +108,6 @@ def network(corridors: Sequence[Corridor]) -> Network:
     ahead = np.array([one.ahead for one in corridors])
     behind = np.array([one.behind for one in corridors])
     far = [one.far for one in corridors]
-    reaches = [one.half_reach for one in corridors]
-    reached = [reach for reach in reaches if reach is not None]
     ratios = (ahead.mean(axis=1) / behind.mean(axis=1)).tolist()
     at_wall = (ahead[:, -1] / np.array(far)).tolist()
     return Network(
@@ -120,9 +118,7 @@ def network(corridors: Sequence[Corridor]) -> Network:
         far_n=packing_mean(far),
         ratio=packing_mean(ratios, ratio=True),
         at_wall=packing_mean(at_wall, ratio=True),
-        half_reach_diameters=(
-            packing_mean(reached, ratio=True) if len(reached) == len(reaches) else None
-        ),
+        half_reach_diameters=_together([one.half_reach for one in corridors], ratio=True),
     )
 
 
@@ -283,7 +279,8 @@ def of_packings(packings: Sequence[MeasuredRun]) -> Statements:
     """Every number over the packings."""
     around = [contacts_of(run) for run in packings]
     numbers = {
-        name: _together([one.numbers[name] for one in around], name) for name in around[0].numbers
+        name: _together([one.numbers[name] for one in around], ratio=name in _RATIOS)
+        for name in around[0].numbers
     }
     profiles = {
         "azimuth": _profile([one.azimuth for one in around], circumference(AZIMUTH_BINS)),
@@ -295,9 +292,10 @@ def of_packings(packings: Sequence[MeasuredRun]) -> Statements:
     )
 
 
-def _together(values: Sequence[float | None], name: str) -> Estimate | None:
+def _together(values: Sequence[float | None], *, ratio: bool) -> Estimate | None:
+    """The mean over the packings; None unless every packing has the number."""
     known = [value for value in values if value is not None]
-    return packing_mean(known, ratio=name in _RATIOS) if len(known) == len(values) else None
+    return packing_mean(known, ratio=ratio) if len(known) == len(values) else None
 
 
 def _profile(curves: Sequence[Floats], edges: Floats) -> PackingProfile:

@@ -7,7 +7,7 @@ the normal rebound was narrowed afterwards, from 5 to 1 over the steps.
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Literal
@@ -191,9 +191,7 @@ def published_curve(test: str, series: str, quantity: str) -> Floats:
     they are shown and never judged.
     """
     table = _published()
-    of_it = (table["test"], table["series"], table["quantity"])
-    names = (test, series, quantity)
-    own = np.logical_and.reduce([column == name for column, name in zip(of_it, names, strict=True)])
+    own = (table[["test", "series", "quantity"]] == [test, series, quantity]).all(axis=1)
     return table[own].sort_values("x")[["x", "y"]].to_numpy(np.float64).T
 
 
@@ -239,12 +237,10 @@ def _rebounds(run: Recording) -> QuantityCheck:
 
 def _restitution(run: Recording) -> Iterator[QuantityCheck]:
     exact = _rebounds(run)
-    yield exact
+    yield replace(exact, drawn=exact.rows)
     entered = [(each.value, each.constants.restitution, each.rebound) for each in run.contacts]
-    if run.case.limit_force:
-        yield QuantityCheck("rebound_over_approach", INPUT, entered, exact.tolerance, 1.0)
-    yield QuantityCheck("rebound_over_approach", EXACT, drawn=exact.rows)
-    yield QuantityCheck("rebound_over_approach", INPUT, drawn=entered)
+    judged = entered if run.case.limit_force else ()
+    yield QuantityCheck("rebound_over_approach", INPUT, judged, exact.tolerance, 1.0, drawn=entered)
     errors = [(x, 0.0, 1e3 * (engine - reference)) for x, reference, engine in exact.rows]
     yield QuantityCheck("rebound_minus_exact", EXACT, drawn=errors)
 

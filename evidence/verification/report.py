@@ -1,7 +1,6 @@
 """The command that verifies a study's contact law: runs, tables and page of the suite."""
 
 from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any, get_args
@@ -38,7 +37,7 @@ from evidence.verification.checks import (
 )
 from evidence.verification.experiment import collide_scene
 from evidence.verification.recording import read_recording
-from evidence.verification.suite import Test, suite_file, suite_of
+from evidence.verification.suite import suite_file, suite_of
 
 _BY_SERIES = ["number", "test", "series", "quantity", "against"]
 
@@ -153,30 +152,16 @@ def counts(summary: pd.DataFrame) -> dict[str, int]:
     return {name: verdicts.count(name) for name in get_args(Verdict)}
 
 
-@dataclass(frozen=True)
-class TestSection:
-    """A test on the page.
+def _section(test: str, compared: Compared, summary: pd.DataFrame) -> Mapping[str, object]:
+    """A test on the page: comparisons with the law that the engine claims to compute, and others.
 
-    Attributes
-    ----------
-    test : Test
-    same, others : sequence of rows
-        Comparisons with the law that the engine claims to compute, and with others.
-    steps : list of int
-        Time steps in the shortest contact of its runs.
+    Its steps are the time steps in the shortest contact of its runs.
     """
-
-    test: Test
-    same: Rows
-    others: Rows
-    steps: Sequence[int]
-
-
-def _section(test: str, compared: Compared, summary: pd.DataFrame) -> TestSection:
     rows = summary[summary["test"] == test]
     same = rows["against"].isin(JUDGED)
     steps = sorted({run.case.steps_per_contact for run, _ in compared})
-    return TestSection(suite_file().tests()[test], _shown(rows[same]), _shown(rows[~same]), steps)
+    shown = {"same": _shown(rows[same]), "others": _shown(rows[~same])}
+    return {"test": suite_file().tests()[test], "steps": steps, **shown}
 
 
 _CLASSES = {"pass": "good-word", "fail": "bad-word", "agrees": "good-word", "differs": "warn"}
