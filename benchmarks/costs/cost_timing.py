@@ -12,7 +12,6 @@ from pathlib import Path
 from cost_decks import Beds, CostTemplates, TimedDecks, text_hash, with_own_blocks
 from cost_file import RoundsFile, TimedCosts, TimedVariant, Timing, base_cost, cost
 from cost_variants import BASES, Variant, standard_case, variant_case, variants
-from dragchain.tradeoff.record import processor
 from dragdeck import __version__
 from dragdeck.cases.case import Case
 from dragdeck.decks import CASE_FILE, DECK_FILE
@@ -28,7 +27,7 @@ from dragdeck.errors import EngineError, InputError, choices
 from dragdeck.files import write_text
 from dragdeck.project import study_templates
 from dragdeck.records.run import CaseFile
-from dragdeck.records.tradeoff import Machine
+from dragdeck.records.tradeoff import Machine, processor
 from dragdeck.scenes.process import process_scene
 
 SECONDS = 0.15
@@ -309,7 +308,7 @@ def _result(bench: _Bench, rows: Sequence[TimedVariant]) -> TimedCosts:
         measured=max(row.measured for row in rows),
         command=shlex.join(["python", "benchmarks/costs", *sys.argv[1:]]),
         versions={"dragdeck": __version__, "engine": bench.engine.version},
-        machine=Machine(cores=os.cpu_count(), processor=processor()),
+        machine=Machine.here(),
         load_average_before=max(row.load_average_before for row in rows),
         bases=[base_cost(base, of_base[base.name], steps_s[base.name]) for base in bench.bases],
         costs=[cost(variant, rows, steps_s) for variant in bench.variants],

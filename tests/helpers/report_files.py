@@ -13,7 +13,6 @@ from dragchain.report.findings import (
     AheadBehind,
     AzimuthProfile,
     Chains,
-    Comparison,
     DepthProfile,
     DropFindings,
     DropImpacts,
@@ -25,6 +24,7 @@ from dragchain.report.findings import (
 )
 from dragchain.report.values import EXTRAPOLATED, Extrapolated, ExtrapolatedQuantity, Need, Reached
 from dragchain.run.basis import QUANTITIES
+from dragchain.run.reference import ReferenceDrag
 from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import Estimate, EstimateColumns
 
@@ -85,7 +85,7 @@ def process_findings(drag: float = -2.5) -> ProcessFindings:
     return ProcessFindings(
         run="workpiece-1", process_time_zero_s=0.1, confidence=0.95, workpiece_frames=31,
         forces=dict.fromkeys(("drag_n", "lateral_n", "vertical_n"), force(drag)),
-        comparison=(Comparison(
+        comparison=(ReferenceDrag(
             label="experiment", mean_n=-2.59, std_n=0.66, source="a paper"),),
         peaks=Peaks(count=4, process_time_s=(), drag_n=(), largest_n=-3.9, separation_s=0.1),
         network=dict.fromkeys(network, 4.5) | {"frames": 31},

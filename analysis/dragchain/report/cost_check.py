@@ -33,25 +33,23 @@ class CostRow:
     Attributes
     ----------
     scene : str
-    steps, actual_steps : int
-    steps_per_s : float
-    actual_steps_per_s : float or None
-        None for a run too short to measure it.
-    wall_time_s, actual_wall_time_s : float
+    steps : int
+    steps_per_s, wall_time_s : float
+        Predicted.
+    record : RunRecord
+        With the actual ones.
     """
 
     scene: str
     steps: int
-    actual_steps: int
     steps_per_s: float
-    actual_steps_per_s: float | None
     wall_time_s: float
-    actual_wall_time_s: float
+    record: RunRecord
 
     @property
     def ratio(self) -> float:
         """Actual over predicted wall time."""
-        return self.actual_wall_time_s / self.wall_time_s
+        return self.record.wall_time_s / self.wall_time_s
 
 
 @dataclass(frozen=True)
@@ -109,16 +107,8 @@ def cost_rows(option: OptionEntry, records: Mapping[str, RunRecord]) -> Iterator
     """
     for scene, steps in option.steps.items():
         if scene in records:
-            record = records[scene]
-            yield CostRow(
-                scene,
-                steps,
-                record.steps,
-                option.steps_per_s[scene],
-                record.steps_per_s,
-                option.wall_time_s[scene],
-                record.wall_time_s,
-            )
+            speed, time_s = option.steps_per_s[scene], option.wall_time_s[scene]
+            yield CostRow(scene, steps, speed, time_s, records[scene])
 
 
 def answers(case: ReportedCase) -> list[Answer]:

@@ -4,8 +4,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal
 
+from dragchain.run.reference import ReferenceDrag
 from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import Estimate, EstimateColumns, Real
+from dragchain.tables.impacts import Restitution
 from dragdeck.documents import Document, Part
 
 FILE = Path("tables") / "figures.json"
@@ -17,25 +19,6 @@ FIGURES: Mapping[str, tuple[str, ...]] = {
     "drop_test": ("drop_test",),
 }
 """The figures of each scene in the order of the report; it has their captions."""
-
-
-class Comparison(Part):
-    """A published mean drag to compare with; `Values.against` has the difference.
-
-    Attributes
-    ----------
-    label : str
-        ``experiment`` or ``simulation``.
-    mean_n, std_n : float
-        Published mean and standard deviation, N; the latter is None if it is not reported.
-    source : str
-        Where it is published.
-    """
-
-    label: str
-    mean_n: float
-    std_n: float | None
-    source: str
 
 
 class Peaks(Part):
@@ -195,7 +178,7 @@ class ProcessFindings(Findings):
         Means of the columns of ``network.parquet``, and the number of ``frames``.
     wake : Wake or None
         None if the workpiece enters no wake, or if there are too few samples before or in it.
-    comparison : tuple of Comparison
+    comparison : tuple of ReferenceDrag
         One entry per published mean drag.
     peaks : Peaks
         Of the drag force.
@@ -212,7 +195,7 @@ class ProcessFindings(Findings):
     scene: Literal["process"] = "process"
     process_time_zero_s: float
     forces: Mapping[str, MeanEstimate]
-    comparison: tuple[Comparison, ...]
+    comparison: tuple[ReferenceDrag, ...]
     peaks: Peaks
     network: Mapping[str, int | Real]
     chains: Chains
@@ -240,23 +223,15 @@ class FillingFindings(Findings):
     rest_energy_ratio: float | None
 
 
-class DropRestitution(Part):
+class DropRestitution(Restitution):
     """Restitution over all impacts of a drop test.
 
     Attributes
     ----------
-    mean, lowest, highest : float
-        Over the impacts.
-    impacts : int
-        Number of impacts.
     input : float or None
         Coefficient of restitution in the input script.
     """
 
-    mean: float
-    lowest: float
-    highest: float
-    impacts: int
     input: float | None
 
 

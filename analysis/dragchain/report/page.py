@@ -16,7 +16,6 @@ import pandas as pd
 from PIL import Image
 
 from dragchain.errors import TableError
-from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import Estimate
 from dragchain.tables.parquet import write_parquet
 from dragdeck.documents import Document
@@ -101,11 +100,6 @@ def ends(estimate: Estimate) -> str:
     return f"{low} to {high}{times}"
 
 
-def mean_interval(mean: MeanEstimate) -> str:
-    """The mean of a series with its 95 % interval, see `with_interval`."""
-    return with_interval(Estimate(mean.mean, mean.ci95_low, mean.ci95_high))
-
-
 def _alike(estimate: Estimate) -> tuple[list[str], str]:
     """Value and ends with the same decimals, four digits at most, and their power of ten."""
     numbers = (estimate.value, estimate.ci95_low, estimate.ci95_high)
@@ -173,7 +167,7 @@ def page_environment(
         lstrip_blocks=True,
     )
     shared = (
-        *(number, measured, fixed, percent, fraction, interval, with_interval, mean_interval, ends),
+        *(number, measured, fixed, percent, fraction, interval, with_interval, ends),
         *(in_percent, heading_key, sections, cell),
     )
     environment.filters |= {one.__name__: one for one in shared} | dict(filters or {})

@@ -1,6 +1,6 @@
 """A run with its tables, each read once and only if it is needed, and its findings from them."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
@@ -29,7 +29,6 @@ from dragchain.report.findings import (
     AheadBehind,
     AzimuthProfile,
     Chains,
-    Comparison,
     DepthProfile,
     DropFindings,
     DropImpacts,
@@ -165,9 +164,7 @@ def process_findings(run: RunData) -> ProcessFindings:
         run=run.case.run,
         process_time_zero_s=drag_start_s(run.case),
         forces=forces,
-        comparison=tuple(
-            Comparison(**vars(reference)) for reference in reference_drags(run.case.reference)
-        ),
+        comparison=tuple(reference_drags(run.case.reference)),
         peaks=_peaks(samples, run),
         network={"frames": len(run.network)} | _means(run.network),
         chains=_chains(run.chains, len(run.network)),
@@ -270,9 +267,9 @@ def _filling(run: RunData) -> FillingFindings:
 
 def _drop(run: RunData) -> DropFindings:
     impacts = run.table("impacts")
-    ratio = effective_restitution(run.folder)
+    ratio = dict(effective_restitution(run.folder))
     return DropFindings(
         run=run.case.run,
-        restitution=DropRestitution(**asdict(ratio), input=run.case.restitution),
+        restitution=DropRestitution(**ratio, input=run.case.restitution),
         impacts=DropImpacts(**{name: impacts[name].tolist() for name in DropImpacts.model_fields}),
     )

@@ -28,7 +28,6 @@ from dragchain.figures.panels import (
 from dragchain.figures.style import BLUE, COLOURS, HALF_IN, RED, drawing, save
 from dragchain.report.findings import (
     FIGURES,
-    Comparison,
     DropFindings,
     DropImpacts,
     FillingFindings,
@@ -36,6 +35,7 @@ from dragchain.report.findings import (
 )
 from dragchain.report.run_data import RunData, write_findings
 from dragchain.run.kinematics import process_time
+from dragchain.run.reference import ReferenceDrag
 from dragchain.run.run_parts import iter_prints
 from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import Estimate
@@ -68,7 +68,7 @@ def forces_panel(axes: Axes, run: RunData, found: ProcessFindings) -> None:
     axes.set(xlabel="process time (s)", ylabel="force on the workpiece (N)", xlim=(0, time_s[-1]))
 
 
-def published_mean(axes: Axes, one: Comparison) -> None:
+def published_mean(axes: Axes, one: ReferenceDrag) -> None:
     """A published mean, dashed over what was drawn before it, with its standard deviation."""
     colour, text = COLOURS[one.label], f"{one.label} mean {one.mean_n:.2f} N"
     if one.std_n is not None:

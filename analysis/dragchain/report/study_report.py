@@ -170,11 +170,6 @@ class ShownFigure:
     uri: str
     alt: str
 
-    @property
-    def foremost(self) -> bool:
-        """Whether it comes first."""
-        return self.name == _FROM_LOADING
-
 
 @dataclass(frozen=True)
 class RunSection:
@@ -299,10 +294,13 @@ def _assumptions(study: StudyRuns) -> list[AssumptionOfRun]:
 
 
 def _pictures(run: ReportedRun[Findings]) -> list[ShownFigure]:
-    """The figures of a run; only a filling may lack one, as it may have no thermo table."""
+    """The figures of a run, that of the loading first.
+
+    Only a filling may lack one of the others, as it may have no thermo table.
+    """
     scene = run.case.scene
     found = []
-    for name in (*FIGURES[scene], *([_FROM_LOADING] if scene == "process" else [])):
+    for name in (*([_FROM_LOADING] if scene == "process" else []), *FIGURES[scene]):
         file = run.folder / "figures" / f"{name}.png"
         if (uri := file_uri(file)) is not None:
             found.append(ShownFigure(name, uri, _alt(name, run)))
@@ -393,6 +391,6 @@ def _overview(cases: Sequence[ReportedCase]) -> str:
         figure = drag_of_cases(
             [one.name for one in cases],
             [one.values.drag.shown for one in cases],
-            list(dict.fromkeys((row.label, row.mean_n) for row in rows)),
+            list(dict.fromkeys((row.reference.label, row.reference.mean_n) for row in rows)),
         )
         return data_uri(png(figure))

@@ -87,7 +87,9 @@ def _forces(forces: Mapping[str, MeanEstimate]) -> Row:
 def _comparisons(comparisons: Sequence[Against]) -> Row:
     row: Row = {}
     for one in comparisons:
-        row |= _interval(f"drag_against_{one.label}", "_percent", one.difference.over(0.01))
+        row |= _interval(
+            f"drag_against_{one.reference.label}", "_percent", one.difference.over(0.01)
+        )
     return row
 
 

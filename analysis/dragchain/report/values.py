@@ -10,7 +10,7 @@ from typing import NamedTuple
 from dragchain.loading.document import Loading
 from dragchain.report.findings import ProcessFindings
 from dragchain.run.basis import QUANTITIES, Basis, Correction, Standing, judge, notes
-from dragchain.run.reference import reference_drags
+from dragchain.run.reference import ReferenceDrag, reference_drags
 from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import Estimate, mean_of
 from dragdeck.documents import Document, Part
@@ -158,14 +158,10 @@ _PER_METRE = {
 }
 
 
-@dataclass(frozen=True)
-class Against:
+class Against(NamedTuple):
     """A published mean drag, and the relative difference of the simulated one from it."""
 
-    label: str
-    source: str
-    mean_n: float
-    std_n: float | None
+    reference: ReferenceDrag
     difference: Estimate
 
 
@@ -221,7 +217,7 @@ class Values:
     def against(self) -> list[Against]:
         """The mean drag beside the published ones."""
         return [
-            Against(one.label, one.source, one.mean_n, one.std_n, one.difference(self.drag.shown))
+            Against(one, one.difference(self.drag.shown))
             for one in reference_drags(self.case.reference)
         ]
 

@@ -1,26 +1,23 @@
 """Figures of a study's source, to set our own beside."""
 
-from dataclasses import dataclass
-
 from dragchain.errors import TableError
 from dragchain.statistics.estimate import Estimate
+from dragdeck.documents import Part
 from dragdeck.study.reference import Reference
 
 
-@dataclass(frozen=True)
-class ReferenceDrag:
-    """A mean drag of the source.
+class ReferenceDrag(Part):
+    """A published mean drag to compare with.
 
     Attributes
     ----------
     label : str
         ``experiment`` or ``simulation``.
-    mean_n : float
-        In N, not zero.
-    std_n : float or None
-        Its standard deviation in N, None if the source gives none.
+    mean_n, std_n : float
+        Published mean, not zero, and standard deviation, N; the latter is None if it is not
+        reported.
     source : str
-        Where it stands.
+        Where it is published.
     """
 
     label: str
@@ -53,5 +50,7 @@ def reference_drags(reference: Reference | None) -> list[ReferenceDrag]:
             raise TableError(
                 f"case.json: reference.{label}.drag_mean_n is 0, so no relative difference exists"
             )
-        found.append(ReferenceDrag(label, drag.drag_mean_n, drag.drag_std_n, reference.source))
+        mean_n, std_n = drag.drag_mean_n, drag.drag_std_n
+        source = reference.source
+        found.append(ReferenceDrag(label=label, mean_n=mean_n, std_n=std_n, source=source))
     return found

@@ -1,6 +1,5 @@
 """Impacts of one particle that is dropped on a plate."""
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +9,7 @@ from dragchain.arrays import Floats, Ints
 from dragchain.errors import TableError
 from dragchain.tables.by_step import read_table
 from dragchain.tables.parquet import Rows
+from dragdeck.documents import Part
 from dragdeck.dumps.frame import Columns
 
 
@@ -108,14 +108,13 @@ def _runs(mask: NDArray[np.bool_]) -> tuple[Ints, Ints]:
     return np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
 
 
-@dataclass(frozen=True)
-class Restitution:
+class Restitution(Part):
     """Restitution of all impacts of a drop.
 
     Attributes
     ----------
     mean, lowest, highest : float
-        Of the ratios of speeds.
+        Over the impacts.
     impacts : int
         Number of impacts.
     """
@@ -150,4 +149,5 @@ def effective_restitution(run_dir: Path | str) -> Restitution:
     """
     file = Path(run_dir) / "tables" / "impacts.parquet"
     ratio = read_table(file, ["restitution"])["restitution"].to_numpy()
-    return Restitution(float(ratio.mean()), float(ratio.min()), float(ratio.max()), len(ratio))
+    mean, lowest, highest = ratio.mean(), ratio.min(), ratio.max()
+    return Restitution(mean=mean, lowest=lowest, highest=highest, impacts=len(ratio))

@@ -110,25 +110,12 @@ def softness(tradeoff: Tradeoff, comparison: QuantityComparison, level: float) -
     return Softness(level, comparison.errors[nearest], str(nearest))
 
 
-@dataclass(frozen=True)
-class ModulusEffects:
-    """What a modulus does to the quantities: their labels by effect."""
-
-    level: float
-    ruined: list[str]
-    kept: list[str]
-    open: list[str]
-
-
-def modulus_effects(tradeoff: Tradeoff) -> list[ModulusEffects]:
-    """For each modulus what it ruins, what it keeps, and what the runs cannot decide."""
-    rows = [ModulusEffects(level, [], [], []) for level in modulus_levels(tradeoff)]
-    for row in rows:
-        for comparison in tradeoff.comparisons.values():
-            soft = softness(tradeoff, comparison, row.level)
-            if soft is not None:
-                getattr(row, soft.effect).append(comparison.quantity.label)
-    return rows
+def softness_by_level(tradeoff: Tradeoff) -> dict[float, dict[str, Softness | None]]:
+    """The `softness` of each quantity, by its name, for each modulus."""
+    return {
+        level: {name: softness(tradeoff, own, level) for name, own in tradeoff.comparisons.items()}
+        for level in modulus_levels(tradeoff)
+    }
 
 
 @dataclass(frozen=True)

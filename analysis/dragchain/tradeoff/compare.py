@@ -80,23 +80,16 @@ class PlanRun:
     setting : Setting
     bed : str or None
         Id of the filling.
-    values : mapping of str to float
-        Quantity to the run's value over the common path; empty if it failed.
     measures : Measures
-    further : sequence of mapping of str to float
-        The same over each further stretch of its path that is as long as the common one.
+    stretches : sequence of mapping of str to float
+        Quantity to the run's value over each stretch of its path that is as long as the common
+        one, the first of them that path; empty if it failed.
     """
 
     setting: Setting
     bed: str | None
-    values: Mapping[str, float]
     measures: Measures
-    further: Sequence[Mapping[str, float]] = ()
-
-    @property
-    def stretches(self) -> list[Mapping[str, float]]:
-        """The values over every stretch of its path."""
-        return [self.values, *self.further]
+    stretches: Sequence[Mapping[str, float]]
 
     @property
     def complete(self) -> bool:
@@ -176,11 +169,9 @@ def _shown(value: object) -> str:
 
 
 def _run(setting: Setting, bed: str | None, measures: Measures, arc_m: float) -> PlanRun:
-    first, *further = (
-        values_within(measures, arc_m, stretch)
-        for stretch in range(max(1, int(measures.arc_m / arc_m + 1e-9)))
-    )
-    return PlanRun(setting, bed, first, measures, further)
+    count = max(1, int(measures.arc_m / arc_m + 1e-9))
+    values = [values_within(measures, arc_m, stretch) for stretch in range(count)]
+    return PlanRun(setting, bed, measures, values)
 
 
 def values_within(measures: Measures, arc_m: float, stretch: int = 0) -> dict[str, float]:

@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-import pandas as pd
 
 from dragchain.errors import SeriesError
 from dragchain.tradeoff.compare import Error, PlanRun, QuantityComparison, Setting, compare_quantity
@@ -215,41 +214,3 @@ def choose(tradeoff: Tradeoff, names: Sequence[str], tolerance: float) -> Choice
         return Choice(tolerance, None, None, math.nan, [])
     errors = [tradeoff.comparisons[name].errors[shown] for name in names]
     return Choice(tolerance, setting, nearest, bounds[shown], errors)
-
-
-def run_table(tradeoff: Tradeoff) -> pd.DataFrame:
-    """One row a run: settings, bed, cost, outcome and the value of every quantity."""
-    rows = [
-        {
-            "run": run.measures.run,
-            **vars(run.setting),
-            "bed": run.bed,
-            "complete": run.complete,
-            "failure": _failure(run),
-            "counted_path_m": run.measures.arc_m or math.nan,
-            **run.measures.cost.model_dump(),
-            **{quantity.name: run.values.get(quantity.name, math.nan) for quantity in QUANTITIES},
-        }
-        for run in tradeoff.runs
-    ]
-    return pd.DataFrame(rows)
-
-
-def _failure(run: PlanRun) -> str:
-    return "; ".join(f"{check.name}: {check.seen}" for check in run.measures.failure)
-
-
-def errors_by_setting(tradeoff: Tradeoff) -> pd.DataFrame:
-    """One row a setting and quantity: cost, error, interval and bound."""
-    rows = [
-        {
-            "quantity": name,
-            **vars(setting),
-            "runs": sum(run.complete for run in tradeoff.of(setting)),
-            "relative_cost": tradeoff.cost(setting),
-            **error.columns(),
-        }
-        for name, comparison in tradeoff.comparisons.items()
-        for setting, error in comparison.errors.items()
-    ]
-    return pd.DataFrame(rows)

@@ -1,35 +1,40 @@
 """Tables, figures, ``tradeoff.json`` and page of the trade-off of speed against accuracy."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+import platform
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
+
+import numpy as np
+import pandas as pd
 
 from dragchain.report.campaign import write_report
 from dragchain.report.page import DASH, MINUS, number
 from dragchain.statistics.estimate import CONFIDENCE, Estimate
 from dragchain.tradeoff.changes import (
     RUINED,
+    Costs,
     gains,
-    modulus_effects,
-    modulus_levels,
     read_costs,
-    softness,
+    softness_by_level,
     step_costs,
 )
-from dragchain.tradeoff.compare import Error, read_plan_runs
-from dragchain.tradeoff.drops import choose_drop, compare_drops
+from dragchain.tradeoff.compare import Error, Setting, read_plan_runs
+from dragchain.tradeoff.drops import ComparedDrop, choose_drop, compare_drops
 from dragchain.tradeoff.figures import draw_tradeoff
 from dragchain.tradeoff.measure_run import LONG_WAVE, SHORT_WAVE
-from dragchain.tradeoff.measures import MAIN
-from dragchain.tradeoff.outcome import (
-    TOLERANCES,
-    choose,
-    compare_settings,
-    errors_by_setting,
-    run_table,
-)
+from dragchain.tradeoff.measures import MAIN, QUANTITIES
+from dragchain.tradeoff.outcome import TOLERANCES, Tradeoff, breaks, choose, compare_settings
 from dragchain.tradeoff.path_length import along, chance, reaches
-from dragchain.tradeoff.record import tradeoff_record
+from dragdeck.records.tradeoff import (
+    DropEntry,
+    ErrorEntry,
+    FidelityParameters,
+    Machine,
+    QuantityEntry,
+    SettingEntry,
+    TradeoffRecord,
+)
 
 # --- numbers -------------------------------------------------------------------------------------
 
@@ -92,6 +97,123 @@ FILTERS: Mapping[str, Callable[..., str]] = {
 """Filters of the page."""
 
 
+# --- tables --------------------------------------------------------------------------------------
+
+
+def run_table(tradeoff: Tradeoff) -> pd.DataFrame:
+    """One row a run: settings, bed, cost, outcome and the value of every quantity."""
+    rows = [
+        {
+            "run": run.measures.run,
+            **vars(run.setting),
+            "bed": run.bed,
+            "complete": run.complete,
+            "failure": "; ".join(f"{one.name}: {one.seen}" for one in run.measures.failure),
+            "counted_path_m": run.measures.arc_m or math.nan,
+            **run.measures.cost.model_dump(),
+            **{one.name: run.stretches[0].get(one.name, math.nan) for one in QUANTITIES},
+        }
+        for run in tradeoff.runs
+    ]
+    return pd.DataFrame(rows)
+
+
+def errors_by_setting(tradeoff: Tradeoff) -> pd.DataFrame:
+    """One row a setting and quantity: cost, error, interval and bound."""
+    rows = [
+        {
+            "quantity": name,
+            **vars(setting),
+            "runs": sum(run.complete for run in tradeoff.of(setting)),
+            "relative_cost": tradeoff.cost(setting),
+            **error.columns(),
+        }
+        for name, comparison in tradeoff.comparisons.items()
+        for setting, error in comparison.errors.items()
+    ]
+    return pd.DataFrame(rows)
+
+
+# --- record --------------------------------------------------------------------------------------
+
+
+def tradeoff_record(
+    tradeoff: Tradeoff,
+    drops: Iterable[ComparedDrop],
+    costs: Costs,
+    plan: str,
+    commands: Sequence[str],
+) -> TradeoffRecord:
+    """The content of ``tradeoff.json``: when, with what and on what was measured, and what."""
+    measures = [run.measures for run in tradeoff.runs]
+    return TradeoffRecord(
+        measured=max(one.started for one in measures)[:10],
+        commands=tuple(commands),
+        plan=plan,
+        study=_joined(one.study for one in measures),
+        versions={
+            **{
+                name: _joined(one.versions[name] for one in measures)
+                for name in ("dragdeck", "engine")
+            },
+            "python": platform.python_version(),
+            "numpy": np.__version__,
+        },
+        machine=Machine.here(),
+        runs=len(measures),
+        engine_hours=sum(one.cost.cpu_time_s for one in measures) / 3600.0,
+        scene=_scene_numbers(tradeoff),
+        reference=FidelityParameters(**tradeoff.reference.parameters()),
+        quantities={
+            name: QuantityEntry.model_validate(
+                {**vars(own.quantity), **vars(own), "arc_m": tradeoff.arc_m}
+            )
+            for name, own in tradeoff.comparisons.items()
+        },
+        settings=tuple(
+            _setting_entry(tradeoff, one) for one in tradeoff.settings() if not one.other
+        ),
+        drop_test=tuple(
+            DropEntry.model_validate({**vars(drop), "restitution_error": drop.bound})
+            for drop in drops
+            if not drop.other
+        ),
+        costs=tuple(costs.entries),
+    )
+
+
+def _joined(names: Iterable[object]) -> str:
+    return ", ".join(sorted(set(map(str, names))))
+
+
+def _scene_numbers(tradeoff: Tradeoff) -> Mapping[str, float]:
+    """Dimensionless numbers of the scene, as the runs at the reference have them."""
+    numbers = [run.measures.numbers for run in tradeoff.of(tradeoff.reference)]
+    return next((own for own in numbers if own), {})
+
+
+def _setting_entry(tradeoff: Tradeoff, setting: Setting) -> SettingEntry:
+    runs = tradeoff.of(setting)
+    complete = sum(run.complete for run in runs)
+    return SettingEntry(
+        **setting.parameters(),
+        seeds=len({run.measures.seed for run in runs}),
+        runs=len(runs),
+        failed=len(runs) - complete,
+        arc_m=tradeoff.arc_m * complete,
+        breaks=breaks(tradeoff, setting),
+        relative_cost=tradeoff.cost(setting),
+        errors={
+            name: ErrorEntry(
+                **vars(own.errors[setting]),
+                single_parameter_error=own.alone(setting, tradeoff.reference),
+            )
+            for name, own in tradeoff.comparisons.items()
+            if setting in own.errors
+        },
+    )
+
+
 # --- report --------------------------------------------------------------------------------------
 
 
@@ -151,7 +273,9 @@ def write_tradeoff(
     )
     commands = [command] if command else []
     record = tradeoff_record(tradeoff, dropped, priced, plan, commands)
-    known, comparisons, levels = reaches(tradeoff), tradeoff.comparisons, modulus_levels(tradeoff)
+    known, comparisons = reaches(tradeoff), tradeoff.comparisons
+    soft = softness_by_level(tradeoff)
+    every = [one for found in soft.values() for one in found.values() if one]
     named = [names for names in _CHOSEN if all(name in comparisons for name in names)]
     write_report(
         out_dir,
@@ -165,12 +289,8 @@ def write_tradeoff(
         costs=priced,
         main=[comparisons[name] for name in MAIN if name in comparisons],
         choices=[(names, [choose(tradeoff, names, one) for one in TOLERANCES]) for names in named],
-        levels=levels,
-        softness={
-            name: [softness(tradeoff, own, level) for level in levels]
-            for name, own in comparisons.items()
-        },
-        effects=modulus_effects(tradeoff),
+        softness=soft,
+        mixed=sorted({one.mixed for one in every if one.mixed}),
         gains=gains(tradeoff),
         chance=chance(tradeoff),
         drops=dropped,

@@ -117,7 +117,7 @@ def test_a_prediction_of_other_settings_is_not_compared(run: Path, other: dict[s
 def test_only_scenes_that_were_run_and_predicted_have_a_row() -> None:
     expected = OptionEntry.model_validate(option())
     (row,) = cost_rows(expected, {"process": RECORD, "drop_test": RECORD})
-    assert (row.scene, row.steps, row.actual_steps) == ("process", 150_000, 160_000)
+    assert (row.scene, row.steps, row.record.steps) == ("process", 150_000, 160_000)
     assert row.ratio == pytest.approx(76 / 50)
 
 

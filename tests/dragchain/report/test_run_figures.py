@@ -30,7 +30,6 @@ from dragchain.network.frame import NetworkFrame
 from dragchain.report.findings import (
     FIGURES,
     FILE,
-    Comparison,
     DropFindings,
     FillingFindings,
     ProcessFindings,
@@ -391,9 +390,8 @@ def test_the_polar_plot_names_its_axis(figures: dict[str, Figure]) -> None:
 def test_the_experiment_lies_over_the_mean_in_its_own_colour(process: Path) -> None:
     run, found = RunData(process, load_case(process)), ProcessFindings.read(process / FILE)
     ours = found.forces["drag_n"].mean
-    (published,) = reference_drags(reference(drag_mean_n=ours, drag_std_n=0.66))
-    row = Comparison(**vars(published))
-    (axes,) = forces(run, changed(found, comparison=[row])).axes
+    published = reference_drags(reference(drag_mean_n=ours, drag_std_n=0.66))
+    (axes,) = forces(run, changed(found, comparison=published)).axes
     at_mean = [line for line in axes.get_lines() if set(line.get_ydata()) == {ours}]
     assert [line.get_color() for line in at_mean] == ["black", COLOURS["experiment"]]
     assert at_mean[1].get_zorder() >= at_mean[0].get_zorder() and at_mean[1].is_dashed()

@@ -18,7 +18,7 @@ from tradeoff_files import (
     point_of,
 )
 
-from dragchain.tradeoff.changes import gains, hub, modulus_effects, softness, speed_up
+from dragchain.tradeoff.changes import gains, hub, softness, softness_by_level, speed_up
 from dragchain.tradeoff.compare import Setting
 from dragchain.tradeoff.outcome import Tradeoff
 
@@ -76,8 +76,8 @@ def test_a_gain_has_an_interval_from_the_scatter_of_costs(tmp_path: Path) -> Non
 
 
 def test_softness_ruins_what_it_was_made_to_ruin(tmp_path: Path) -> None:
-    (row,) = modulus_effects(made(tmp_path, contents()))
-    assert row.level == 0.01
-    assert "mean normal force per contact on the workpiece" in row.ruined
-    assert "mean lateral force" in row.ruined
-    assert "contacts on the workpiece" in row.kept and "bed height" in row.kept
+    ((level, found),) = softness_by_level(made(tmp_path, contents())).items()
+    assert level == 0.01
+    effects = {name: one.effect for name, one in found.items() if one}
+    assert effects["contact_force_mean"] == effects["lateral_mean"] == "ruined"
+    assert effects["workpiece_contacts"] == effects["bed_height"] == "kept"

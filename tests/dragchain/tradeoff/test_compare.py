@@ -29,14 +29,8 @@ from dragchain.errors import TableError
 from dragchain.statistics.estimate import student_quantile
 from dragchain.tradeoff.compare import Setting, compare_quantity, read_plan_runs
 from dragchain.tradeoff.measures import QUANTITIES
-from dragchain.tradeoff.outcome import (
-    Tradeoff,
-    breaks,
-    choose,
-    errors_by_setting,
-    largest_bound,
-    run_table,
-)
+from dragchain.tradeoff.outcome import Tradeoff, breaks, choose, largest_bound
+from dragchain.tradeoff.report import errors_by_setting, run_table
 from dragdeck.errors import DocumentError
 
 
@@ -126,7 +120,7 @@ def test_the_longest_of_runs_that_differ_in_path_counts(tmp_path: Path) -> None:
     assert lengths == pytest.approx([8, 8, 16, 16])
     assert arc_m == pytest.approx(8 * BLOCK_M)
     first = next(run for run in own if run.bed == "bed-1")
-    assert first.values["drag_mean"] == np.mean(first.measures.blocks["drag_mean"][:8])
+    assert first.stretches[0]["drag_mean"] == np.mean(first.measures.blocks["drag_mean"][:8])
 
 
 def test_a_quantity_that_is_missing_or_changes_sign_is_skipped(tmp_path: Path) -> None:
@@ -196,8 +190,8 @@ def test_a_run_twice_as_long_counts_as_two_of_its_bed(tmp_path: Path) -> None:
     assert [len(run.stretches) for run in runs if run not in long] == [1, 1, 1]
     assert [len(run.stretches) for run in long] == [2, 2, 2]
     second = np.mean(long[0].measures.blocks["drag_mean"][8:16])
-    assert long[0].further[0]["drag_mean"] == pytest.approx(second)
-    assert "bed_height" not in long[0].further[0]
+    assert long[0].stretches[1]["drag_mean"] == pytest.approx(second)
+    assert "bed_height" not in long[0].stretches[1]
 
 
 def test_what_is_written_is_no_setting(tmp_path: Path) -> None:
@@ -221,16 +215,12 @@ def test_intervals_hold_whatever_settings_do_together(tmp_path: Path) -> None:
     held, trials = 0, 300
     for _ in range(trials):
         together = rng.normal(0.0, 1.4 * spread)
+        logs = [
+            together * (run.setting == Setting(*BOTH)) + rng.normal(0.0, spread) for run in runs
+        ]
         again = [
-            replace(
-                run,
-                values={
-                    "drag_mean": math.exp(
-                        together * (run.setting == Setting(*BOTH)) + rng.normal(0.0, spread)
-                    )
-                },
-            )
-            for run in runs
+            replace(run, stretches=[{"drag_mean": math.exp(log)}])
+            for run, log in zip(runs, logs, strict=True)
         ]
         error = compare_quantity(drag, again, reference).errors[Setting(*BOTH)]
         held += error.ci95_low <= math.expm1(together) <= error.ci95_high

@@ -59,8 +59,8 @@ def coverage(tradeoff: Tradeoff, trials: int = 60) -> float:
         values = iter(np.exp(own.run_std * scatter).tolist())
         again = []
         for run in tradeoff.runs:
-            first, *further = ({"drag_mean": next(values)} for _ in run.stretches)
-            again.append(replace(run, values=first, further=further))
+            stretches = [{"drag_mean": next(values)} for _ in run.stretches]
+            again.append(replace(run, stretches=stretches))
         errors = compare_quantity(own.quantity, again, tradeoff.reference).errors
         held += [
             not error.significant for one, error in errors.items() if one != tradeoff.reference

@@ -1,6 +1,8 @@
 """What was measured of speed against accuracy: ``tradeoff.json`` and ``costs.json``."""
 
 import math
+import os
+import platform
 from collections.abc import Mapping
 from functools import cache
 from importlib import resources
@@ -37,6 +39,19 @@ class Machine(Part):
 
     cores: int | None
     processor: str
+
+    @classmethod
+    def here(cls) -> "Machine":
+        """The machine that this runs on."""
+        return cls(cores=os.cpu_count(), processor=processor())
+
+
+def processor() -> str:
+    """Name of the machine's processor, as far as it is known."""
+    file = Path("/proc/cpuinfo")
+    lines = file.read_text(encoding="utf-8").splitlines() if file.is_file() else []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor()
 
 
 class FidelityParameters(Part):
