@@ -196,7 +196,8 @@ def calibration(random: Random, impacts: int) -> tuple[Estimate, float]:
     found = calibrate(
         measure_impacts(record_of(drop, sensor, random), fall_time_s=FALL_S), _sweep()
     )
-    return found.fit_reference.interval, 0.68
+    fit = found.fit_reference
+    return Estimate(fit.restitution, fit.ci95_low, fit.ci95_high), 0.68
 
 
 # --- all kinds -------------------------------------------------------------------------------
