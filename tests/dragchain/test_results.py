@@ -1,5 +1,7 @@
 import json
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -279,3 +281,13 @@ def test_a_run_that_is_not_there_is_named(project: Path, number: Any) -> None:
     with pytest.raises(UnknownNameError, match=r"(?s)no run .*3 run\(s\).*study\.run"):
         load("small").runs[number]
     assert len(load("small").runs[:2]) == 2
+
+
+def test_results_are_read_without_what_makes_pages() -> None:
+    script = (
+        "import sys, dragchain; dragchain.load, dragchain.read_dump; "
+        "print([name for name in ('jinja2', 'pyvista', 'snakemake') if name in sys.modules])"
+    )
+    call = [sys.executable, "-c", script]
+    done = subprocess.run(call, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

@@ -14,7 +14,6 @@ from typing import Generic, TypeVar
 import numpy as np
 from pydantic import JsonValue
 
-from dragchain.loading.document import FILE as LOADING
 from dragchain.loading.document import Loading
 from dragchain.report.findings import (
     FILE,
@@ -25,14 +24,14 @@ from dragchain.report.findings import (
 )
 from dragchain.report.page import TIMES, number
 from dragchain.report.values import (
-    EXTRAPOLATED,
     Extrapolated,
     ExtrapolatedQuantity,
     Values,
+    read_optional,
     values_of,
     values_over_packings,
 )
-from dragchain.run.case import changed_inputs
+from dragchain.run.case import changed_inputs, upstream_folders
 from dragchain.run.kinematics import axis_speed, drag_phase, motion_of, needed, path_passed
 from dragdeck.errors import DocumentError, RejectedRunError
 from dragdeck.records.case import CaseOfRun, load_case
@@ -206,30 +205,9 @@ def read_study_runs(run_dir: Path) -> StudyRuns:
     return StudyRuns(process, filling, drop_test, *read_optional(run_dir))
 
 
-def read_optional(run_dir: Path) -> tuple[Loading | None, Extrapolated | None]:
-    """Read ``loading.json`` and ``extrapolated.json`` of a process run, None where there is none.
-
-    Raises
-    ------
-    DocumentError
-        If one of them cannot be used.
-    """
-    loading, extrapolated = run_dir / LOADING, run_dir / EXTRAPOLATED
-    return (
-        Loading.read(loading) if loading.is_file() else None,
-        Extrapolated.read(extrapolated) if extrapolated.is_file() else None,
-    )
-
-
 def read_upstream(run_dir: Path) -> ReportedRun[Findings]:
     """Read a filling or a drop test; errors are those of `read_study_runs`."""
     return _read(run_dir, Findings)
-
-
-def upstream_folders(run_dir: Path, case: CaseOfRun) -> dict[str, Path]:
-    """Folders of the filling and the drop test that a process run names, by scene."""
-    results = run_dir.resolve().parent.parent
-    return {scene: results / scene / run for scene, run in case.upstream.items()}
 
 
 def _read(run_dir: Path, findings: type[F]) -> ReportedRun[F]:

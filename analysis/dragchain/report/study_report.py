@@ -16,7 +16,6 @@ from dragchain.report.cases import (
     cases_of,
     read_study_runs,
     read_upstream,
-    upstream_folders,
 )
 from dragchain.report.cost_check import CostRow, answers, cost_rows, prediction_for, read_advice
 from dragchain.report.findings import FIGURES, FillingFindings, Findings, ProcessFindings
@@ -30,6 +29,7 @@ from dragchain.report.page import (
 )
 from dragchain.report.spreadsheet import summary_workbook
 from dragchain.report.summary import summary
+from dragchain.run.case import upstream_folders
 from dragchain.statistics.correlated import RELIABLE_TIMES
 from dragchain.tables.network_contacts import Corrections
 from dragdeck.errors import DragdeckError

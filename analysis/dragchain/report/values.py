@@ -7,6 +7,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
+from dragchain.loading.document import FILE as LOADING
 from dragchain.loading.document import Loading
 from dragchain.report.findings import ProcessFindings
 from dragchain.run.basis import QUANTITIES, Basis, Correction, Standing, judge, notes
@@ -142,6 +143,21 @@ class Extrapolated(Document):
     def of(self, name: str) -> ExtrapolatedQuantity | None:
         """A quantity by its name, None if it was not measured."""
         return next((one for one in self.quantities if one.name == name), None)
+
+
+def read_optional(run_dir: Path) -> tuple[Loading | None, Extrapolated | None]:
+    """Read ``loading.json`` and ``extrapolated.json`` of a process run, None where there is none.
+
+    Raises
+    ------
+    DocumentError
+        If one of them cannot be used.
+    """
+    loading, extrapolated = run_dir / LOADING, run_dir / EXTRAPOLATED
+    return (
+        Loading.read(loading) if loading.is_file() else None,
+        Extrapolated.read(extrapolated) if extrapolated.is_file() else None,
+    )
 
 
 # --- values --------------------------------------------------------------------------------------

@@ -1,6 +1,7 @@
 """What ``case.json`` says of a run: its inputs by dotted name, and the friction of its contacts."""
 
 from collections.abc import Mapping
+from pathlib import Path
 
 from pydantic import JsonValue
 
@@ -61,3 +62,9 @@ def friction_with(case: CaseOfRun, body: str) -> float:
     particle, other = (input_of(case, f"{name}.material") for name in ("media", body))
     names = [f"pairs.{pair}.friction" for pair in (f"{particle}-{other}", f"{other}-{particle}")]
     return number_of(case, next((name for name in names if name in case.inputs), names[0]))
+
+
+def upstream_folders(run_dir: Path, case: CaseOfRun) -> dict[str, Path]:
+    """Folders of the filling and the drop test that a process run names, by scene."""
+    results = run_dir.resolve().parent.parent
+    return {scene: results / scene / run for scene, run in case.upstream.items()}
