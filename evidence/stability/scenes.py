@@ -7,8 +7,7 @@ from typing import Literal
 from dragdeck.cases.bed import bed_rayleigh_time, particle_material, skin
 from dragdeck.cases.case import Case
 from dragdeck.decks import PACKING_FILE, outputs
-from dragdeck.decks.deck import Deck, Scene
-from dragdeck.decks.render import Body, data_file
+from dragdeck.decks.deck import Body, Deck, Scene, data_file
 from dragdeck.documents import Part
 from dragdeck.physics.contact_mechanics import (
     effective_modulus,

@@ -10,9 +10,8 @@ from pydantic.dataclasses import dataclass as checked
 from dragdeck import __version__
 from dragdeck.cases.case import digest
 from dragdeck.decks import outputs
-from dragdeck.decks.deck import Deck, Materials, Scene, contact_law
-from dragdeck.decks.render import Body as DataBody
-from dragdeck.decks.render import Vector, data_file
+from dragdeck.decks.deck import Body as DataBody
+from dragdeck.decks.deck import Deck, Materials, Scene, Vector, contact_law, data_file
 from dragdeck.physics.contact_mechanics import rayleigh_time
 from dragdeck.physics.rounding import round_to
 from dragdeck.records.run import CaseFile, CountOfRun, RanksOfRun

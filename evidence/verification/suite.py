@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 import yaml
 from pydantic import Field, model_validator
 
-from dragdeck.decks.render import Vector
+from dragdeck.decks.deck import Vector
 from dragdeck.physics import contact_mechanics as mechanics
 from dragdeck.physics.rounding import round_to
 from dragdeck.study.base import Model, Number, Positive, Whole

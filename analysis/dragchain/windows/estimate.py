@@ -300,7 +300,7 @@ def corrected_map(
     prior = between * expected**2 + from_soft
     weight = np.divide(prior, prior + from_windows, out=np.zeros_like(prior), where=prior > 0.0)
     value = expected + weight * (mean * total.value / mean.sum() - expected)
-    scale = (total.ci95_high - total.value) / NORMAL_QUANTILE / total.value
+    scale = total.relative_half_width / NORMAL_QUANTILE
     std = np.hypot(np.sqrt(weight * from_windows), value * scale)
     return LoadMap(
         soft=tuple(own.tolist()),

@@ -1,6 +1,7 @@
-"""Mechanics of contacts and beds: moduli, damping, time steps, contact times.
+"""Mechanics of contacts and packings: moduli, damping, contact times, limits of LIGGGHTS.
 
-Every function is plain arithmetic on SI values.
+`stability_number` says whether a time step is stable on a whole contact network. All values are
+in SI units.
 """
 
 import math
@@ -179,6 +180,9 @@ def damping_ratio(restitution: float) -> float:
     return -log / math.hypot(log, math.pi)
 
 
+# --- limits of LIGGGHTS --------------------------------------------------------------------------
+
+
 ENGINE_SOFTEST_PA = 5e6
 """The engine's `units si` refuses a softer Young's modulus."""
 
@@ -187,6 +191,9 @@ ENGINE_NEIGHBOURS = 2000
 
 ENGINE_HARD_PA = 1e9
 """Above this the engine wants `hard_particles yes`."""
+
+
+# --- the contact network of a packing ------------------------------------------------------------
 
 
 Floats = NDArray[np.float64]

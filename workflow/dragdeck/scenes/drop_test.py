@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from dragdeck.cases.bed import impact_time, particle_material
 from dragdeck.cases.case import Case, materials_content
 from dragdeck.decks import outputs
-from dragdeck.decks.deck import Deck, LeftOut, Scene
-from dragdeck.decks.render import Body, data_file
+from dragdeck.decks.deck import Body, Deck, LeftOut, Scene, data_file
 from dragdeck.physics.contact_mechanics import fall_speed, rayleigh_time
 from dragdeck.physics.rounding import timestep
 from dragdeck.records.case import DropTestCase

@@ -19,8 +19,7 @@ from dragdeck.cases.bed import (
 )
 from dragdeck.cases.case import Case, materials_content
 from dragdeck.decks import outputs
-from dragdeck.decks.deck import Deck, LeftOut, Scene
-from dragdeck.decks.render import Body, data_file
+from dragdeck.decks.deck import Body, Deck, LeftOut, Scene, data_file
 from dragdeck.errors import Caution, InputError
 from dragdeck.physics.contact_mechanics import (
     DENSEST_RANDOM_PACKING,

@@ -1,9 +1,9 @@
 """Where the workpiece goes: plunge, approach, drag.
 
-What is superposed on the path (`dragdeck.study.superposed`) moves the workpiece during the drag
-only.
+A position is that of the workpiece's reference point, the centre of its tip. What is superposed on
+the path (`dragdeck.study.superposed`) moves the workpiece during the drag only.
 
-A `Course` is the motion in whole steps, as the engine makes it. Input script, ``case.json``, checks
+A `Course` is the motion in whole steps, as LIGGGHTS makes it. Input script, ``case.json``, checks
 and preview are made from it.
 """
 
@@ -23,6 +23,8 @@ from dragdeck.study.driven import DrivenMotion
 from dragdeck.study.model import Motion, Study
 from dragdeck.study.paths.path import Point, Vector
 from dragdeck.study.workpiece import MeshShape
+
+# --- legs, and the places that a motion reaches --------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -149,6 +151,9 @@ def deepest(motion: Motion) -> float:
     return motion.immersion_depth_m - vertical_range(motion)[0]
 
 
+# --- steps between frames of the outputs ---------------------------------------------------------
+
+
 @dataclass(frozen=True)
 class Periods:
     """Steps between frames of each output, each a multiple of the one before."""
@@ -166,6 +171,9 @@ def output_periods(study: Study, timestep_s: float) -> Periods:
     contacts = force * max(1, math.floor(1 / (rates.workpiece_contacts_hz * per_second * force)))
     network = contacts * max(1, math.floor(1 / (rates.network_hz * per_second * contacts)))
     return Periods(force, contacts, network)
+
+
+# --- the whole motion ----------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -282,6 +290,9 @@ def _in_periods(
         velocity_m_s=(x, y, z),
         motion=EngineMotion({"": f"linear {x!r} {y!r} {z!r}"}),
     )
+
+
+# --- what the input script needs: place, legs, superposed motions --------------------------------
 
 
 @dataclass(frozen=True)

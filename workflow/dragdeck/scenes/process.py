@@ -415,3 +415,4 @@ PROCESS = SceneType(
 
 
 SCENES: dict[str, SceneType] = {scene.name: scene for scene in (DROP_TEST, FILLING, PROCESS)}
+"""The scenes of a study's case, by name: a new one is its module and an entry here."""

@@ -1,4 +1,8 @@
-"""The workpiece of a case, generated or from the user's mesh."""
+"""The workpiece of a case: its mesh, whether it fits, and the numbers that describe its scene.
+
+It has to fit with its motion into bowl, packing and time step. The dimensionless numbers are those
+by which scenes are compared.
+"""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -260,6 +264,9 @@ def _from_file(
     turned = facing_out(mesh)
     assert turned is not None, "the check refuses a surface with one side"
     return place(turned, shape.offset_m), found
+
+
+# --- whether it fits -----------------------------------------------------------------------------
 
 
 _FEWEST_STEPS_PER_CONTACT = 5
@@ -538,6 +545,9 @@ def check_headroom(case: Case, tip_m: float, top_m: float) -> None:
             limit=f"at most {longest:.4g} m",
             remedy="shorten the mesh at its upper end, or use a higher bowl (bowl.height_m)",
         )
+
+
+# --- dimensionless numbers -----------------------------------------------------------------------
 
 
 def describe(case: Case) -> dict[str, float]:

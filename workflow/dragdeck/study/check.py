@@ -1,4 +1,7 @@
-"""Whether the content of a study file can be used: errors name field, value, limit and remedy."""
+"""Whether the content of a study file can be used: errors name field, value, limit and remedy.
+
+Some errors no single field shows: names that do not exist, values that contradict each other.
+"""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
@@ -25,6 +28,9 @@ _LEAST_LEVELS = 3
 
 _Found = Iterator[tuple[str, str, str]]
 """Field, what is wrong with it, and what would be accepted."""
+
+
+# --- values against each other -------------------------------------------------------------------
 
 
 def contradictions(study: Study, whole: bool) -> Iterator[InputError]:
@@ -180,6 +186,9 @@ def _level(value: object) -> float:
         return math.nan if isinstance(value, bool) else float(str(value))
     except ValueError:
         return math.nan
+
+
+# --- the whole file ------------------------------------------------------------------------------
 
 
 def validate(data: Json, file: Path | str, *, whole: bool = False) -> Study:

@@ -1,4 +1,8 @@
-"""How a run drives the drag: its steps, and what the engine needs to know of a motion."""
+"""How a run drives the drag: its steps, and what LIGGGHTS needs to know of a motion.
+
+Paths and superposed motions build on this: rotations of the workpiece, quantities that change in
+stages, and the entries of a motion in ``case.json``.
+"""
 
 import math
 import re
@@ -19,6 +23,9 @@ StepCounts = NDArray[np.float64] | NDArray[np.int64]
 
 LIVE_REFERENCE = Markup("${reference_x} ${reference_y} ${reference_z}")
 """The reference point where the engine has it when the drag begins or is resumed."""
+
+
+# --- steps, formulas and movers ------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -231,6 +238,9 @@ def rates_about_axes(matrix: Floats, drive: Drive) -> tuple[float, float, float]
     return x / drive.timestep_s, y / drive.timestep_s, z / drive.timestep_s
 
 
+# --- rotations, and angles about the vertical ----------------------------------------------------
+
+
 def wrap_angle(angle_rad: ArrayLike) -> Floats:
     """Wrap angles into (-pi, pi]."""
     turned = np.pi - np.asarray(angle_rad, dtype=np.float64)
@@ -308,6 +318,9 @@ class Rotation:
         """Vectors of the bowl's frame, (N, 3), in the workpiece's own."""
         found = rotated(vectors, -self.turn_rad)
         return found if self.own is None else np.einsum("nji,nj->ni", self.own, found)
+
+
+# --- a quantity in stages: one value after another, the last of which stays ----------------------
 
 
 def chain(
@@ -401,6 +414,9 @@ def stage_at(steps: StepCounts, lengths: Sequence[int]) -> NDArray[np.int64]:
     """
     stage = np.searchsorted(np.cumsum(lengths), steps, side="left")
     return np.minimum(stage, len(lengths) - 1)
+
+
+# --- entries in case.json ------------------------------------------------------------------------
 
 
 class PathEntry(BaseModel):

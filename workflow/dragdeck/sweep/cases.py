@@ -1,4 +1,19 @@
-"""The cases of a study file: one per combination of its sweep."""
+"""Designs of runs, and the cases of a study file: one per combination of its sweep.
+
+Every campaign has one shape (`dragchain.report.campaign` has the rest of it): a design of runs,
+a row of measures of each run, a judgement of the rows, and a report. This is the grammar of all
+designs; a campaign whose runs need more, as seeds or a path, adds fields to `Variation` or
+`Design`::
+
+    base: {friction: 0.3, restitution: 0.8}         # at all points that do not set it
+    reference: {vary: {timestep_fraction: [0.05]}}  # what the others are compared with
+    points:
+      - vary: {timestep_fraction: [0.2, 0.4]}       # every combination
+        one_by_one: {friction: [0, 1]}              # at each of them, one at a time
+        with: {restitution: 1}                      # at all of them
+
+Fields are those of the study by their dotted names, or the settings of a scene that no study has.
+"""
 
 import copy
 import itertools
@@ -18,6 +33,9 @@ from dragdeck.study.yaml import read_study, read_yaml
 
 Settings = Mapping[str, Any]
 """Dotted name of a field to its value."""
+
+
+# --- designs -------------------------------------------------------------------------------------
 
 
 def combinations(vary: Mapping[str, Sequence[Any]]) -> Iterator[Settings]:
@@ -97,6 +115,9 @@ class Design(Model, Generic[Block]):
                 "the reference must be a single point", file=file, field="reference.vary"
             )
         return found
+
+
+# --- cases ---------------------------------------------------------------------------------------
 
 
 Resolve = Callable[[Case, Tolerance], Case]
