@@ -215,7 +215,7 @@ def at_rest(case: Case, settled: Settled, templates: CostTemplates) -> AnyScene:
         begun,
         "at_rest",
         {**BEDS["workpiece_in"], **BEDS["at_rest"]},
-        damping_kg_s=particle_mass(particle_material(study), study.media.radius_mean_m)
+        damping_kg_s=particle_mass(particle_material(study), study.media.typical_radius_m)
         / DAMPING_TIME_S,
         damped_steps=math.ceil(DAMPED_S / dt),
         free_steps=math.ceil(FREE_S / dt),

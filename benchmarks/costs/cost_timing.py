@@ -303,7 +303,7 @@ def _result(bench: _Bench, rows: Sequence[TimedVariant]) -> TimedCosts:
     return TimedCosts(
         study=bench.base.study_name,
         fidelity=study.chosen_fidelity(),
-        particles=study.media.count,
+        particles=study.particle_count,
         seconds=bench.seconds,
         measured=max(row.measured for row in rows),
         command=shlex.join(["python", "benchmarks/costs", *sys.argv[1:]]),

@@ -115,7 +115,7 @@ def impact_scene(
     """
     study = case.study
     scale = study.chosen_fidelity().youngs_modulus_scale
-    material, radius = particle_material(study), study.media.radius_mean_m
+    material, radius = particle_material(study), study.media.typical_radius_m
     mass, rayleigh = particle_mass(material, radius), rayleigh_time(material, radius, scale)
     dt = timestep(rayleigh, fraction)
     body_radius, body_mass = impact.effective_body(radius, mass)
@@ -134,7 +134,7 @@ def impact_scene(
         scene="impact",
         run=run,
         source="particles.data",
-        materials=material_table(study, [study.media.material], scale, case),
+        materials=material_table(study, [study.media.main_material], scale, case),
         limit_force=study.contact.limit_force,
         gravity_m_s2=0.0,
         skin_m=radius,
@@ -265,12 +265,12 @@ def column_scene(
         A modulus that the engine refuses.
     """
     study, media = case.study, case.study.media
-    scale, radius = study.chosen_fidelity().youngs_modulus_scale, media.radius_mean_m
+    scale, radius = study.chosen_fidelity().youngs_modulus_scale, media.typical_radius_m
     stack, material = load.packing == "stack", particle_material(study)
     rayleigh = rayleigh_time(material, radius, scale) if stack else bed_rayleigh_time(study)
     dt, load_dt = timestep(rayleigh, fraction), timestep(rayleigh, _LOAD_FRACTION)
     load_steps = math.ceil(_LOAD_S / load_dt)
-    count = _STACK if stack else media.count
+    count = _STACK if stack else study.particle_count
     tube = (1 + _TUBE_CLEARANCE) * radius if stack else study.bowl.radius_m
     top = 2 * radius * (_STACK + 4) if stack else box_top(study)
     types = study.type_names()
@@ -312,7 +312,7 @@ def column_scene(
         media=MediaOfRun(
             count=count,
             radius_mean_m=radius,
-            radius_std_m=media.radius_std_m,
+            radius_std_m=media.typical_std_m,
             density_kg_m3=material.density_kg_m3,
         ),
         bowl=BowlOfRun(radius_m=tube, walls="primitive"),

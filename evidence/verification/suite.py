@@ -81,7 +81,7 @@ class Lab:
 
     @property
     def _own(self) -> Mapping[str, str]:
-        return {"media": self.study.media.material, "workpiece": self.study.workpiece.material}
+        return {"media": self.study.media.main_material, "workpiece": self.study.workpiece.material}
 
     def material(self, name: str) -> Material:
         """A material by the suite's name."""

@@ -241,7 +241,7 @@ def preview(study: str, fidelity: str | None, case: str | None) -> None:
 
 def _numbers(case: Case) -> dict[str, list[tuple[str, str]]]:
     """The tables of a preview by their headings."""
-    count = ("particles", str(case.study.media.count))
+    count = ("particles", str(case.study.particle_count))
     return {
         "Expected": [*workpiece_notes(case), count],
         "Dimensionless numbers": dimensionless(case),

@@ -70,7 +70,7 @@ def measure_machine_speed(
     return Speed(
         filling_steps_per_s=settled.steps_per_s,
         drag_steps_per_s=last_loop(screen.read_text(errors="replace")),
-        particles=case.study.media.count,
+        particles=case.study.particle_count,
         ranks=settled.ranks,
         engine_version=settled.engine_version,
     )
@@ -79,7 +79,7 @@ def measure_machine_speed(
 def _low_bed(study: Study) -> Bed:
     """The bed as it is expected: the workpiece begins well above it."""
     surface = expected_surface(study)
-    return Bed(surface, surface + 2 * _CLEAR_DIAMETERS * study.media.radius_mean_m)
+    return Bed(surface, surface + 2 * _CLEAR_DIAMETERS * study.media.typical_radius_m)
 
 
 def _result(batch: Batch, kind: SceneType, case: Case, bed: Bed | None) -> RunRecord:

@@ -144,7 +144,7 @@ def confirmation(study: Study, restitution: float, full_restitution: float) -> I
 
 def full(study: Study, fraction: float) -> DropFidelity:
     """Full modulus, and a step that is a fraction of the mean particle's Rayleigh time."""
-    rayleigh = mechanics.rayleigh_time(particle_material(study), study.media.radius_mean_m)
+    rayleigh = mechanics.rayleigh_time(particle_material(study), study.media.typical_radius_m)
     return DropFidelity(1.0, timestep(rayleigh, fraction))
 
 
@@ -158,7 +158,7 @@ def _height(study: Study, fidelity: DropFidelity, phase: float) -> float:
 def drop_case(case: Case, drop: Drop) -> Case:
     """The case with a drop's restitution, height and contact option in place."""
     study = case.study
-    particle, plate = study.media.material, study.workpiece.material
+    particle, plate = study.media.main_material, study.workpiece.material
     pair = study.pair(particle, plate).model_copy(update={"restitution": drop.restitution})
     key = f"{particle}-{plate}" if f"{particle}-{plate}" in study.pairs else f"{plate}-{particle}"
     changed = study.model_copy(
@@ -212,8 +212,8 @@ def run_drops(case: Case, drops: Sequence[Drop], batch: Batch, report: Report) -
 
 def _listed(case: Case, rows: Sequence[DropOfList]) -> DropsFile:
     study, section = case.study, settings(case)
-    particle, plate = study.media.material, study.workpiece.material
-    material, radius = particle_material(study), study.media.radius_mean_m
+    particle, plate = study.media.main_material, study.workpiece.material
+    material, radius = particle_material(study), study.media.typical_radius_m
     modulus = mechanics.effective_modulus(material, study.materials[plate])
     height, gravity = study.drop_test.height_m, study.gravity_m_s2
     mass, speed = mechanics.particle_mass(material, radius), mechanics.fall_speed(height, gravity)

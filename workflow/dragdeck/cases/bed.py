@@ -1,6 +1,7 @@
 """The media of a study as numbers: radii, Rayleigh time, time steps, neighbour skin."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -14,24 +15,49 @@ from dragdeck.physics.contact_mechanics import (
     rayleigh_time,
     stiffness_number,
 )
-from dragdeck.physics.packing import Array, radii
 from dragdeck.physics.rounding import round_to, rounded, timestep
-from dragdeck.study.model import Media, Study
+from dragdeck.study.media import Array, Media
+from dragdeck.study.model import Study
 from dragdeck.study.workpiece import Material
 
 JUST_BEYOND = 1 + 1e-6
 """A limit counts as passed from this multiple of it on: a rounded remedy may meet it exactly."""
 
 
-def bed_radii(study: Study) -> Array:
-    """Radii of a study's particles in ascending order, (count,), m."""
-    return media_radii(study.media)
+@dataclass(frozen=True)
+class BedClass:
+    """Particles of one class in a bed.
+
+    Attributes
+    ----------
+    name : str
+        Empty if the media have no classes.
+    material : str
+    radii_m : (N,) array
+        In ascending order; not to be changed.
+    """
+
+    name: str
+    material: str
+    radii_m: Array
+
+
+def bed_classes(study: Study) -> tuple[BedClass, ...]:
+    """The particles of a study, class by class."""
+    return _classes(study.media, tuple(study.class_counts.values()))
 
 
 @lru_cache(maxsize=2)
-def media_radii(media: Media) -> Array:
-    """`bed_radii` of the media alone; not to be changed."""
-    return radii(media.count, media.radius_mean_m, media.radius_std_m)
+def _classes(media: Media, counts: tuple[int, ...]) -> tuple[BedClass, ...]:
+    parts = zip(media.parts.items(), counts, strict=True)
+    return tuple(
+        BedClass(name, str(part.material), part.radii(count)) for (name, part), count in parts
+    )
+
+
+def bed_radii(study: Study) -> Array:
+    """Radii of a study's particles, class by class and ascending in each, (count,), m."""
+    return np.concatenate([one.radii_m for one in bed_classes(study)])
 
 
 def smallest_radius(study: Study) -> float:
@@ -40,15 +66,24 @@ def smallest_radius(study: Study) -> float:
 
 
 def bed_rayleigh_time(study: Study) -> float:
-    """Rayleigh time of the bed's smallest particle at the fidelity's modulus, s."""
+    """Shortest Rayleigh time of the particles at the fidelity's modulus, s."""
     scale = study.chosen_fidelity().youngs_modulus_scale
-    return rayleigh_time(particle_material(study), smallest_radius(study), scale)
+    return min(
+        rayleigh_time(study.materials[one.material], float(one.radii_m[0]), scale)
+        for one in bed_classes(study)
+    )
 
 
-@lru_cache(maxsize=2)
-def media_volume(media: Media) -> float:
+def bed_volume(study: Study) -> float:
     """Total volume of the particles, m3."""
-    return float((4 / 3 * np.pi * media_radii(media) ** 3).sum())
+    return float((4 / 3 * np.pi * bed_radii(study) ** 3).sum())
+
+
+def bed_density(study: Study) -> float:
+    """Mass of the particles over their volume, kg/m3."""
+    volumes = [(one.radii_m**3).sum() for one in bed_classes(study)]
+    densities = [study.materials[one.material].density_kg_m3 for one in bed_classes(study)]
+    return densities[0] if len(densities) == 1 else float(np.average(densities, weights=volumes))
 
 
 def bed_timestep(study: Study, field: str) -> float:
@@ -67,7 +102,7 @@ def impact_time(study: Study, scale: float, speed_m_s: float) -> float:
     speed_m_s : float
     """
     particle, plate = particle_material(study), study.materials[study.workpiece.material]
-    radius, modulus = study.media.radius_mean_m, effective_modulus(particle, plate, scale)
+    radius, modulus = study.media.typical_radius_m, effective_modulus(particle, plate, scale)
     return hertz_contact_time(particle_mass(particle, radius), radius, modulus, speed_m_s)
 
 
@@ -103,13 +138,13 @@ def outrun(study: Study, field: str, who: str, speed_m_s: float) -> Iterator[Cau
 
 
 def particle_material(study: Study) -> Material:
-    """Material of the particles."""
-    return study.materials[study.media.material]
+    """Material of the particles, of their first class."""
+    return study.materials[study.media.main_material]
 
 
 def tip_pressure(study: Study) -> float:
     """Pressure of the bed at the depth of the workpiece's tip, Pa."""
-    density, depth = particle_material(study).density_kg_m3, study.motion.immersion_depth_m
+    density, depth = bed_density(study), study.motion.immersion_depth_m
     return bed_pressure(density, study.gravity_m_s2, depth)
 
 
@@ -121,9 +156,9 @@ def full_stiffness_number(study: Study) -> float:
 def skin(study: Study) -> float:
     """Neighbour skin, m: the fidelity's own, or a tenth of the mean radius."""
     chosen = study.chosen_fidelity().skin_m
-    return chosen if chosen is not None else round_to(0.1 * study.media.radius_mean_m, 3)
+    return chosen if chosen is not None else round_to(0.1 * study.media.typical_radius_m, 3)
 
 
 def widest_skin(study: Study) -> float:
     """Widest neighbour skin without a measurable cost, m (docs/evidence/costs.md)."""
-    return round_to(0.3 * study.media.radius_mean_m, 3)
+    return round_to(0.3 * study.media.typical_radius_m, 3)

@@ -49,7 +49,7 @@ def dimensionless(case: Case) -> list[tuple[str, str]]:
 
 
 def _gap(case: Case, gap_m: float) -> str:
-    diameters = gap_m / (2 * case.study.media.radius_mean_m)
+    diameters = gap_m / (2 * case.study.media.typical_radius_m)
     return f"{diameters:.3g} particle diameters, {1e3 * gap_m:.3g} mm"
 
 

@@ -114,7 +114,7 @@ def outlook(case: Case, scene: SceneType, timestep_s: float) -> list[PairOutlook
     """
     study = case.study
     scale = 1.0 if scene.single_particle else study.chosen_fidelity().youngs_modulus_scale
-    radius = study.media.radius_mean_m if scene.single_particle else smallest_radius(study)
+    radius = study.media.typical_radius_m if scene.single_particle else smallest_radius(study)
     speed = scene.impact_speed(case)
     return [
         _pair(study, other, others_radius, radius, scale, speed, timestep_s, name)
@@ -142,7 +142,7 @@ def _pair(
     modulus = effective_modulus(particle, partner, scale)
     contact = hertz_contact_time(fraction * mass, fraction * radius, modulus, speed)
     steps = contact / timestep_s
-    pair = study.pair(study.media.material, other)
+    pair = study.pair(study.media.main_material, other)
     return PairOutlook(
         bodies=f"particle on {name}",
         limiting=limiting,
@@ -226,8 +226,8 @@ def stable_fraction(case: Case, margin: float = 0.0) -> float:
     study, law = case.study, stable_step_law()
     softer = study.chosen_fidelity().youngs_modulus_scale ** (2 / 3)
     kappa = softer * full_stiffness_number(study)
-    restitution = study.pair(study.media.material, study.media.material).restitution
-    spread = study.media.radius_std_m / study.media.radius_mean_m
+    restitution = study.pair(study.media.main_material, study.media.main_material).restitution
+    spread = study.media.typical_std_m / study.media.typical_radius_m
     return law.largest_fraction(kappa, restitution, spread, math.exp(margin))
 
 

@@ -12,13 +12,10 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from dragdeck.study.media import SOLID_FRACTION_ESTIMATE
 from dragdeck.study.workpiece import Material
 
 Size = TypeVar("Size", float, NDArray[np.float64])
-
-SOLID_FRACTION_ESTIMATE = 0.59
-"""Solid fraction of a poured bed about twelve particles wide, an estimate used only
-for expectations before the bed exists (measured beds replace it)."""
 
 COORDINATION_ESTIMATE = 5.0
 """Contacts of a particle in a poured bed with friction, an estimate used only for expectations."""

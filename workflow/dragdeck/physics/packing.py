@@ -1,11 +1,11 @@
 """The particles before they fall: their radii and first positions.
 
-The engine gets every particle by name from a data file instead of inserting them at
-random: exactly the asked number with exactly the asked mean and spread, without
-a chance to fall short, at a cost that grows linearly.
+The engine gets every particle by name from a data file instead of inserting them at random: the
+asked number with the asked sizes, without a chance to fall short, at a cost that grows linearly.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -15,9 +15,6 @@ from numpy.typing import NDArray
 from dragdeck.errors import InputError
 
 Array = NDArray[np.float64]
-
-CUTOFF_STD = 2.5
-"""Radii lie within this many standard deviations of the untruncated normal."""
 
 _SPACING = 1.2
 """Lattice spacing over the largest diameter: room to jitter, and to fall."""
@@ -49,12 +46,15 @@ class Particles:
 
     Attributes
     ----------
+    classes : (N,) array of int
+        Class of each, in ascending order.
     radii_m : (N,) array
     positions_m : (N, 3) array
         Centres; no two particles touch.
     velocities_m_s : (N, 3) array
     """
 
+    classes: NDArray[np.int64]
     radii_m: Array
     positions_m: Array
     velocities_m_s: Array
@@ -70,35 +70,13 @@ class Particles:
         return float(np.linalg.norm(self.velocities_m_s, axis=1).max())
 
 
-def radii(count: int, mean_m: float, std_m: float) -> Array:
-    """Radii of a truncated normal distribution whose sample mean and spread are exact.
-
-    Quantiles of the normal distribution cut at `CUTOFF_STD`, then centred and
-    scaled: their mean is `mean_m` and their standard deviation (population
-    form) is `std_m`, to rounding.
-
-    Returns
-    -------
-    (count,) array
-        In ascending order, m.
-    """
-    from scipy.special import ndtr, ndtri
-
-    if count == 1 or std_m == 0:
-        return np.full(count, mean_m)
-    tail = float(ndtr(-CUTOFF_STD))
-    levels = tail + (1 - 2 * tail) * (np.arange(count) + 0.5) / count
-    scores = ndtri(levels)
-    scores = (scores - scores.mean()) / scores.std()
-    return np.asarray(mean_m + std_m * scores, dtype=np.float64)
-
-
-def pour(particle_radii_m: Array, bowl_radius_m: float, seed: int) -> Particles:
+def pour(classes_m: Sequence[Array], bowl_radius_m: float, seed: int) -> Particles:
     """Place particles on a jittered lattice inside a cylinder, in random order.
 
     Parameters
     ----------
-    particle_radii_m : (N,) array
+    classes_m : sequence of (N,) array
+        Radii of the particles of each class.
     bowl_radius_m : float
     seed : int
         Of the order of the radii, the jitter and the first velocities.
@@ -109,15 +87,21 @@ def pour(particle_radii_m: Array, bowl_radius_m: float, seed: int) -> Particles:
         The largest particle does not fit into the bowl.
     """
     random = np.random.default_rng(seed)
-    largest = float(particle_radii_m.max())
-    sites = _sites(len(particle_radii_m), bowl_radius_m, largest)
+    radii = np.concatenate(classes_m)
+    largest = float(radii.max())
+    sites = _sites(len(radii), bowl_radius_m, largest)
     jitter = (_SPACING - 1) * largest * 0.999
     velocities = random.normal(0.0, FIRST_SPEED_M_S, sites.shape)
     velocities[:, 2] = -np.abs(velocities[:, 2])  # none leaves through the top
+    order = random.permutation(len(radii))
+    positions = sites + random.uniform(-jitter, jitter, sites.shape)
+    of_class = np.repeat(np.arange(len(classes_m)), [len(one) for one in classes_m])[order]
+    by_class = np.argsort(of_class, kind="stable")
     return Particles(
-        radii_m=random.permutation(particle_radii_m),
-        positions_m=sites + random.uniform(-jitter, jitter, sites.shape),
-        velocities_m_s=velocities,
+        classes=of_class[by_class],
+        radii_m=radii[order][by_class],
+        positions_m=positions[by_class],
+        velocities_m_s=velocities[by_class],
     )
 
 

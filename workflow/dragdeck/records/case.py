@@ -60,6 +60,32 @@ class MediaOfRun(CountOfRun):
     density_kg_m3: PositiveFloat
 
 
+class ClassOfRun(Part):
+    """A class of the media.
+
+    Attributes
+    ----------
+    name, material : str
+    first_id, count : int
+        Its particles have the ids from `first_id` on.
+    radius_mean_m, radius_std_m : float
+        Of the particles as placed, m.
+    density_kg_m3 : float
+    contact_moduli, attractive : mapping
+        As in `CaseOfRun`, of a particle of this class; those with other classes by their names.
+    """
+
+    name: str
+    material: str
+    first_id: int
+    count: int
+    radius_mean_m: PositiveFloat
+    radius_std_m: float
+    density_kg_m3: PositiveFloat
+    contact_moduli: Mapping[str, ContactConstants]
+    attractive: Mapping[str, Mapping[str, float]] = omitted({})
+
+
 class BowlOfRun(Part):
     """The bowl: a cylinder about the z axis with its floor at z = 0.
 
@@ -152,6 +178,8 @@ class CaseOfRun(CaseFile):
     attractive : mapping
         By the same names, coefficients that add an attractive force, as simulated; absent if the
         contact law has none.
+    classes : tuple of ClassOfRun
+        Classes of the media, if there are several.
     unsafe_timestep : str or None
         Why a step of the process beyond the stable one is accepted.
     fidelity : FidelityOfRun
@@ -191,6 +219,7 @@ class CaseOfRun(CaseFile):
     bowl: BowlOfRun
     contact_moduli: Mapping[str, ContactConstants]
     attractive: Mapping[str, Mapping[str, float]] = omitted({})
+    classes: tuple[ClassOfRun, ...] = omitted(())
     assumptions: tuple[AssumptionOfRun, ...]
     reference: Reference | None
     unsafe_timestep: str | None = None

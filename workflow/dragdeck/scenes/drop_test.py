@@ -62,8 +62,8 @@ def drop_scene(case: Case, fidelity: DropFidelity | None = None) -> Scene[DropTe
     study = case.study
     fidelity = fidelity or DropFidelity()
     scale = fidelity.youngs_modulus_scale
-    radius = study.media.radius_mean_m
-    names = list(dict.fromkeys((study.media.material, study.workpiece.material)))
+    radius = study.media.typical_radius_m
+    names = list(dict.fromkeys((study.media.main_material, study.workpiece.material)))
     rayleigh = rayleigh_time(particle_material(study), radius, scale)
     dt = fidelity.timestep_s or timestep(rayleigh, study.drop_test.timestep_fraction)
     contact_steps = _slowest_contact_time(study, scale) / dt
@@ -97,7 +97,7 @@ def drop_scene(case: Case, fidelity: DropFidelity | None = None) -> Scene[DropTe
             dt,
             rayleigh,
             settings={"youngs_modulus_scale": scale, "skin_m": deck.skin_m, "ranks": 1},
-            restitution=study.pair(study.media.material, study.workpiece.material).restitution,
+            restitution=study.pair(study.media.main_material, study.workpiece.material).restitution,
         ),
         steps=round(_duration(study) / dt),
         files={"particle.data": lambda: _particle_data(study, len(names))},
@@ -125,21 +125,21 @@ def _modulus(scale: float) -> dict[str, str]:
 
 def _slowest_contact_time(study: Study, scale: float = 1.0) -> float:
     """Hertz time of the last impact, the slowest and so the longest, s."""
-    pair = study.pair(study.media.material, study.workpiece.material)
+    pair = study.pair(study.media.main_material, study.workpiece.material)
     speed = fall_speed(study.drop_test.height_m, study.gravity_m_s2)
     return impact_time(study, scale, speed * pair.restitution ** (study.drop_test.impacts - 1))
 
 
 def _duration(study: Study) -> float:
     """Free fall and the flights between impacts, s."""
-    pair = study.pair(study.media.material, study.workpiece.material)
+    pair = study.pair(study.media.main_material, study.workpiece.material)
     fall = fall_speed(study.drop_test.height_m, study.gravity_m_s2) / study.gravity_m_s2
     flights = sum(pair.restitution**k for k in range(1, study.drop_test.impacts))
     return fall * (1 + 2 * flights)
 
 
 def _particle_data(study: Study, types: int) -> str:
-    radius = study.media.radius_mean_m
+    radius = study.media.typical_radius_m
     start = study.drop_test.height_m + radius
     side = 4 * radius
     box = ((-side, side), (-side, side), (-radius, 2 * start + 2 * radius))
@@ -150,11 +150,11 @@ def _particle_data(study: Study, types: int) -> str:
 def _content(case: Case) -> Json:
     """What a drop test depends on."""
     study = case.study
-    particle, plate = study.media.material, study.workpiece.material
+    particle, plate = study.media.main_material, study.workpiece.material
     return {
         "materials": materials_content(study, particle, plate),
         "pair": study.pair(particle, plate).plain(),
-        "radius_m": study.media.radius_mean_m,
+        "radius_m": study.media.typical_radius_m,
         "gravity_m_s2": study.gravity_m_s2,
         "contact": study.contact.plain(),
         "drop_test": study.drop_test.plain(),
@@ -163,7 +163,7 @@ def _content(case: Case) -> Json:
 
 DROP_TEST = SceneType(
     name="drop_test",
-    slug=lambda case: f"{case.study.media.material}-on-{case.study.workpiece.material}",
+    slug=lambda case: f"{case.study.media.main_material}-on-{case.study.workpiece.material}",
     content=_content,
     build=lambda case, _: drop_scene(case),
     inputs=("particle.data",),

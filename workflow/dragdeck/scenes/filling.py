@@ -9,11 +9,12 @@ import numpy as np
 
 from dragdeck.cases.bed import (
     JUST_BEYOND,
+    bed_classes,
+    bed_density,
     bed_radii,
     bed_rayleigh_time,
     bed_timestep,
-    media_radii,
-    media_volume,
+    bed_volume,
     outrun,
     particle_material,
     skin,
@@ -25,7 +26,6 @@ from dragdeck.decks.deck import Body, Deck, LeftOut, Scene, data_file
 from dragdeck.errors import Caution, InputError
 from dragdeck.physics.contact_mechanics import (
     DENSEST_RANDOM_PACKING,
-    SOLID_FRACTION_ESTIMATE,
     bed_height,
     bed_overlap,
     bed_pressure,
@@ -44,7 +44,8 @@ from dragdeck.records.case import FillingCase
 from dragdeck.records.run import SettlingCriterion
 from dragdeck.scenes.scene import SceneType, case_of_study, material_table
 from dragdeck.study.base import Json
-from dragdeck.study.model import Media, Study
+from dragdeck.study.media import SOLID_FRACTION_ESTIMATE, Media
+from dragdeck.study.model import Study
 
 _CHECK_INTERVAL_S = 0.02
 """Time between two looks at the kinetic energy, about the fall over one particle."""
@@ -149,19 +150,23 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
 
 def _filling_types(study: Study) -> list[str]:
     """A material for each engine type; a type the fill has no use for repeats the bowl's."""
-    particle, bowl = study.media.material, study.bowl.material
-    used = list(dict.fromkeys((particle, bowl)))
+    bowl = study.bowl.material
+    used = list(dict.fromkeys((*study.media.materials, bowl)))
     return used + [bowl] * (len(study.type_names()) - len(used))
 
 
 def first_particles(study: Study) -> Particles:
     """The particles of a study before they fall."""
-    return _first_particles(study.media, study.bowl.radius_m, study.seed)
+    counts = tuple(study.class_counts.values())
+    return _first_particles(study.media, counts, study.bowl.radius_m, study.seed)
 
 
 @lru_cache(maxsize=1)
-def _first_particles(media: Media, bowl_radius_m: float, seed: int) -> Particles:
-    return pour(media_radii(media), bowl_radius_m, seed)
+def _first_particles(
+    media: Media, counts: tuple[int, ...], bowl_radius_m: float, seed: int
+) -> Particles:
+    parts = zip(media.parts.values(), counts, strict=True)
+    return pour([part.radii(count) for part, count in parts], bowl_radius_m, seed)
 
 
 def _check_capacity(case: Case) -> None:
@@ -173,15 +178,15 @@ def _check_capacity(case: Case) -> None:
         Even the densest random packing would stand above the rim.
     """
     study = case.study
-    media, bowl = study.media, study.bowl
+    bowl = study.bowl
     height = _height(study, DENSEST_RANDOM_PACKING)
     if height > bowl.height_m:
-        most = math.floor(media.count * bowl.height_m / height)
+        most = math.floor(study.particle_count * bowl.height_m / height)
         raise InputError(
             "more particles than fit into the bowl",
             file=case.file,
             field="media.count",
-            value=f"{media.count}, which fill it to at least {height:.4g} m",
+            value=f"{study.particle_count}, which fill it to at least {height:.4g} m",
             limit=f"{most} particles in a bowl {bowl.height_m:g} m high, at a solid fraction of "
             f"{DENSEST_RANDOM_PACKING} (random close packing)",
             remedy="use fewer particles, or a wider or higher bowl",
@@ -196,12 +201,12 @@ def expected_surface(study: Study) -> float:
 def expected_bed(study: Study) -> Bed:
     """The settled bed before it exists: an estimate."""
     surface = expected_surface(study)
-    return Bed(surface, surface + 2 * study.media.radius_mean_m)
+    return Bed(surface, surface + 2 * study.media.typical_radius_m)
 
 
 def _height(study: Study, solid_fraction: float) -> float:
     """Height of the study's particles in its bowl at a solid fraction, m."""
-    return bed_height(media_volume(study.media), study.bowl.radius_m, solid_fraction)
+    return bed_height(bed_volume(study), study.bowl.radius_m, solid_fraction)
 
 
 def box_top(study: Study) -> float:
@@ -212,7 +217,7 @@ def box_top(study: Study) -> float:
     It must not depend on the workpiece: cases with other workpieces share this fill, and
     their runs inherit the box from its restart file.
     """
-    diameter = 2 * study.media.radius_mean_m
+    diameter = 2 * study.media.typical_radius_m
     above_bed = 2 * expected_surface(study) + 8 * diameter
     falling = first_particles(study).top_m
     return math.ceil(100 * max(falling, above_bed, 2 * study.bowl.height_m) + 5) / 100
@@ -222,11 +227,11 @@ def rank_split(case: Case) -> Split:
     """How the box of a case is split among its ranks."""
     study = case.study
     filled = FilledBowl(
-        particles=study.media.count,
+        particles=study.particle_count,
         radius_m=study.bowl.radius_m,
         height_m=expected_surface(study),
         half_width_m=_half_width(study),
-        bottom_m=-study.media.radius_mean_m,
+        bottom_m=-study.media.typical_radius_m,
         top_m=box_top(study),
         reach_m=2 * float(bed_radii(study).max()) + skin(study),
     )
@@ -239,7 +244,7 @@ def floor_overlap(study: Study) -> float:
     An estimate.
     """
     particle, scale = particle_material(study), study.chosen_fidelity().youngs_modulus_scale
-    pressure = bed_pressure(particle.density_kg_m3, study.gravity_m_s2, expected_surface(study))
+    pressure = bed_pressure(bed_density(study), study.gravity_m_s2, expected_surface(study))
     return bed_overlap(effective_modulus(particle, particle, scale), pressure)
 
 
@@ -272,8 +277,8 @@ def _overlap_caution(study: Study) -> Iterator[Caution]:
 
 def _cohesion_caution(study: Study) -> Iterator[Caution]:
     """A warning where an attraction holds more than a particle's weight."""
-    particle, radius = particle_material(study), study.media.radius_mean_m
-    pair = study.pair(study.media.material, study.media.material)
+    particle, radius = particle_material(study), study.media.typical_radius_m
+    pair = study.pair(study.media.main_material, study.media.main_material)
     one, half = np.ones(1), np.full(1, radius / 2)
     slope = float(FrictionLimit(0.0, pair.attractive(), wall=False).attraction_n(half, one)[0])
     largest = pull_off_force(slope, effective_modulus(particle, particle), radius / 2)
@@ -288,14 +293,14 @@ def _cohesion_caution(study: Study) -> Iterator[Caution]:
 
 def bed_limits(study: Study, top_m: float, speed_m_s: float) -> RunLimits:
     """Limits of a run with the whole bed in a box of that height."""
-    mass = particle_mass(particle_material(study), study.media.radius_mean_m)
-    return run_limits(study.media.count, mass, study.gravity_m_s2, top_m, speed_m_s)
+    mass = particle_mass(particle_material(study), study.media.typical_radius_m)
+    return run_limits(study.particle_count, mass, study.gravity_m_s2, top_m, speed_m_s)
 
 
 def _energy_unit(study: Study) -> float:
     """Number of particles times m g d of the mean particle, J."""
-    media, density = study.media, particle_material(study).density_kg_m3
-    return fall_energy(media.count, density, media.radius_mean_m, study.gravity_m_s2)
+    radius, count = study.media.typical_radius_m, study.particle_count
+    return fall_energy(count, bed_density(study), radius, study.gravity_m_s2)
 
 
 def expected_time(study: Study) -> float:
@@ -310,28 +315,40 @@ def _arrival_speed(study: Study, particles: Particles) -> float:
 
 def _half_width(study: Study) -> float:
     """Half of the box's width, m."""
-    return study.bowl.radius_m + 2 * study.media.radius_mean_m
+    return study.bowl.radius_m + 2 * study.media.typical_radius_m
 
 
 def _particles_data(particles: Particles, study: Study, top_m: float, types: int) -> str:
     side = _half_width(study)
-    box = ((-side, side), (-side, side), (-study.media.radius_mean_m, top_m))
-    density = particle_material(study).density_kg_m3
-    columns = (particles.radii_m, particles.positions_m, particles.velocities_m_s)
+    box = ((-side, side), (-side, side), (-study.media.typical_radius_m, top_m))
+    names = [one.material for one in bed_classes(study)]
+    kinds = [1 + study.type_names().index(name) for name in names]
+    densities = [study.materials[name].density_kg_m3 for name in names]
+    columns = (
+        *(particles.classes, particles.radii_m),
+        *(particles.positions_m, particles.velocities_m_s),
+    )
     rows = zip(*(column.tolist() for column in columns), strict=True)
-    bodies = [Body(1, radius, density, place, velocity) for radius, place, velocity in rows]
+    bodies = [
+        Body(kinds[at], radius, densities[at], place, velocity)
+        for at, radius, place, velocity in rows
+    ]
     return data_file("particles before they fall", types, box, bodies)
 
 
 def filling_content(case: Case) -> Json:
     """What a filling depends on: less than a process, so that many share one."""
     study = case.of_filling.study
-    particle, bowl = study.media.material, study.bowl.material
+    particles, bowl = study.media.materials, study.bowl.material
     fidelity, outer = study.chosen_fidelity().plain(), study.bowl.plain()
     settings = ("youngs_modulus_scale", "filling_timestep_fraction", "skin_m", "ranks")
     return {
-        "materials": materials_content(study, particle, bowl),
-        "pairs": [study.pair(particle, other).plain() for other in (particle, bowl)],
+        "materials": materials_content(study, *particles, bowl),
+        "pairs": [
+            study.pair(one, other).plain()
+            for at, one in enumerate(particles)
+            for other in (*particles[at:], bowl)
+        ],
         "types": len(study.type_names()),
         "media": study.media.plain(),
         "bowl": {name: value for name, value in outer.items() if name != "facet_size_m"},
@@ -354,14 +371,14 @@ def partners_in_bed(case: Case) -> list[tuple[str, str, float]]:
     """What a particle of a bed meets."""
     study = case.study
     return [
-        ("particle", study.media.material, smallest_radius(study)),
+        ("particle", study.media.main_material, smallest_radius(study)),
         ("bowl", study.bowl.material, study.bowl.radius_m),
     ]
 
 
 FILLING = SceneType(
     name="filling",
-    slug=lambda case: f"{case.study.media.count}-particles",
+    slug=lambda case: f"{case.study.particle_count}-particles",
     content=filling_content,
     build=lambda case, _: filling_scene(case.of_filling),
     inputs=("particles.data",),

@@ -198,7 +198,7 @@ def stops(case: Case, drag: Drive, steps: Covered, materials: Materials) -> Iter
 
 def _before_counted(study: Study) -> tuple[float, float]:
     """Time in which the moduli are raised, and in which the bed relaxes then, s."""
-    fall = math.sqrt(2 * study.media.radius_mean_m / study.gravity_m_s2)
+    fall = math.sqrt(2 * study.media.typical_radius_m / study.gravity_m_s2)
     return max(_SHORTEST_RAMP_S, _RAMP_FALLS * fall), _SETTLING_FALLS * fall
 
 
@@ -257,7 +257,7 @@ def _block_s(study: Study) -> float:
     """Time of a block of the counted path, about a mean particle diameter, s."""
     motion = study.motion
     counted_m = motion.path_length_m - motion.uncounted_m
-    blocks = max(1, round(counted_m / (2 * study.media.radius_mean_m)))
+    blocks = max(1, round(counted_m / (2 * study.media.typical_radius_m)))
     return _seconds(counted_m / blocks, study)
 
 

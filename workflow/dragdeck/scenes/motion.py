@@ -236,7 +236,7 @@ def course(study: Study, bed: Bed, reference_m: float = 0.0) -> Course:
         Height of the workpiece's reference point above its lowest point.
     """
     motion, timestep = study.motion, bed_timestep(study, "timestep_fraction")
-    clear = round_to(bed.top_m + study.media.radius_mean_m, 6)
+    clear = round_to(bed.top_m + study.media.typical_radius_m, 6)
     dive = clear - (bed.surface_m - motion.immersion_depth_m + motion.path.start_height_m)
     found, begun, period = list[Leg](), 0, output_periods(study, timestep).network
     for name, duration, velocity in _entry(motion, dive, study.chosen_fidelity().speed_factor):

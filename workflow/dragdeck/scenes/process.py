@@ -369,7 +369,7 @@ def _content(case: Case) -> Json:
     return {
         "filling": dict(filling_content(case)),
         "materials": materials_content(study, study.workpiece.material),
-        "pair": study.pair(study.media.material, study.workpiece.material).plain(),
+        "pair": study.pair(study.media.main_material, study.workpiece.material).plain(),
         "facet_size_m": study.bowl.facet_size_m,
         "workpiece": study.workpiece.plain(),
         "motion": study.motion.plain(),

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 from dragdeck import __version__
-from dragdeck.cases.bed import particle_material, skin
+from dragdeck.cases.bed import bed_classes, bed_density, skin
 from dragdeck.cases.case import Case, digest, slug
 from dragdeck.decks.deck import Materials, Scene, contact_law
 from dragdeck.errors import InputError
@@ -18,9 +18,17 @@ from dragdeck.physics.contact_mechanics import (
 )
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import round_to
-from dragdeck.records.case import AssumptionOfRun, BowlOfRun, CaseOfRun, FidelityOfRun, MediaOfRun
+from dragdeck.records.case import (
+    AssumptionOfRun,
+    BowlOfRun,
+    CaseOfRun,
+    ClassOfRun,
+    FidelityOfRun,
+    MediaOfRun,
+)
 from dragdeck.records.packing import Packing
 from dragdeck.study.base import Json, flat
+from dragdeck.study.contact_law import Pair
 from dragdeck.study.model import Study
 
 C = TypeVar("C", bound=CaseOfRun)
@@ -157,6 +165,7 @@ def case_of_study(
         "ranks": of.ranks,
     }
     fidelity = FidelityOfRun(**{**usual, **(settings or {})})
+    main = study.media.main_material
     entries = {
         "study": of.study_name,
         "title": study.title,
@@ -167,17 +176,18 @@ def case_of_study(
         "fidelity": fidelity,
         "inputs": flat(inputs),
         "media": MediaOfRun(
-            count=study.media.count,
-            radius_mean_m=study.media.radius_mean_m,
-            radius_std_m=study.media.radius_std_m,
-            density_kg_m3=particle_material(study).density_kg_m3,
+            count=study.particle_count,
+            radius_mean_m=study.media.typical_radius_m,
+            radius_std_m=study.media.typical_std_m,
+            density_kg_m3=bed_density(study),
         ),
         "bowl": BowlOfRun(
             radius_m=study.bowl.radius_m,
             walls="primitive" if study.bowl_facet_size_m is None else "mesh",
         ),
-        "contact_moduli": _contact_moduli(study, fidelity.youngs_modulus_scale),
-        "attractive": _attractive(study, fidelity.youngs_modulus_scale),
+        "contact_moduli": _contact_moduli(study, main, fidelity.youngs_modulus_scale),
+        "attractive": _attractive(study, main, fidelity.youngs_modulus_scale),
+        "classes": _classes(study, fidelity.youngs_modulus_scale),
         "assumptions": _assumptions(study),
         "reference": study.reference,
         "versions": {"dragdeck": __version__},
@@ -185,31 +195,54 @@ def case_of_study(
     return kind(**{**entries, **own})
 
 
+def _classes(study: Study, scale: float) -> tuple[ClassOfRun, ...]:
+    """The classes of the media; none where there is one only."""
+    found, first = [], 1
+    for one in bed_classes(study) if study.media.classes else ():
+        found.append(
+            ClassOfRun(
+                name=one.name,
+                material=one.material,
+                first_id=first,
+                count=len(one.radii_m),
+                radius_mean_m=float(one.radii_m.mean()),
+                radius_std_m=float(one.radii_m.std()),
+                density_kg_m3=study.materials[one.material].density_kg_m3,
+                contact_moduli=_contact_moduli(study, one.material, scale),
+                attractive=_attractive(study, one.material, scale),
+            )
+        )
+        first += len(one.radii_m)
+    return tuple(found)
+
+
 def _bodies(study: Study) -> dict[str, str]:
-    """The material of what a particle touches."""
+    """The material of what a particle touches: other classes by their names."""
+    others = {name: str(part.material) for name, part in study.media.parts.items() if name}
     return {
-        "particle": study.media.material,
+        "particle": study.media.main_material,
         "bowl": study.bowl.material,
         "workpiece": study.workpiece.material,
+        **others,
     }
 
 
-def _attractive(study: Study, scale: float) -> dict[str, dict[str, float]]:
-    pairs = {
-        body: study.pair(study.media.material, other) for body, other in _bodies(study).items()
-    }
+def _attractive(study: Study, material: str, scale: float) -> dict[str, dict[str, float]]:
+    """Attractive coefficients of particles of a material by what they touch, as simulated."""
+    pairs = {body: study.pair(material, other) for body, other in _bodies(study).items()}
     found = {body: pair.softened(scale).attractive() for body, pair in pairs.items()}
     return {body: values for body, values in found.items() if values}
 
 
-def _contact_moduli(study: Study, scale: float) -> dict[str, ContactConstants]:
-    particle = particle_material(study)
+def _contact_moduli(study: Study, material: str, scale: float) -> dict[str, ContactConstants]:
+    """Contact constants of particles of a material by what they touch."""
+    particle = study.materials[material]
     return {
         name: ContactConstants(
             modulus_pa=effective_modulus(particle, study.materials[other], scale),
             shear_pa=effective_shear(particle, study.materials[other], scale),
-            restitution=study.pair(study.media.material, other).restitution,
-            friction=study.pair(study.media.material, other).friction,
+            restitution=study.pair(material, other).restitution,
+            friction=study.pair(material, other).friction,
         )
         for name, other in _bodies(study).items()
     }
@@ -259,12 +292,17 @@ def material_table(
     moduli = [round_to(scale * material.youngs_modulus_pa, 12) for material in materials]
     for name, modulus in zip(names, moduli, strict=True):
         _check_modulus(name, modulus, scale, case)
+    particles = {names[0], *(() if one_particle else study.media.materials)}
     size = range(len(names))
-    with_particle = [study.pair(names[0], name).softened(scale) for name in names]
-    if one_particle:
-        with_particle[0] = with_particle[-1]
-    # pairs that never touch repeat one that does
-    law = contact_law([[with_particle[max(i, j)] for j in size] for i in size])
+
+    def pair(i: int, j: int) -> Pair:
+        """Of two types; those that never touch repeat one that does."""
+        low, high = min(i, j), max(i, j)
+        first = names[low] if names[low] in particles else names[0]
+        other = names[-1] if one_particle and high == 0 else names[high]
+        return study.pair(first, other).softened(scale)
+
+    law = contact_law([[pair(i, j) for j in size] for i in size])
     return Materials(
         names=names,
         youngs_moduli_pa=moduli,

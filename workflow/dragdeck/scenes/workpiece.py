@@ -153,7 +153,7 @@ def workpiece_warnings(case: Case) -> list[Caution]:
 def _too_fine(case: Case) -> Iterator[Caution]:
     """A warning where a step is spent on facets."""
     shape, facets = case.study.workpiece.shape, workpiece_facets(case)
-    particles_s = case.study.media.count / PARTICLE_STEPS_PER_S
+    particles_s = case.study.particle_count / PARTICLE_STEPS_PER_S
     enough = max(_ALWAYS_FACETS, round(_MOST_TIMES * particles_s / FACET_STEP_S))
     if facets <= enough:
         return
@@ -173,7 +173,7 @@ def _too_fine(case: Case) -> Iterator[Caution]:
 
 
 def _of_case(case: Case, shape: MeshShape) -> "tuple[Trimesh, list[Finding]]":
-    surroundings = Surroundings(case.study.bowl.radius_m, case.study.media.radius_mean_m)
+    surroundings = Surroundings(case.study.bowl.radius_m, case.study.media.typical_radius_m)
     return _from_file(mesh_file(case, shape), shape, surroundings)
 
 
@@ -188,7 +188,7 @@ def workpiece_length(case: Case) -> float:
 def _generated_length(case: Case) -> float:
     """Length of a generated workpiece along its axis, m."""
     study = case.study
-    freeboard = _FREEBOARD_DIAMETERS * 2 * study.media.radius_mean_m
+    freeboard = _FREEBOARD_DIAMETERS * 2 * study.media.typical_radius_m
     depth = deepest(study.motion)
     return round_to((depth + freeboard) / math.cos(math.radians(study.motion.tilt_deg or 0)), 6)
 
@@ -385,7 +385,7 @@ def process_cautions(case: Case) -> Iterator[Caution]:
     """What a user should know of the workpiece and its motion before a process runs."""
     study = case.study
     yield from workpiece_warnings(case)
-    gap = _wall_gap(case) / (2 * study.media.radius_mean_m)
+    gap = _wall_gap(case) / (2 * study.media.typical_radius_m)
     if gap < _JAMMING_GAP:
         yield Caution(
             "gap",
@@ -415,7 +415,7 @@ def _beside(case: Case, gap: float) -> Iterator[InputError]:
     study = case.study
     reach = farthest_reach(study.motion)
     radius = study.bowl.radius_m - gap - reach
-    diameter = 2 * study.media.radius_mean_m
+    diameter = 2 * study.media.typical_radius_m
     if gap < diameter:
         yield InputError(
             "the workpiece does not fit between its path and the bowl"
@@ -562,7 +562,7 @@ def describe(case: Case) -> dict[str, float]:
     are diameters, or the depth, over the mean diameter of a particle.
     """
     study = case.study
-    particle, diameter = particle_material(study), 2 * study.media.radius_mean_m
+    particle, diameter = particle_material(study), 2 * study.media.typical_radius_m
     motion = study.motion
     speed = fastest_surface(case)
     rate = speed / diameter
@@ -573,7 +573,7 @@ def describe(case: Case) -> dict[str, float]:
         "tilt_deg": abs(motion.tilt_deg or 0.0),
         "further_workpieces": float(len(of_each_workpiece(case.all_workpieces)) - 1),
     }
-    names = study.media.material, study.workpiece.material
+    names = study.media.main_material, study.workpiece.material
     return {
         "stiffness_number": full_stiffness_number(study),
         "inertial_number": inertial_number(
@@ -587,5 +587,5 @@ def describe(case: Case) -> dict[str, float]:
         ),
         **superposed,
         **{name: value for name, value in optional.items() if value},
-        "particles": study.media.count,
+        "particles": study.particle_count,
     }

@@ -36,15 +36,25 @@ _Found = Iterator[tuple[str, str, str]]
 def contradictions(study: Study, whole: bool) -> Iterator[InputError]:
     """Every contradiction within a whole study, or one of its cases; the errors name no file."""
     values = flat(study.plain())
-    for check in (_names, _pairs, _shape, _motion, _assumptions, *([_sweep] if whole else [])):
+    for check in (
+        _names,
+        _pairs,
+        _media,
+        _shape,
+        _motion,
+        _assumptions,
+        *([_sweep] if whole else []),
+    ):
         for field, problem, limit in check(study):
             yield InputError(problem, field=field, value=values.get(field), limit=limit)
 
 
 def _names(study: Study) -> _Found:
-    for owner in ("media", "bowl", "workpiece"):
-        name = getattr(study, owner).material
-        yield from _known(f"{owner}.material", name, study.materials, "no such material")
+    owners = {"bowl": study.bowl.material, "workpiece": study.workpiece.material}
+    for name, part in study.media.parts.items():
+        owners[f"media.classes.{name}" if name else "media"] = str(part.material)
+    for owner, material in owners.items():
+        yield from _known(f"{owner}.material", material, study.materials, "no such material")
     if isinstance(study.fidelity, str):
         known = {**BUILT_IN_FIDELITIES, **study.fidelities}
         yield from _known("fidelity", study.fidelity, known, "unknown fidelity")
@@ -66,14 +76,25 @@ def _pairs(study: Study) -> _Found:
                 f"differs from {key}, which is the same pair",
                 "one entry per pair",
             )
-    for other in study.type_names():
-        key, back = f"{study.media.material}-{other}", f"{other}-{study.media.material}"
+    for one, other in product(study.media.materials, study.type_names()):
+        key, back = f"{one}-{other}", f"{other}-{one}"
         if key in every and not {key, back} & set(study.pairs):
             yield (
                 "pairs",
                 f"has no entry {key!r}, although these come into contact",
                 "every pair in contact",
             )
+
+
+def _media(study: Study) -> _Found:
+    media = study.media
+    for name in {"particle", "bowl", "workpiece"} & set(media.classes):
+        yield "media.classes", f"a class must not be called {name}", "another name"
+    if {str(part.material) for part in media.parts.values()} <= set(study.materials):
+        for name, count in study.class_counts.items():
+            if not count:
+                field = f"media.classes.{name}" if name else "media"
+                yield field, "not one particle of it", "a larger total or fraction"
 
 
 def _shape(study: Study) -> _Found:

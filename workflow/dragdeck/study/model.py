@@ -6,6 +6,7 @@ run.
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
@@ -21,6 +22,7 @@ from dragdeck.study.base import (
     Whole,
 )
 from dragdeck.study.contact_law import Contact, Pair
+from dragdeck.study.media import Media, class_counts
 from dragdeck.study.paths.circle import CirclePath
 from dragdeck.study.paths.figure_eight import FigureEightPath
 from dragdeck.study.paths.line import LinePath
@@ -38,26 +40,6 @@ Ranks = Annotated[
     | Annotated[Whole, Field(ge=1, le=1024), Tag("a-number")],
     Discriminator(lambda value: "a-word" if value == "auto" else "a-number"),
 ]
-
-
-class Media(Model):
-    """The media: spherical particles."""
-
-    material: str = Field(description="material of the particles: a name under `materials`")
-    count: Annotated[Whole, Field(ge=1)] = Field(description="number of particles")
-    radius_mean_m: Positive = Field(description="mean particle radius, m")
-    radius_std_m: NonNegative = Field(
-        default=0.0, description="standard deviation of the particle radii, m"
-    )
-
-    @model_validator(mode="after")
-    def _spread(self) -> "Media":
-        if self.radius_std_m > 0.3 * self.radius_mean_m:
-            raise ValueError(
-                f"radius_std_m {self.radius_std_m} exceeds 0.3 of radius_mean_m "
-                f"{self.radius_mean_m}: the smallest radii would approach zero"
-            )
-        return self
 
 
 class Bowl(Model):
@@ -596,9 +578,20 @@ class Study(Model):
         return super().absent() | (set() if self._stations else {"workpieces"})
 
     def type_names(self) -> list[str]:
-        """Materials in the order of the engine's types: particle, bowl, workpiece, each once."""
-        owners = (self.media, self.bowl, self.workpiece)
-        return list(dict.fromkeys(owner.material for owner in owners))
+        """Materials in the order of the engine's types: particles, bowl, workpiece, each once."""
+        walls = (self.bowl.material, self.workpiece.material)
+        return list(dict.fromkeys((*self.media.materials, *walls)))
+
+    @cached_property
+    def class_counts(self) -> Mapping[str, int]:
+        """Number of particles of each class of the media."""
+        densities = {name: one.density_kg_m3 for name, one in self.materials.items()}
+        return class_counts(self.media, densities, math.pi * self.bowl.radius_m**2)
+
+    @property
+    def particle_count(self) -> int:
+        """Number of particles."""
+        return sum(self.class_counts.values())
 
     def pair(self, first: str, second: str) -> Pair:
         """The contact coefficients of two materials.
@@ -617,7 +610,7 @@ class Study(Model):
     def bowl_facet_size_m(self) -> float | None:
         """Edge length of the bowl's facets, m; None for exact walls, which cannot rotate."""
         if self.bowl.facet_size_m is None and self.motion.bowl_rad_s:
-            return 2 * self.media.radius_mean_m
+            return 2 * self.media.typical_radius_m
         return self.bowl.facet_size_m
 
     def chosen_fidelity(self) -> Fidelity:

@@ -46,8 +46,13 @@ class _Range:
 _ANGLE = _Range(-1e5, -36e3, 36e3, 1e5, {})
 _RANGES = {
     "media.count": _Range(1, 1, 1e6, 4e6, {}),
-    "media.radius_mean_m": _Range(1e-5, 1e-4, 0.02, 0.1, _LENGTH),
-    "media.radius_std_m": _Range(0, 0, 0.006, 0.03, _LENGTH),
+    "media*.radius_mean_m": _Range(1e-5, 1e-4, 0.02, 0.1, _LENGTH),
+    "media*.radius_std_m": _Range(0, 0, 0.006, 0.03, _LENGTH),
+    "media*.sieve.*.0": _Range(1e-5, 1e-4, 0.04, 0.2, _LENGTH),
+    "media*.sieve.*.1": _Range(0, 0, 1, 1, {"%": 0.01}),
+    "media.classes.*.fraction": _Range(1e-9, 1e-6, 1, 1, {"%": 0.01}),
+    "media.mass_kg": _Range(1e-6, 1e-3, 1e3, 1e5, {"g": 1e-3}),
+    "media.fill_height_m": _Range(1e-4, 1e-3, 2, 10, _LENGTH),
     "bowl.radius_m": _Range(1e-3, 5e-3, 2, 10, _LENGTH),
     "bowl.height_m": _Range(1e-3, 5e-3, 2, 10, _LENGTH),
     "workpiece*.shape.radius_m": _Range(1e-5, 2e-4, 0.3, 2, _LENGTH),

@@ -1,0 +1,316 @@
+"""The media: spherical particles of one class or several, their sizes and their total.
+
+A class has a material, a distribution of sizes and a fraction of the whole. Sizes are not drawn at
+random: they are quantiles of the distribution, so that mean and spread, or the sieve curve, come
+out as asked.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import Annotated, Literal, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from dragdeck.study.base import (
+    MaterialName,
+    Model,
+    Name,
+    NonNegative,
+    Number,
+    Positive,
+    Whole,
+)
+
+Array = NDArray[np.float64]
+
+SOLID_FRACTION_ESTIMATE = 0.59
+"""Solid fraction of a poured bed about twelve particles wide, an estimate used only for
+expectations before the bed exists (measured beds replace it)."""
+
+CUTOFF_STD = 2.5
+"""Radii lie within this many standard deviations of the untruncated normal distribution."""
+
+_LARGEST_SPREAD = 0.3
+"""Standard deviation over mean of radii: the smallest of a normal distribution stay above zero."""
+
+_LEVELS = 4096
+"""Quantiles from which the moments of a distribution are computed."""
+
+MOST_SIEVES = 100
+
+
+def _none(value: object) -> bool:
+    return value is None
+
+
+class Sieve(NamedTuple):
+    """A row of a sieve analysis: diameter, m, and the fraction of the mass that is finer."""
+
+    diameter_m: Positive
+    mass_passing: Annotated[Number, Field(ge=0, le=1)]
+
+
+class Grains(Model):
+    """Particles of one material and one distribution of sizes."""
+
+    material: MaterialName | None = Field(
+        default=None, description="material of the particles: a name under `materials`"
+    )
+    radius_mean_m: Positive | None = Field(default=None, description="mean particle radius, m")
+    radius_std_m: NonNegative = Field(
+        default=0.0, description="standard deviation of the particle radii, m"
+    )
+    distribution: Literal["normal", "log_normal", "uniform"] = Field(
+        default="normal",
+        description="distribution of the radii that has this mean and standard deviation",
+        exclude_if=lambda value: value == "normal",
+    )
+    sieve: Annotated[list[Sieve], Field(min_length=2, max_length=MOST_SIEVES)] | None = Field(
+        default=None,
+        description="instead of radius_mean_m, a sieve analysis: 2 to 100 rows [diameter, fraction "
+        "of the mass that is finer], m and 0 to 1, straight between them; or the name of a CSV "
+        "file with the columns diameter_m and mass_passing, relative to the study",
+        exclude_if=_none,
+    )
+
+    @model_validator(mode="after")
+    def _sizes(self) -> Self:
+        mean, std = self.radius_mean_m, self.radius_std_m
+        if self.sieve is not None:
+            if mean is not None or std:
+                raise ValueError("give either sieve or radius_mean_m, and not both")
+            _check_sieve(self.sieve)
+        elif mean is not None and std > _LARGEST_SPREAD * mean:
+            raise ValueError(
+                f"radius_std_m {std} exceeds {_LARGEST_SPREAD} of radius_mean_m {mean}: the "
+                "smallest radii would approach zero"
+            )
+        return self
+
+    def radii(self, count: int) -> Array:
+        """Radii in ascending order, (count,), m.
+
+        Quantiles of the distribution; those of a mean and a standard deviation are then shifted and
+        scaled so that mean and standard deviation (population form) are exact.
+        """
+        if self.sieve is not None:
+            return _sieved(self.sieve, count)
+        assert self.radius_mean_m is not None
+        return QUANTILES[self.distribution](self.radius_mean_m, self.radius_std_m, count)
+
+    @property
+    def mean_volume_m3(self) -> float:
+        """Mean volume of a particle, m3."""
+        return float(4 / 3 * math.pi * (self.radii(_LEVELS) ** 3).mean())
+
+
+def _check_sieve(rows: Sequence[Sieve]) -> None:
+    diameters, passing = zip(*rows, strict=True)
+    if any(b <= a for a, b in pairwise(diameters)):
+        raise ValueError("the diameters of the sieve analysis do not increase")
+    if any(b < a for a, b in pairwise(passing)):
+        raise ValueError("the mass passing decreases from a sieve to the next larger one")
+    if passing[0] != 0 or passing[-1] != 1:
+        raise ValueError(
+            f"the mass passing goes from {passing[0]:g} to {passing[-1]:g}: the first sieve must "
+            "pass 0, the last one 1"
+        )
+
+
+def _normal_scores(count: int) -> Array:
+    from scipy.special import ndtr, ndtri
+
+    tail = float(ndtr(-CUTOFF_STD))
+    return np.asarray(ndtri(tail + (1 - 2 * tail) * (np.arange(count) + 0.5) / count))
+
+
+def _scaled(scores: Array, mean_m: float, std_m: float) -> Array:
+    scores = (scores - scores.mean()) / scores.std()
+    return np.asarray(mean_m + std_m * scores, dtype=np.float64)
+
+
+def _normal(mean_m: float, std_m: float, count: int) -> Array:
+    """A normal distribution cut at `CUTOFF_STD`."""
+    if count == 1 or std_m == 0:
+        return np.full(count, mean_m)
+    return _scaled(_normal_scores(count), mean_m, std_m)
+
+
+def _uniform(mean_m: float, std_m: float, count: int) -> Array:
+    if count == 1 or std_m == 0:
+        return np.full(count, mean_m)
+    return _scaled((np.arange(count) + 0.5) / count, mean_m, std_m)
+
+
+def _log_normal(mean_m: float, std_m: float, count: int) -> Array:
+    """A log-normal distribution cut at `CUTOFF_STD` of the logarithm."""
+    from scipy.optimize import brentq
+
+    if count == 1 or std_m == 0:
+        return np.full(count, mean_m)
+    scores = _normal_scores(count)
+
+    def spread(width: float) -> float:
+        sizes = np.exp(width * scores)
+        return float(sizes.std() / sizes.mean() - std_m / mean_m)
+
+    sizes = np.exp(brentq(spread, 0.0, 2.0, xtol=1e-14) * scores)
+    return np.asarray(mean_m * sizes / sizes.mean())
+
+
+QUANTILES = {"normal": _normal, "uniform": _uniform, "log_normal": _log_normal}
+
+
+def _sieved(rows: Sequence[Sieve], count: int) -> Array:
+    """Radii whose mass follows a sieve analysis.
+
+    Between two sieves a and b the mass is uniform in the diameter d, so that the number density
+    goes as ``1 / d^3`` and the number finer than d as ``1 / a^2 - 1 / d^2``.
+    """
+    diameter, passing = np.array(rows, dtype=np.float64).T
+    inverse = diameter**-2
+    number = np.diff(passing) / np.diff(diameter) * (inverse[:-1] - inverse[1:])
+    finer = np.concatenate([[0.0], np.cumsum(number)])
+    level = finer[-1] * (np.arange(count) + 0.5) / count
+    at = np.searchsorted(finer, level, side="right") - 1
+    part = (level - finer[at]) / number[at]
+    return np.asarray((inverse[at] - part * (inverse[at] - inverse[at + 1])) ** -0.5 / 2)
+
+
+class MediaClass(Grains):
+    """One of several classes of particles."""
+
+    fraction: Annotated[Number, Field(gt=0, le=1)] = Field(
+        description="fraction of the class; those of all classes sum to 1"
+    )
+
+
+class Media(Grains):
+    """The media: spherical particles of one class, or of several."""
+
+    count: Annotated[Whole, Field(ge=1)] | None = Field(
+        default=None, description="number of particles"
+    )
+    mass_kg: Positive | None = Field(
+        default=None, description="total mass, kg, instead of count", exclude_if=_none
+    )
+    fill_height_m: Positive | None = Field(
+        default=None,
+        description="expected height of the bed, m, instead of count: an estimate with the solid "
+        "fraction of a poured bed; the height obtained is in the report",
+        exclude_if=_none,
+    )
+    classes: dict[Name, MediaClass] = Field(
+        default_factory=dict,
+        description="several classes by name, each with material, sizes and fraction, instead of "
+        "material and sizes here",
+        exclude_if=lambda value: not value,
+    )
+    fractions_of: Literal["number", "mass", "volume"] = Field(
+        default="mass",
+        description="what the fractions of the classes refer to",
+        exclude_if=lambda value: value == "mass",
+    )
+
+    @model_validator(mode="after")
+    def _whole(self) -> Self:
+        totals = [self.count, self.mass_kg, self.fill_height_m]
+        if sum(total is not None for total in totals) != 1:
+            raise ValueError("give one of count, mass_kg and fill_height_m")
+        for name, grains in self.parts.items():
+            where = f"class {name}: " if name else ""
+            if grains.material is None:
+                raise ValueError(f"{where}a material is missing")
+            if grains.radius_mean_m is None and grains.sieve is None:
+                raise ValueError(f"{where}radius_mean_m or sieve is missing")
+        if self.classes:
+            if self.material or self.radius_mean_m or self.sieve:
+                raise ValueError("with classes, material and sizes stand in each of them")
+            total = sum(one.fraction for one in self.classes.values())
+            if abs(total - 1) > 1e-6:
+                raise ValueError(f"the fractions of the classes sum to {total:.6g}, not to 1")
+        return self
+
+    def __hash__(self) -> int:
+        """Of what the study says, as it has parts that have no hash."""
+        return hash(self.model_dump_json())
+
+    @property
+    def parts(self) -> Mapping[str, Grains]:
+        """The classes by name; one without a name where the study has none."""
+        return self.classes or {"": self}
+
+    @property
+    def main(self) -> Grains:
+        """The first class: drop test, skin and dimensionless numbers refer to it."""
+        return next(iter(self.parts.values()))
+
+    @property
+    def main_material(self) -> str:
+        """Material of the first class."""
+        return str(self.main.material)
+
+    @property
+    def typical_radius_m(self) -> float:
+        """Mean radius of the first class, m; of a sieve analysis the Sauter mean."""
+        main = self.main
+        if main.radius_mean_m is not None:
+            return main.radius_mean_m
+        sizes = main.radii(_LEVELS)
+        return float((sizes**3).sum() / (sizes**2).sum())
+
+    @property
+    def typical_std_m(self) -> float:
+        """Standard deviation of the radii of the first class, m."""
+        main = self.main
+        return main.radius_std_m if main.sieve is None else float(main.radii(_LEVELS).std())
+
+    @property
+    def materials(self) -> Sequence[str]:
+        """Materials of the classes in their order, each once."""
+        return list(dict.fromkeys(str(part.material) for part in self.parts.values()))
+
+
+def class_counts(
+    media: Media, densities_kg_m3: Mapping[str, float], bowl_area_m2: float
+) -> Mapping[str, int]:
+    """Number of particles of each class.
+
+    Parameters
+    ----------
+    media : Media
+    densities_kg_m3 : mapping
+        Of the materials by name.
+    bowl_area_m2 : float
+        Area of the bowl's floor, on which a fill height stands.
+    """
+    volume = {name: part.mean_volume_m3 for name, part in media.parts.items()}
+    mass = {
+        name: volume[name] * densities_kg_m3[str(part.material)]
+        for name, part in media.parts.items()
+    }
+    per_particle = {"number": dict.fromkeys(volume, 1.0), "mass": mass, "volume": volume}
+    fractions = {name: one.fraction for name, one in media.classes.items()} or {"": 1.0}
+    by_number = {
+        name: share / per_particle[media.fractions_of][name] for name, share in fractions.items()
+    }
+    if media.count is not None:
+        scale = media.count / sum(by_number.values())
+    else:
+        weight = volume if media.mass_kg is None else mass
+        of_all = sum(number * weight[name] for name, number in by_number.items())
+        solid = SOLID_FRACTION_ESTIMATE * bowl_area_m2 * (media.fill_height_m or 0.0)
+        scale = (solid if media.mass_kg is None else media.mass_kg) / of_all
+    return _whole_numbers({name: scale * number for name, number in by_number.items()})
+
+
+def _whole_numbers(wanted: Mapping[str, float]) -> dict[str, int]:
+    """Whole numbers with the rounded total of all: the largest remainders are rounded up."""
+    found = {name: math.floor(number) for name, number in wanted.items()}
+    missing = round(sum(wanted.values())) - sum(found.values())
+    for name in sorted(wanted, key=lambda one: found[one] - wanted[one])[:missing]:
+        found[name] += 1
+    return found
