@@ -14,9 +14,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from dragchain.arrays import Floats, Ints
-from dragchain.run.case import friction_with, input_of, number_of
+from dragchain.errors import TableError
 from dragchain.run.kinematics import drag_surface_speed
-from dragdeck.physics.contact_mechanics import Elastic, effective_modulus, hertz_contact_time
+from dragdeck.physics.contact_mechanics import hertz_contact_time
 from dragdeck.records.case import CaseOfRun
 
 IMPACT, SLIDING, ROLLING, RESTING = TYPES = ("impact", "sliding", "rolling", "resting")
@@ -83,20 +83,14 @@ def surfaces(case: CaseOfRun) -> Surfaces:
     Raises
     ------
     TableError
-        If ``case.json`` does not give the materials.
+        If ``case.json`` does not give their constants.
     """
-    friction = friction_with(case, "workpiece").friction
-    bodies = [input_of(case, f"{body}.material") for body in ("media", "workpiece")]
-    names = ("youngs_modulus_pa", "poissons_ratio")
-    first, second = (
-        Elastic(*(number_of(case, f"materials.{material}.{name}") for name in names))
-        for material in bodies
-    )
-    modulus = case.fidelity.youngs_modulus_scale * effective_modulus(first, second)
-    radius = case.media.radius_mean_m
+    if "workpiece" not in case.contact_moduli:
+        raise TableError(f"{case.run}: case.json has no contact_moduli.workpiece; render it again")
+    contact, radius = case.contact_moduli["workpiece"], case.media.radius_mean_m
     mass = case.media.density_kg_m3 * 4.0 / 3.0 * np.pi * radius**3
-    time_s = hertz_contact_time(mass, radius, modulus, drag_surface_speed(case))
-    return Surfaces(friction, float(time_s))
+    time_s = hertz_contact_time(mass, radius, contact.modulus_pa, drag_surface_speed(case))
+    return Surfaces(contact.friction, float(time_s))
 
 
 def find_events(rows: pd.DataFrame, frames: int, interval_s: float) -> tuple[pd.DataFrame, Ints]:

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 
 from dragchain.arrays import Floats, Ints
 from dragchain.errors import TableError
-from dragchain.loading.contact_events import AMOUNTS, POINT, SLIP, Thresholds, surfaces
-from dragchain.run.case import attracts
+from dragchain.loading.contact_events import AMOUNTS, POINT, SLIP, Thresholds
+from dragchain.run.case import attracts, friction_with
 from dragchain.run.kinematics import (
     axis_speed,
     bowl_velocity,
@@ -177,7 +177,9 @@ def _with_amounts(
     steps = rows["step"].to_numpy()
     rotation = workpiece_rotation(steps, heading, case)
     speed = np.linalg.norm(slip, axis=1)
-    most = surfaces(case).friction * (normal + rows.get(ATTRACTION, 0.0))
+    ids = rows["particle_id"].to_numpy()
+    limit = friction_with(case, "workpiece").at(ids, ids)
+    most = limit.friction * (normal + rows.get(ATTRACTION, 0.0))
     mobilisation = np.divide(tangential, most, out=np.full_like(most, np.inf), where=most > 0.0)
     mobilised = mobilisation >= limits.mobilised
     velocity = workpiece_velocity(steps, point, reference, case)

@@ -1,13 +1,15 @@
 """What ``case.json`` says of a run: its inputs by dotted name, and the friction of its contacts."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
+import numpy as np
 from pydantic import JsonValue
 
+from dragchain.arrays import Floats, Ints
 from dragchain.errors import TableError
 from dragdeck.physics.coulomb import FrictionLimit
-from dragdeck.records.case import CaseOfRun
+from dragdeck.records.case import CaseOfRun, ClassOfRun
 
 
 def changed_inputs(
@@ -19,27 +21,6 @@ def changed_inputs(
     """
     names = sorted({*own, *other})
     return {name: own.get(name) for name in names if own.get(name) != other.get(name)}
-
-
-def input_of(case: CaseOfRun, name: str) -> JsonValue:
-    """An input of a run by its dotted name.
-
-    Raises
-    ------
-    TableError
-        If ``case.json`` does not give it.
-    """
-    if name not in case.inputs:
-        raise TableError(f"{case.run}: case.json has no inputs.{name}; render the run again")
-    return case.inputs[name]
-
-
-def number_of(case: CaseOfRun, name: str) -> float:
-    """An input of a run that must be a number; see `input_of`."""
-    value = input_of(case, name)
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise TableError(f"{case.run}: case.json: inputs.{name} is {value!r}, not a number")
-    return float(value)
 
 
 def friction_with(case: CaseOfRun, body: str) -> FrictionLimit:
@@ -60,13 +41,36 @@ def friction_with(case: CaseOfRun, body: str) -> FrictionLimit:
         )
     if body not in case.contact_moduli:
         raise TableError(f"{case.run}: case.json has no contact_moduli.{body}; render it again")
-    friction = case.contact_moduli[body].friction
-    return FrictionLimit(friction, case.attractive.get(body, {}), wall=body != "particle")
+    wall = body != "particle"
+    if not case.classes:
+        return FrictionLimit(
+            case.contact_moduli[body].friction, case.attractive.get(body, {}), wall
+        )
+    others = (body,) if wall else tuple(one.name for one in case.classes)
+    names = {name for one in case.classes for rows in one.attractive.values() for name in rows}
+
+    def table(value: Callable[[ClassOfRun, str], float]) -> Floats:
+        found = np.array([[value(one, other) for other in others] for one in case.classes])
+        return found[:, 0] if wall else found
+
+    def of(name: str) -> Floats:
+        return table(lambda one, other: one.attractive.get(other, {}).get(name, 0.0))
+
+    friction = table(lambda one, other: one.contact_moduli[other].friction)
+    first_ids = tuple(one.first_id for one in case.classes)
+    return FrictionLimit(friction, {name: of(name) for name in names}, wall, first_ids)
+
+
+def class_of(case: CaseOfRun, particle_id: Ints) -> Ints:
+    """Number of the class of (N,) particles in `CaseOfRun.classes`, from 0."""
+    first = [one.first_id for one in case.classes]
+    return np.searchsorted(first, particle_id, side="right") - 1
 
 
 def attracts(case: CaseOfRun) -> bool:
     """Whether the contact law attracts particles to the workpiece."""
-    return "workpiece" in case.attractive
+    parts = [case.attractive, *(one.attractive for one in case.classes)]
+    return any("workpiece" in part for part in parts)
 
 
 def upstream_folders(run_dir: Path, case: CaseOfRun) -> dict[str, Path]:

@@ -44,6 +44,13 @@ WORKPIECE_CONTACTS = (
 ATTRACTION = "attraction_n"
 """Column of ``workpiece_contacts`` beside these where the contact law attracts particles."""
 
+CLASSES = {
+    "particles": ("class",),
+    "workpiece_contacts": ("class",),
+    "contacts": ("a_class", "b_class"),
+}
+"""Columns of tables beside theirs where the media have classes, by table."""
+
 CONTACTS = (
     "step", "time_s", "kind", "a_id", "b_id", *POINT, *FORCES,
     "normal_force_n", "tangential_force_n", "overlap_m",

@@ -150,10 +150,9 @@ def _particle_particle(
     point = centre + (particles.radii[at_first] - 0.5 * overlap)[:, None] * away
     first_m, second_m = particles.radii[at_first], particles.radii[at_second]
     reduced = first_m * second_m / (first_m + second_m)
-    attraction = friction.attraction_n(reduced, overlap)
-    force, removed = within_friction(
-        contacts.vectors(*FORCES), -away, friction.friction, attraction
-    )
+    limit = friction.at(first, second)
+    attraction = limit.attraction_n(reduced, overlap)
+    force, removed = within_friction(contacts.vectors(*FORCES), -away, limit.friction, attraction)
     rows = _rows("particle-particle", first, second, point, force, -away, overlap)
     return replace(rows, removed_n=removed)
 

@@ -36,7 +36,7 @@ def category(codes: Any, labels: tuple[str, ...]) -> pa.Array:
 
 def column_type(name: str) -> pa.DataType:
     """Tell a column's type by its name: ids int64, labels text, flags bool, else float64."""
-    if name in ("phase", "kind"):
+    if name in ("phase", "kind", "class", "a_class", "b_class"):
         return _CATEGORY
     if name == "in_statistics":
         return pa.bool_()

@@ -183,7 +183,7 @@ def join_workpiece_frames(
             "more than once"
         )
     written = int(np.count_nonzero(_on(touching) == meshes.workpiece))
-    touching = _within_friction(touching, pushed, friction, meshes.bowl)
+    touching = _within_friction(touching, pushed, friction, meshes.bowl, above)
     if merge:
         touching = _merged(touching, pushed)
     touching = touching.take(np.lexsort((touching.ids("facet_id"), touching.ids("particle_id"))))
@@ -228,7 +228,11 @@ def _rows_of(contacts: Frame, particles: Frame) -> tuple[NDArray[np.bool_], Ints
 
 
 def _within_friction(
-    contacts: Frame, particles: Frame, friction: tuple[FrictionLimit, FrictionLimit], bowl: int
+    contacts: Frame,
+    particles: Frame,
+    friction: tuple[FrictionLimit, FrictionLimit],
+    bowl: int,
+    above: int,
 ) -> Frame:
     """Add the normals, and cut the evaluated forces on particles that received one."""
     loud, at = _rows_of(contacts, particles)
@@ -238,9 +242,11 @@ def _within_friction(
     radius = np.asarray(particles.columns["radius_m"][at], dtype=np.float64)
     overlap = np.asarray(contacts.columns["overlap_m"][loud], dtype=np.float64)
     on_bowl = _on(contacts)[loud] == bowl
-    limit = np.where(on_bowl, friction[1].friction, friction[0].friction)
+    ids = contacts.ids("particle_id")[loud] % above
+    of_class = [one.at(ids, ids) for one in friction]
+    limit = np.where(on_bowl, of_class[1].friction, of_class[0].friction)
     attraction = np.zeros(contacts.rows)
-    both = (one.attraction_n(radius, overlap) for one in friction)
+    both = (one.attraction_n(radius, overlap) for one in of_class)
     attraction[loud] = np.where(~on_bowl, *both)
     forces[loud], _ = within_friction(forces[loud], normal[loud], limit, attraction[loud])
     added = (*FORCES, *_NORMAL, ATTRACTION)

@@ -11,7 +11,7 @@ import pyarrow as pa
 
 from dragchain.arrays import Floats, Ints
 from dragchain.errors import TableError
-from dragchain.run.case import attracts, friction_with
+from dragchain.run.case import attracts, class_of, friction_with
 from dragchain.run.kinematics import (
     counted_mask,
     directions,
@@ -27,6 +27,7 @@ from dragchain.tables.closure import LIMIT, SHARED_LIMIT, Closure
 from dragchain.tables.columns import (
     ATTRACTION,
     BODY,
+    CLASSES,
     CONTACTS,
     FORCES,
     IMPACTS,
@@ -212,8 +213,8 @@ def _write_workpiece_contacts(run: Run, file: Path) -> None:
     shared = run.case.bowl.walls == "mesh"
     closure = Closure(limit=SHARED_LIMIT if shared else LIMIT)
     samples = WorkpieceSamples(run.prints("workpiece_force"))
-    columns = WORKPIECE_CONTACTS + ((ATTRACTION,) if attracts(run.case) else ())
-    with table_writer(file, columns) as table:
+    own = WORKPIECE_CONTACTS + ((ATTRACTION,) if attracts(run.case) else ())
+    with table_writer(file, _with_classes(own, "workpiece_contacts", run.case)) as table:
         for frames in run.workpiece_frames():
             of_step = [samples.from_start(step) for step in frames.step.tolist()]
             places, at = np.array([one.ref_m for one in of_step]), frames.workpiece_at
@@ -271,7 +272,8 @@ def workpiece_contact_rows(
         "azimuth_rad": wrap_angle(np.arctan2(y, x) - heading),
         "depth_m": needed(case.surface_m, "surface_m") - contacts.point_m[:, 2],
         "in_statistics": counted_mask(steps, case),
-        **({ATTRACTION: contacts.attraction_n} if attracts(case) else {}),
+        ATTRACTION: contacts.attraction_n,
+        **_classes("workpiece_contacts", case, contacts.particle_id),
     }
 
 
@@ -283,19 +285,22 @@ def _named(names: tuple[str, ...], vectors: Floats) -> dict[str, Floats]:
 
 
 def _write_particles(run: Run, file: Path) -> None:
-    with table_writer(file, ("step", "time_s", *KINEMATICS)) as table:
+    own = ("step", "time_s", *KINEMATICS)
+    with table_writer(file, _with_classes(own, "particles", run.case)) as table:
         for frame in run.frames("particles"):
             steps = np.full(frame.rows, frame.step)
             order = np.argsort(frame.columns["particle_id"])
             rows = {name: frame.columns[name][order] for name in KINEMATICS}
-            table.write({"step": steps, "time_s": steps * run.case.timestep_s, **rows})
+            classes = _classes("particles", run.case, rows["particle_id"].astype(np.int64))
+            time = {"step": steps, "time_s": steps * run.case.timestep_s}
+            table.write({**time, **rows, **classes})
 
 
 def _write_contacts(run: Run, file: Path) -> None:
     bowl_radius = run.case.bowl.radius_m
     particles, pairs = run.frames("particles"), run.workpiece_pairs()
     friction, corrected = friction_with(run.case, "particle"), np.zeros(8)
-    with table_writer(file, CONTACTS) as table:
+    with table_writer(file, _with_classes(CONTACTS, "contacts", run.case)) as table:
         for frame in run.frames("contacts"):
             workpiece = _frame_at(pairs, frame.step, "workpiece_contacts").join()
             beside = _frame_at(particles, frame.step, "particles")
@@ -303,7 +308,8 @@ def _write_contacts(run: Run, file: Path) -> None:
             rows = contact_rows(beside, frame, *touching, bowl_radius, friction)
             corrected += count_corrections(rows, workpiece.merged)
             table.write(_contact_columns(frame.step, rows, run.case))
-    Corrections.of(friction.friction, corrected).write(run.table("corrections.json"))
+    of_main = run.case.contact_moduli["particle"].friction
+    Corrections.of(of_main, corrected).write(run.table("corrections.json"))
 
 
 class _Stepped(Protocol):
@@ -338,6 +344,23 @@ def _contact_columns(step: int, rows: ContactRows, case: CaseOfRun) -> Rows:
         "normal_force_n": rows.normal_force_n,
         "tangential_force_n": rows.tangential_force_n,
         "overlap_m": rows.overlap_m,
+        **_classes("contacts", case, rows.a_id, rows.b_id),
+    }
+
+
+def _with_classes(own: tuple[str, ...], table: str, case: CaseOfRun) -> tuple[str, ...]:
+    return own + (CLASSES[table] if case.classes else ())
+
+
+def _classes(table: str, case: CaseOfRun, *particle_ids: Ints) -> dict[str, pa.Array]:
+    """The columns of a table with the classes of (N,) particles; ids below 1 have none."""
+    if not case.classes:
+        return {}
+    names = (*(one.name for one in case.classes), "none")
+    codes = (np.where(ids > 0, class_of(case, ids), len(names) - 1) for ids in particle_ids)
+    return {
+        column: category(of_column, names)
+        for column, of_column in zip(CLASSES[table], codes, strict=True)
     }
 
 

@@ -22,7 +22,7 @@ PAIR = [[0.0, 0.0, 0.1], [0.0, 1.2 * (RADIUS - OVERLAP / 2), 0.1 + 1.6 * (RADIUS
 
 def number(centres: list[list[float]], constants: ContactConstants, step: float = STEP) -> float:
     radii = np.full(len(centres), RADIUS)
-    return stability_number(np.array(centres), radii, DENSITY, BOWL, [constants] * 2, step)
+    return stability_number(np.array(centres), radii, DENSITY, BOWL, [[constants] * 2], step)
 
 
 def stiffness(curvature_radius: float) -> tuple[float, float]:
@@ -66,7 +66,7 @@ def test_without_damping_it_is_the_largest_frequency_of_a_bed() -> None:
     stiff = hertz_stiffness(overlap[hit], effective, *moduli)
     mass = 4 / 3 * np.pi * radius**3 * DENSITY
     omega = largest_frequency(mass, a, b, away[hit] / distance[hit, None], stiff)
-    found = stability_number(centre, radius, DENSITY, 1.0, [ELASTIC] * 2, STEP)
+    found = stability_number(centre, radius, DENSITY, 1.0, [[ELASTIC] * 2], STEP)
     assert found == pytest.approx(omega * STEP / 2, rel=1e-3)
 
 

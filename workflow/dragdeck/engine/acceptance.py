@@ -206,7 +206,8 @@ def _stable_timestep(
 ) -> AcceptanceCheck:
     """Whether the median `stability_number` of the frames is 1 at most."""
     case = CaseOfRun.read(folder / CASE_FILE)
-    wanted = [particles.columns.index(name) for name in ("x_m", "y_m", "z_m", "radius_m")]
+    names = ("x_m", "y_m", "z_m", "radius_m", "particle_id")
+    wanted = [particles.columns.index(name) for name in names]
     frames = some_frames(folder, particles, parts, _FRAMES)
     found = [_stability_number(case, rows[:, wanted]) for rows in frames]
     number, reason, limit = float(np.median(found or [0.0])), case.unsafe_timestep, "1"
@@ -222,12 +223,16 @@ def _stable_timestep(
 
 
 def _stability_number(case: CaseOfRun, rows: Floats) -> float:
-    """That of centres and radii; infinite for those of no packing."""
+    """That of centres, radii and ids; infinite for those of no packing."""
     if not (rows.size and np.isfinite(rows).all()):
         return math.inf
-    constants = [case.contact_moduli[name] for name in ("particle", "bowl")]
-    of_case = case.media.density_kg_m3, case.bowl.radius_m, constants, case.timestep_s
-    return stability_number(rows[:, :3], rows[:, 3], *of_case)
+    first = [one.first_id for one in case.classes] or [1]
+    own = np.searchsorted(first, rows[:, 4], side="right") - 1
+    densities = [one.density_kg_m3 for one in case.classes] or [case.media.density_kg_m3]
+    bodies = [*(one.name for one in case.classes), "bowl"] if case.classes else ["particle", "bowl"]
+    constants = [[one.contact_moduli[body] for body in bodies] for one in case.classes or (case,)]
+    of_case = np.array(densities)[own], case.bowl.radius_m, constants, case.timestep_s
+    return stability_number(rows[:, :3], rows[:, 3], *of_case, own)
 
 
 def ranks_check(split: Decomposition | None, ranks: int) -> AcceptanceCheck:

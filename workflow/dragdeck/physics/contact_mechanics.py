@@ -230,10 +230,11 @@ class ContactConstants:
 def stability_number(
     centre_m: Floats,
     radius_m: Floats,
-    density_kg_m3: float,
+    density_kg_m3: Floats | float,
     bowl_radius_m: float,
-    constants: Sequence[ContactConstants],
+    constants: Sequence[Sequence[ContactConstants]],
     timestep_s: float,
+    classes: Ints | None = None,
 ) -> float:
     """Stability number of a time step: above 1 the contacts gain energy from step to step.
 
@@ -253,10 +254,13 @@ def stability_number(
     ----------
     centre_m, radius_m : (N, 3) and (N,) ndarray
         Of the particles, in a bowl about the z axis with its floor at z = 0.
-    density_kg_m3, bowl_radius_m : float
-    constants : sequence of ContactConstants
-        Of a particle with a particle and with the bowl.
+    density_kg_m3 : float or (N,) ndarray
+    bowl_radius_m : float
+    constants : sequence of sequence of ContactConstants
+        For each class of particles, those with particles of each class and with the bowl.
     timestep_s : float
+    classes : (N,) ndarray of int, optional
+        Number of each particle's class; of one class if not given.
 
     Returns
     -------
@@ -272,9 +276,14 @@ def stability_number(
         return 0.0
     # the bowl is the last body: it has no curvature and never moves
     curvature = np.append(1 / radius_m, 0.0)
-    inverse_mass = 3 / (4 * math.pi * density_kg_m3) * curvature**3
-    laws = np.array([(*astuple(one), damping_ratio(one.restitution)) for one in constants])
-    modulus, shear, _, friction, ratio = laws[(bodies[1] == len(radius_m)).astype(int)].T
+    inverse_mass = np.append(3 / (4 * math.pi * density_kg_m3) * np.ones_like(radius_m), 0.0)
+    inverse_mass *= curvature**3
+    own = np.zeros(len(radius_m), dtype=np.int64) if classes is None else classes
+    laws = np.array(
+        [[(*astuple(one), damping_ratio(one.restitution)) for one in row] for row in constants]
+    )
+    partner = np.append(own, len(constants))[bodies[1]]  # the bowl comes after the classes
+    modulus, shear, _, friction, ratio = laws[own[bodies[0]], partner].T
     contact_radius = np.sqrt(overlap / curvature[bodies].sum(axis=0))
     stiffness = np.stack([2 * modulus, 8 * shear * (friction > 0)]) * contact_radius
     damping = 2 * math.sqrt(5 / 6) * ratio * np.sqrt(stiffness / inverse_mass[bodies].sum(axis=0))

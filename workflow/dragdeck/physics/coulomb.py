@@ -1,6 +1,6 @@
 """Coulomb's limit of friction, to which the forces in dumps of contacts are cut."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from dragdeck.study.contact_law import coefficients
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -17,17 +18,31 @@ class FrictionLimit:
 
     Attributes
     ----------
-    friction : float
-        Coefficient of friction.
+    friction : float or ndarray
+        Coefficient of friction: one, or one per class of particles, (C,), and per class of the
+        other particle, (C, C); after `at`, one per contact.
     attractive : mapping
-        Coefficients that add an attractive force by name, as simulated.
+        Coefficients that add an attractive force by name, as simulated; likewise.
     wall : bool
         Whether the body is a wall; otherwise it is another particle.
+    first_ids : sequence of int
+        First particle of each class, if there are several.
     """
 
-    friction: float
-    attractive: Mapping[str, float] = field(default_factory=dict)
+    friction: Floats | float
+    attractive: Mapping[str, Floats | float] = field(default_factory=dict)
     wall: bool = True
+    first_ids: Sequence[int] = ()
+
+    def at(self, particle_id: Ints, other_id: Ints) -> "FrictionLimit":
+        """What limits (N,) contacts; the ids of the other body count if it is a particle."""
+        if not self.first_ids:
+            return self
+        first = np.searchsorted(self.first_ids, particle_id, side="right") - 1
+        second = np.searchsorted(self.first_ids, other_id, side="right") - 1
+        place = first if self.wall else (first, second)
+        attractive = {name: np.asarray(values)[place] for name, values in self.attractive.items()}
+        return FrictionLimit(np.asarray(self.friction)[place], attractive, self.wall)
 
     def attraction_n(self, reduced_radius_m: Floats, overlap_m: Floats) -> Floats:
         """Magnitude of the attractive forces of (N,) contacts, N.

@@ -23,7 +23,7 @@ _PUSHING = ("hertz", "hertz/stiffness", "hooke", "hooke/stiffness")
 """Normal models whose force, in LIGGGHTS, is the one to which Coulomb's limit refers."""
 
 _Floats = NDArray[np.float64]
-Attraction = Callable[[float, _Floats, _Floats, bool], _Floats]
+Attraction = Callable[[_Floats | float, _Floats, _Floats, bool], _Floats]
 """Attractive force of (N,) contacts, N, from the coefficient, reduced radii and overlaps, m, and
 whether the other body is a wall."""
 
@@ -64,7 +64,9 @@ class Coefficient:
     modulus_power: float = 0.0
 
 
-def _sjkr2(density_j_m3: float, reduced_m: _Floats, overlap_m: _Floats, wall: bool) -> _Floats:
+def _sjkr2(
+    density_j_m3: _Floats | float, reduced_m: _Floats, overlap_m: _Floats, wall: bool
+) -> _Floats:
     """Cohesion of LIGGGHTS's model ``sjkr2``: a density times the area 2 pi d (2 R*).
 
     Its area at a wall is half of that, 2 pi d R.
