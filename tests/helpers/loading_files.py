@@ -48,7 +48,7 @@ def case_json(**motion: Any) -> dict[str, Any]:
     }  # fmt: skip
     return made_case(
         "process", "made-process", timestep_s=STEP_S, rayleigh_time_s=2e-4, inputs=inputs,
-        contact_moduli=touching(MU), bowl={"radius_m": 0.1},
+        contact_moduli=touching(MU, 0.01 * 2e11 / (2 * (1 - 0.3**2))), bowl={"radius_m": 0.1},
         surface_m=SURFACE, motion=line(SPEED) | motion,
         workpiece={"kind": "mesh", "radius_m": 0.01, "length_m": SIZE, "immersion_depth_m": SIZE},
         phases=phases(START, LAST), statistics={"transient_s": 0.0},

@@ -80,9 +80,14 @@ def made_case(scene: str, run: str, **values: Any) -> dict[str, Any]:
     return with_motion(case, **motion)
 
 
-def touching(friction: float) -> dict[str, Any]:
+def touching(friction: float, modulus_pa: float = 1e9) -> dict[str, Any]:
     """What a particle touches, with one friction for all."""
-    constants = {"modulus_pa": 1e9, "shear_pa": 4e8, "restitution": 0.5, "friction": friction}
+    constants = {
+        "modulus_pa": modulus_pa,
+        "shear_pa": 4e8,
+        "restitution": 0.5,
+        "friction": friction,
+    }
     return dict.fromkeys(("particle", "bowl", "workpiece"), constants)
 
 

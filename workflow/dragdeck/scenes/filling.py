@@ -34,6 +34,7 @@ from dragdeck.physics.contact_mechanics import (
     fall_speed,
     particle_mass,
     pull_off_force,
+    rayleigh_time,
 )
 from dragdeck.physics.coulomb import FrictionLimit
 from dragdeck.physics.domain_split import FilledBowl, Split, rank_warnings, split
@@ -254,6 +255,7 @@ def filling_cautions(case: Case) -> Iterator[Caution]:
     yield from rank_warnings(rank_split(case))
     yield from _overlap_caution(study)
     yield from _cohesion_caution(study)
+    yield from _class_cautions(study)
     particles = first_particles(study)
     speed = math.hypot(particles.fastest_m_s, _arrival_speed(study, particles))
     yield from outrun(study, "filling_timestep_fraction", "particles fall", speed)
@@ -289,6 +291,30 @@ def _cohesion_caution(study: Study) -> Iterator[Caution]:
             f"cohesion holds {bond:.3g} times the weight of a mean particle (Bond number); above 1 "
             "a bed fills loosely or bridges, and may not come to rest",
         )
+
+
+_DEAR = 10.0
+"""Cost of a run over that without one of its classes, from which a warning is given."""
+
+
+def _class_cautions(study: Study) -> Iterator[Caution]:
+    """A warning for each class whose small particles make a run many times dearer."""
+    classes = bed_classes(study) if study.media.classes else ()
+    times = [rayleigh_time(study.materials[one.material], one.radii_m[0]) for one in classes]
+    total = study.particle_count
+    for at, one in enumerate(classes):
+        others = [time for number, time in enumerate(times) if number != at]
+        if not others or total == len(one.radii_m):
+            continue
+        dearer = total / (total - len(one.radii_m)) * min(others) / min(times)
+        if dearer >= _DEAR:
+            share = (one.radii_m**3).sum() / (bed_radii(study) ** 3).sum()
+            yield Caution(
+                "class",
+                f"class {one.name} ({100 * share:.2g} % of the volume) makes the runs about "
+                f"{dearer:.2g} times as long, by its number and its Rayleigh time: without it they "
+                f"would take {100 / dearer:.2g} % of that",
+            )
 
 
 def bed_limits(study: Study, top_m: float, speed_m_s: float) -> RunLimits:

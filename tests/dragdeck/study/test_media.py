@@ -1,0 +1,198 @@
+"""The media: sizes come out as asked, totals are met, and what cannot be is refused."""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from dragdeck.cases.bed import bed_classes, bed_density, bed_rayleigh_time
+from dragdeck.errors import InputError
+from dragdeck.physics.contact_mechanics import rayleigh_time
+from dragdeck.scenes.filling import filling_cautions, filling_scene, first_particles
+from dragdeck.scenes.process import process_scene
+from dragdeck.study.media import SOLID_FRACTION_ESTIMATE, Grains
+from dragdeck.sweep.cases import load_cases
+
+Small = dict[str, Any]
+Write = Callable[[Small], Path]
+
+SIEVE = [[2e-3, 0.0], [4e-3, 0.3], [5e-3, 0.9], [8e-3, 1.0]]
+
+
+@pytest.mark.parametrize("distribution", ["normal", "log_normal", "uniform"])
+@pytest.mark.parametrize("spread", [0.0, 0.05, 0.3])
+def test_mean_and_spread_come_out_as_asked(distribution: str, spread: float) -> None:
+    grains = Grains.model_validate(
+        {"radius_mean_m": 3e-3, "radius_std_m": spread * 3e-3, "distribution": distribution}
+    )
+    radii = grains.radii(500)
+    assert radii.mean() == pytest.approx(3e-3, rel=1e-12)
+    assert radii.std() == pytest.approx(spread * 3e-3, rel=1e-9, abs=1e-15)
+    assert (np.diff(radii) >= 0).all() and radii[0] > 0
+
+
+def test_a_log_normal_distribution_is_skewed_and_a_uniform_one_is_not() -> None:
+    log_normal, uniform = (
+        Grains.model_validate(
+            {"radius_mean_m": 1.0, "radius_std_m": 0.3, "distribution": distribution}
+        ).radii(1000)
+        for distribution in ("log_normal", "uniform")
+    )
+    logs = np.log(log_normal)
+    assert logs.mean() == pytest.approx(np.median(logs), abs=1e-9)
+    assert np.diff(uniform) == pytest.approx(np.diff(uniform)[0])
+
+
+def test_the_mass_of_sieved_particles_follows_the_sieve_analysis() -> None:
+    diameters = 2 * Grains.model_validate({"sieve": SIEVE}).radii(20_000)
+    mass = np.cumsum(diameters**3) / (diameters**3).sum()
+    asked = np.interp(diameters, *np.transpose(SIEVE))
+    assert np.abs(mass - asked).max() < 5e-3
+    assert diameters[0] > 2e-3 and diameters[-1] < 8e-3
+
+
+@pytest.mark.parametrize(
+    ("sieve", "problem"),
+    [
+        ([[2e-3, 0.0], [2e-3, 1.0]], "do not increase"),
+        ([[2e-3, 0.0], [3e-3, 0.5], [4e-3, 0.4], [5e-3, 1.0]], "mass passing decreases"),
+        ([[2e-3, 0.1], [3e-3, 1.0]], "from 0.1 to 1"),
+        ([[2e-3, 0.0], [3e-3, 0.9]], "from 0 to 0.9"),
+        ([[-2e-3, 0.0], [3e-3, 1.0]], "greater than 0"),
+    ],
+)
+def test_a_sieve_analysis_that_cannot_be_is_refused(sieve: Any, problem: str) -> None:
+    with pytest.raises(ValidationError, match=problem):
+        Grains.model_validate({"sieve": sieve})
+
+
+MIXTURE = {
+    "coarse": {"material": "ceramic", "fraction": 0.7, "radius_mean_m": 3e-3, "radius_std_m": 2e-4},
+    "fine": {"material": "steel", "fraction": 0.3, "radius_mean_m": 2e-3},
+}
+GOLD = MIXTURE["fine"] | {"material": "gold"}
+PAIR = {"restitution": 0.6, "friction": 0.2}
+
+
+def mixed(small: Small, **changes: Any) -> Small:
+    """The small study with two classes of media."""
+    media = {"count": 300, "classes": MIXTURE} | changes
+    media = {name: value for name, value in media.items() if value is not None}
+    return small | {"media": media, "pairs": small["pairs"] | {"steel-steel": PAIR}}
+
+
+@pytest.mark.parametrize("fractions_of", ["number", "mass", "volume"])
+@pytest.mark.parametrize(
+    "total",
+    [{"count": 3000}, {"count": None, "mass_kg": 0.6}, {"count": None, "fill_height_m": 0.1}],
+)
+def test_asked_fractions_and_totals_are_obtained(
+    fractions_of: str, total: Small, small: Small, write_study: Write
+) -> None:
+    (case,) = load_cases(write_study(mixed(small, fractions_of=fractions_of, **total)))
+    study, classes = case.study, bed_classes(case.study)
+    volume = np.array([(4 / 3 * math.pi * one.radii_m**3).sum() for one in classes])
+    mass = volume * [study.materials[one.material].density_kg_m3 for one in classes]
+    amounts = {"number": np.array([len(one.radii_m) for one in classes]), "mass": mass}
+    amount = amounts.get(fractions_of, volume)
+    assert amount / amount.sum() == pytest.approx([0.7, 0.3], abs=2e-3)
+    height = volume.sum() / SOLID_FRACTION_ESTIMATE / (math.pi * study.bowl.radius_m**2)
+    got = {"count": study.particle_count, "mass_kg": mass.sum(), "fill_height_m": height}
+    ((name, asked),) = ((name, value) for name, value in total.items() if value)
+    assert got[name] == pytest.approx(asked, rel=2e-3)
+    assert bed_density(study) == pytest.approx(mass.sum() / volume.sum())
+
+
+def test_every_particle_has_the_density_and_the_type_of_its_class(
+    small: Small, write_study: Write
+) -> None:
+    (case,) = load_cases(write_study(mixed(small)))
+    scene = filling_scene(case)
+    lines = scene.texts()["particles.data"].splitlines()
+    start = lines.index("Atoms") + 2
+    atoms = np.array([line.split()[:4] for line in lines[start : start + 300]], dtype=float)
+    coarse, fine = scene.case.classes
+    assert (coarse.first_id, fine.first_id, coarse.count + fine.count) == (1, coarse.count + 1, 300)
+    for one, kind, density in ((coarse, 1, coarse.density_kg_m3), (fine, 2, fine.density_kg_m3)):
+        rows = atoms[one.first_id - 1 : one.first_id - 1 + one.count]
+        assert set(rows[:, 1]) == {kind} and set(rows[:, 3]) == {density}
+        assert rows[:, 2].mean() / 2 == pytest.approx(one.radius_mean_m)
+    places = first_particles(case.study).positions_m
+    assert abs(places[: coarse.count, 2].mean() / places[coarse.count :, 2].mean() - 1) < 0.2
+
+
+def test_pairs_of_all_materials_are_in_the_script(small: Small, write_study: Write) -> None:
+    (case,) = load_cases(write_study(mixed(small)))
+    law = process_scene(case).deck.materials.law
+    restitution = next(table for table in law.tables if table.name == "restitution").values
+    known = small["pairs"]
+    both = [known["ceramic-ceramic"]["restitution"], known["ceramic-steel"]["restitution"]]
+    assert restitution == [*both, both[1], 0.6]
+
+
+def test_the_class_with_the_shortest_rayleigh_time_sets_the_time_step(
+    small: Small, write_study: Write
+) -> None:
+    (case,) = load_cases(write_study(mixed(small)))
+    study = case.study
+    scale = study.chosen_fidelity().youngs_modulus_scale
+    steel, ceramic = (
+        rayleigh_time(study.materials[name], radius, scale)
+        for name, radius in (("steel", 2e-3), ("ceramic", float(bed_classes(study)[0].radii_m[0])))
+    )
+    assert bed_rayleigh_time(study) == steel < ceramic
+
+
+def test_a_class_that_makes_runs_many_times_dearer_gets_a_warning(
+    small: Small, write_study: Write
+) -> None:
+    powder = MIXTURE["fine"] | {"radius_mean_m": 1e-4, "fraction": 0.001}
+    classes = {"coarse": MIXTURE["coarse"] | {"fraction": 0.999}, "powder": powder}
+    changes = {"classes": classes, "fractions_of": "volume"}
+    for changed, warned in ((changes, True), ({}, False)):
+        (case,) = load_cases(write_study(mixed(small, **changed)))
+        texts = [str(one) for one in filling_cautions(case) if one.code == "class"]
+        assert bool(texts) == warned
+        assert all("class powder (0.1 % of the volume)" in text for text in texts)
+
+
+@pytest.mark.parametrize(
+    ("changes", "problem"),
+    [
+        ({"count": None}, "one of count, mass_kg and fill_height_m"),
+        ({"mass_kg": 1.0}, "one of count, mass_kg and fill_height_m"),
+        ({"material": "ceramic"}, "stand in each of them"),
+        ({"classes": {"a": MIXTURE["coarse"]}}, "sum to 0.7, not to 1"),
+        ({"classes": MIXTURE | {"fine": {"material": "steel", "fraction": 0.3}}}, "is missing"),
+        ({"count": 1}, "not one particle"),
+        ({"classes": {"bowl": MIXTURE["coarse"] | {"fraction": 1}}}, "must not be called bowl"),
+        (
+            {"classes": MIXTURE | {"fine": MIXTURE["fine"] | {"material": "gold"}}},
+            "no such material",
+        ),
+    ],
+)
+def test_media_that_cannot_be_are_refused(
+    changes: Small, problem: str, small: Small, write_study: Write
+) -> None:
+    with pytest.raises(InputError, match=problem):
+        load_cases(write_study(mixed(small, **changes)))
+
+
+def test_a_sieve_analysis_is_read_from_a_file_beside_the_study(
+    small: Small, write_study: Write
+) -> None:
+    media = {"material": "ceramic", "count": 50, "sieve": "sieve.csv"}
+    file = write_study(small | {"media": media})
+    table = file.with_name("sieve.csv")
+    table.write_text("diameter_m,mass_passing\n0.004,0\n0.006,0.5\n0.007,1\n")
+    (case,) = load_cases(file)
+    assert case.study.media.sieve == [(0.004, 0), (0.006, 0.5), (0.007, 1)]
+    table.write_text("diameter_m,mass_passing\n0.004,0\n0.006,x\n0.007,1\n")
+    with pytest.raises(InputError, match=r"sieve\.csv") as caught:
+        load_cases(file)
+    assert caught.value.line == 3
