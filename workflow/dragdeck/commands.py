@@ -27,9 +27,9 @@ from dragdeck.campaigns.restitution_drops import confirmation, run_drops, sweep
 from dragdeck.cases.case import Case
 from dragdeck.cases.ranks import check_ranks, cores_here
 from dragdeck.decks.render import (
-    of_its_law,
     effective,
     idle,
+    of_its_law,
     overriding,
     write_run,
     write_workpiece,
