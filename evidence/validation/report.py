@@ -29,7 +29,6 @@ from dragchain.scaling.document import ScalingFile
 from dragchain.scaling.fit import SCENE, draw_scalings, read_scalings
 from dragchain.statistics.estimate import Estimate, EstimateColumns
 from dragdeck.documents import Document
-from evidence.validation import peaks as chain_peaks
 from evidence.validation.force import (
     Compared,
     Effect,
@@ -95,18 +94,16 @@ def write_validation(out_dir: Path, run_dirs: Sequence[Path], command: str) -> N
     """
     runs = read_validation_runs(run_dirs)
     first, found = runs.packings[0], validation_of(runs, command)
-    peaks = chain_peaks.of_runs([run.folder for run in runs.packings])
     write_report(
         out_dir,
         "validation/validation.html.j2",
         draw=lambda: _draw(runs, found),
         pictures={"workpiece": (first.folder / "figures" / "workpiece.png").read_bytes()},
-        tables={**_tables(runs, found), "chain_tests": peaks.table()},
-        documents={"validation": found, "peaks": peaks},
+        tables=_tables(runs, found),
+        documents={"validation": found},
         package="evidence",
         found=json.loads(found.as_text()),
         scalings=found.scalings,
-        peaks=json.loads(peaks.as_text()),
         assumptions=first.case.assumptions,
         varied={row.field for row in found.effects},
         runs=runs,
@@ -114,7 +111,7 @@ def write_validation(out_dir: Path, run_dirs: Sequence[Path], command: str) -> N
 
 
 def validation_of(runs: RunsByBed, command: str) -> Validation:
-    """All numbers of the page but those of peaks and chains."""
+    """All numbers of the page."""
     first = runs.packings[0]
     force, statements = force_of_packings(runs.packings), of_packings(runs.packings)
     return Validation(

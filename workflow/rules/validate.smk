@@ -6,7 +6,7 @@ rule write_validation:
         measures=lambda wildcards: WORK.every_point("measures.json", VALIDATION),
         loads=lambda wildcards: WORK.every_packing("tables/loading.json"),
         templates=WORK.page_templates(
-            *(f"validation/{name}.html.j2" for name in ("validation", "peaks", "scaling", "load")),
+            *(f"validation/{name}.html.j2" for name in ("validation", "scaling", "load")),
             package="evidence",
         ),
         words="analysis/dragchain/scaling/words.html.j2",
