@@ -149,14 +149,14 @@ def draw_map(
     drawn = {}
     for regime in (one for one in REGIMES if (points["regime"] == one).any()):
         own, rows = (table[table["regime"] == regime] for table in (tested, conditions))
-        drawn[f"map_{regime}"] = _map(own, rows, _TITLES[regime].format(sizes.get(regime)))
+        drawn[f"map_{regime}"] = draw_regime(own, rows, _TITLES[regime].format(sizes.get(regime)))
     if errors.steps_per_contact:
         drawn["restitution_error"] = _errors(head_on_impacts(points), errors)
     drawn["fraction_of_critical"] = _fractions(tested)
     return drawn
 
 
-def _map(points: pd.DataFrame, conditions: pd.DataFrame, title: str) -> Figure:
+def draw_regime(points: pd.DataFrame, conditions: pd.DataFrame, title: str) -> Figure:
     """Conditions down, steps across, a colour and a letter per class."""
     steps = np.sort(points["fraction"].unique())
     figure, (axes,) = new_panels(1.5 + 0.24 * len(conditions))

@@ -1,7 +1,6 @@
 """The report on a validation: its document, tables, figures and page."""
 
 import json
-import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -22,11 +21,9 @@ from dragchain.figures.panels import (
     row,
     row_names,
 )
-from dragchain.figures.style import BLUE, COLOURS, GREY, RED
+from dragchain.figures.style import BLUE, COLOURS, GREY
 from dragchain.report.campaign import write_report
 from dragchain.run.kinematics import drag_start_s
-from dragchain.scaling.document import ScalingFile
-from dragchain.scaling.fit import SCENE, draw_scalings, read_scalings
 from dragchain.statistics.estimate import Estimate, EstimateColumns
 from dragdeck.documents import Document
 from evidence.validation.force import (
@@ -34,7 +31,6 @@ from evidence.validation.force import (
     Effect,
     Force,
     LoadingOverPackings,
-    Spectrum,
     compare_drag,
     effect_table,
     facets,
@@ -45,7 +41,6 @@ from evidence.validation.force import (
 from evidence.validation.runs import MeasuredRun, RunsByBed, read_validation_runs
 from evidence.validation.statements import (
     Claim,
-    Network,
     PackingProfile,
     Statements,
     claim_table,
@@ -66,7 +61,6 @@ class Validation(Document):
     comparison: tuple[Compared, ...]
     load: LoadingOverPackings
     statements: Statements
-    scalings: tuple[ScalingFile, ...]
     claims: tuple[Claim, ...]
     effects: tuple[Effect, ...]
 
@@ -103,7 +97,6 @@ def write_validation(out_dir: Path, run_dirs: Sequence[Path], command: str) -> N
         documents={"validation": found},
         package="evidence",
         found=json.loads(found.as_text()),
-        scalings=found.scalings,
         assumptions=first.case.assumptions,
         varied={row.field for row in found.effects},
         runs=runs,
@@ -124,25 +117,15 @@ def validation_of(runs: RunsByBed, command: str) -> Validation:
         comparison=compare_drag(force.together["drag_n"], first.case),
         load=load_of_packings(runs.packings),
         statements=statements,
-        scalings=tuple(_scalings_of(first.measures.numbers)),
         claims=claims(statements),
         effects=tuple(setting_effects(runs)),
     )
 
 
-def _scalings_of(numbers: Mapping[str, float]) -> list[ScalingFile]:
-    """The packaged sweeps that were made in a scene with these numbers."""
-    return [
-        found
-        for found in read_scalings()
-        if all(math.isclose(found.scene[k], numbers[k], rel_tol=0.01) for k in SCENE)
-    ]
-
-
 def _tables(runs: RunsByBed, found: Validation) -> dict[str, pd.DataFrame]:
     """The numbers of the page as tables, by name."""
     force, statements = found.force, found.statements
-    network, spectrum = statements.network, force.spectrum
+    network = statements.network
     compared = [
         row.model_dump(exclude={"std_ratio"} if row.std_ratio is None else None)
         for row in found.comparison
@@ -163,9 +146,6 @@ def _tables(runs: RunsByBed, found: Validation) -> dict[str, pd.DataFrame]:
         ),
         "around": _profile(statements.azimuth, "rad"),
         "depth": _profile(statements.depth, "m"),
-        "spectrum": pd.DataFrame(
-            {"waves_per_diameter": spectrum.waves_per_diameter, **dict(spectrum.density)}
-        ),
     }
 
 
@@ -190,14 +170,11 @@ def _draw(runs: RunsByBed, found: Validation) -> dict[str, Figure]:
     drawn = {
         "comparison": _comparison(found.force, found.comparison, found.effects),
         "traces": _traces(runs.packings, found.comparison),
-        "spectrum": _spectrum(found.force.spectrum),
         "around": _around(found.statements),
-        "corridor": _corridor(found.statements.network),
+        "corridor": _corridor(found.statements),
     }
     if any(row.field for row in found.effects):
         drawn["assumed"] = _assumed(found.effects)
-    if found.scalings:
-        drawn["scaling"] = draw_scalings(found.scalings)
     return drawn
 
 
@@ -289,20 +266,6 @@ def _rows(rows: Sequence[_Row], label: str) -> Figure:
     return figure
 
 
-def _spectrum(found: Spectrum) -> Figure:
-    """Power spectrum of the drag along the path."""
-    figure, (axes,) = new_panels(3.2)
-    waves, density, half = found.waves_per_diameter, found.density, found.half_wave.value
-    band(axes, waves, density, BLUE)
-    axes.loglog(waves, density.mean, color=BLUE, label="mean over packings; band: their range")
-    label = f"half of the variance to the left (wavelength > {half:.1f} particle diameters)"
-    axes.axvline(1.0 / half, color=RED, linestyle="--", label=label)
-    axes.set_xlabel("wavenumber (1 / particle diameter)")
-    axes.set_ylabel("power density (N² particle diameters)")
-    axes.legend(loc="upper right")
-    return figure
-
-
 def _around(found: Statements) -> Figure:
     """Normal force on the workpiece by azimuth, and that of a contact by depth."""
     figure = new_figure(3.9)
@@ -315,8 +278,9 @@ def _around(found: Statements) -> Figure:
     return figure
 
 
-def _corridor(network: Network) -> Figure:
+def _corridor(found: Statements) -> Figure:
     """Mean contact force of the network ahead of the workpiece and behind it."""
+    network, far = found.network, found.numbers["far_n"]
     figure, (axes,) = new_panels(3.2)
     edges = np.array(network.edges_diameters)
     middle = (edges[1:] + edges[:-1]) / 2
@@ -326,7 +290,8 @@ def _corridor(network: Network) -> Figure:
         band(axes, middle, side, colour)
         axes.plot(middle, side.value, "o-", color=colour, label=name)
     wall = network.wall_diameters
-    axes.axhline(network.far_n.value, color="black", linestyle="--", label="far field")
+    if far is not None:
+        axes.axhline(far.value, color="black", linestyle="--", label="far field")
     axes.axvline(wall, color=GREY, linewidth=2.0)
     axes.text(wall, 0.0, " bowl wall", color=GREY, va="bottom")
     axes.set(ylabel="mean normal force\nper contact (N)", xlim=(0, wall + 0.5), ylim=(0, None))
