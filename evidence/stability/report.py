@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from dragchain.arrays import Floats
-from dragchain.figures.panels import head, key, legend_below, log_ticks, new_panels, row_names
+from dragchain.figures.panels import head, key, legend_below, new_panels, row_names
 from dragchain.figures.style import BLUE, GREEN, GREY, INK, ORANGE, RED
 from dragchain.report.campaign import write_report
 from dragdeck.records.stability import RestitutionErrors
@@ -152,7 +152,6 @@ def draw_map(
         drawn[f"map_{regime}"] = draw_regime(own, rows, _TITLES[regime].format(sizes.get(regime)))
     if errors.steps_per_contact:
         drawn["restitution_error"] = _errors(head_on_impacts(points), errors)
-    drawn["fraction_of_critical"] = _fractions(tested)
     return drawn
 
 
@@ -176,16 +175,16 @@ def draw_regime(points: pd.DataFrame, conditions: pd.DataFrame, title: str) -> F
     axes.grid(False)
     axes.tick_params(length=0)
     axes.tick_params("y", labelsize=7.5)
-    _class_keys(axes, points, _LETTERS)
+    _class_keys(axes, points)
     for style, name in _CRITICAL.items():
         key(axes, name, marker="", ls=style, color=INK, lw=1.6)
     return legend_below(figure)
 
 
-def _class_keys(axes: Axes, points: pd.DataFrame, letters: Mapping[str, str]) -> None:
+def _class_keys(axes: Axes, points: pd.DataFrame) -> None:
     """Name the colours of the classes that occur."""
     for kind in (one for one in CLASSES if (points["class"] == one).any()):
-        name = f"{letters.get(kind, '')} {kind}".strip()
+        name = f"{_LETTERS[kind]} {kind}".strip()
         key(axes, name, color=COLOURS[kind], marker="s", ms=8)
 
 
@@ -220,30 +219,3 @@ def _errors(impacts: pd.DataFrame, table: RestitutionErrors) -> Figure:
     axes.legend(loc="upper right")
     figure.colorbar(dots, label="input restitution")
     return figure
-
-
-def _fractions(points: pd.DataFrame) -> Figure:
-    """Every point over its step as a fraction of the Rayleigh time and of the critical step."""
-    figure, panels = new_panels(4.2, 2, sharey=True)
-    columns = (
-        ("fraction", "time step / Rayleigh time", RULE),
-        ("fraction_of_critical", "time step / critical step", 1.0),
-    )
-    for axes, (column, label, limit) in zip(panels, columns, strict=True):
-        known = points[np.isfinite(points[column])]
-        for line, regime in enumerate(REGIMES):
-            own = known[known["regime"] == regime]
-            axes.scatter(own[column], line + _offsets(own), 9, own["class"].map(COLOURS), lw=0)
-        axes.axvline(limit, color=INK, ls="--", lw=1)
-        axes.set(xscale="log", xlabel=label)
-        log_ticks(axes.xaxis, steps=(1.0, 2.0, 5.0))
-    row_names(panels[0], REGIMES)
-    _class_keys(panels[0], points, {})
-    return legend_below(figure)
-
-
-def _offsets(points: pd.DataFrame) -> Floats:
-    """Place of each point's condition within the line of its regime, (N,)."""
-    codes, names = pd.factorize(points["condition"])
-    spread = np.linspace(-0.36, 0.36, len(names)) if len(names) > 1 else np.zeros(1)
-    return np.asarray(spread[codes])
