@@ -30,8 +30,9 @@ from evidence.stability.judge import (
     judge_points,
     summarise_map,
 )
-from evidence.stability.measures import PointRun, read_points
+from evidence.stability.measures import read_points
 from evidence.stability.points import REGIMES
+from evidence.stability.scenes import PHASES
 
 
 def write_stability(out_dir: Path, lists: Sequence[Path]) -> None:
@@ -55,18 +56,18 @@ def write_stability(out_dir: Path, lists: Sequence[Path]) -> None:
     runs = read_points(lists)
     points, verdicts = judge_points(runs)
     found = conditions(points)
-    summary, sizes = summarise_map(points, found, runs), _run_sizes(runs)
+    summary = summarise_map(points, found, runs)
     tested = points[~points["reference"]]
     axes = points.groupby(["regime", "axis"], sort=False)["label"]
     write_report(
         out_dir,
         "stability/stability.html.j2",
-        draw=lambda: draw_map(points, found, summary.restitution_error, sizes),
+        draw=lambda: draw_map(points, found, summary.restitution_error),
         tables={"points": points, "conditions": found},
         documents={"stability": summary},
         package="evidence",
         summary=summary,
-        sizes=sizes,
+        phases=PHASES,
         class_names=CLASSES,
         classes=[
             {"regime": regime, **Counter(dict.fromkeys(CLASSES, 0)), **Counter(own["class"])}
@@ -95,16 +96,6 @@ def _with_reference(row: Mapping[Hashable, object]) -> dict[Hashable, object]:
     return {**row, "reference": f"{row['reference_class']}{why}"}
 
 
-def _run_sizes(runs: Sequence[PointRun]) -> dict[str, int]:
-    """Impacts, or particles, of a run, by regime; of the base point where it was run."""
-    sizes: dict[str, int] = {}
-    for run in sorted(runs, key=lambda run: run.point.axis != "base"):
-        if run.case is not None:
-            pairs = 2 if run.point.settings.get("size_ratio") else 1
-            sizes.setdefault(run.point.regime, run.case.media.count // pairs)
-    return sizes
-
-
 # --- figures -----------------------------------------------------------------------------------
 
 COLOURS = {
@@ -122,8 +113,8 @@ _CRITICAL = {"-": "critical step of the contact network", ":": "critical step, d
 """Lines of the maps."""
 
 _TITLES = {
-    "impact": "Single impacts ({} per run, at different phases within a time step)",
-    "settle": "Settling of {} particles in a bowl",
+    "impact": f"Single impacts ({PHASES} per run, at different phases within a time step)",
+    "settle": "Settling of particles in a bowl",
     "column": "At rest under load: settled packing or column of particles in a tube",
     "drag": "Slow drag: workpiece plunges in and is dragged through the packing",
 }
@@ -133,7 +124,6 @@ def draw_map(
     points: pd.DataFrame,
     conditions: pd.DataFrame,
     errors: RestitutionErrors,
-    sizes: Mapping[str, int],
 ) -> dict[str, Figure]:
     """All figures by name.
 
@@ -142,14 +132,12 @@ def draw_map(
     points, conditions : DataFrame
         One row per point, and per condition.
     errors : RestitutionErrors
-    sizes : mapping of str to int
-        Impacts or particles of a run, by regime.
     """
     tested = points[~points["reference"]]
     drawn = {}
     for regime in (one for one in REGIMES if (points["regime"] == one).any()):
         own, rows = (table[table["regime"] == regime] for table in (tested, conditions))
-        drawn[f"map_{regime}"] = draw_regime(own, rows, _TITLES[regime].format(sizes.get(regime)))
+        drawn[f"map_{regime}"] = draw_regime(own, rows, _TITLES[regime])
     if errors.steps_per_contact:
         drawn["restitution_error"] = _errors(head_on_impacts(points), errors)
     return drawn
