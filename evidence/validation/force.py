@@ -21,7 +21,6 @@ from dragchain.run.reference import reference_drags
 from dragchain.statistics.bed_effects import fit_effects
 from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import Estimate, Real
-from dragchain.tables.by_step import read_table
 from dragdeck.documents import Part
 from dragdeck.records.case import CaseOfRun
 from evidence.validation.runs import MeasuredRun, RunsByBed, packing_mean
@@ -366,12 +365,3 @@ def _shares(types: Sequence[ContactType]) -> dict[str, Estimate]:
         name: packing_mean([100.0 * one.fraction_of[name].value for one in types])
         for name in _SHARES
     }
-
-
-def facets(packings: Sequence[MeasuredRun]) -> pd.DataFrame:
-    """The facets of every packing, one row per facet and packing."""
-    tables = [
-        read_table(run.folder / "tables" / "facets.parquet").assign(packing=run.seed)
-        for run in packings
-    ]
-    return pd.concat(tables, ignore_index=True)

@@ -33,7 +33,6 @@ from evidence.validation.force import (
     LoadingOverPackings,
     compare_drag,
     effect_table,
-    facets,
     force_of_packings,
     load_of_packings,
     setting_effects,
@@ -93,7 +92,7 @@ def write_validation(out_dir: Path, run_dirs: Sequence[Path], command: str) -> N
         "validation/validation.html.j2",
         draw=lambda: _draw(runs, found),
         pictures={"workpiece": (first.folder / "figures" / "workpiece.png").read_bytes()},
-        tables=_tables(runs, found),
+        tables=_tables(found),
         documents={"validation": found},
         package="evidence",
         found=json.loads(found.as_text()),
@@ -122,7 +121,7 @@ def validation_of(runs: RunsByBed, command: str) -> Validation:
     )
 
 
-def _tables(runs: RunsByBed, found: Validation) -> dict[str, pd.DataFrame]:
+def _tables(found: Validation) -> dict[str, pd.DataFrame]:
     """The numbers of the page as tables, by name."""
     force, statements = found.force, found.statements
     network = statements.network
@@ -134,7 +133,6 @@ def _tables(runs: RunsByBed, found: Validation) -> dict[str, pd.DataFrame]:
         "packings": pd.json_normalize([row.model_dump() for row in force.packings], sep="_"),
         "effects": effect_table(found.effects),
         "load": pd.DataFrame([dict(row) for row in found.load.rows]),
-        "facets": facets(runs.packings),
         "comparison": pd.json_normalize(compared, sep="_"),
         "statements": claim_table(found.claims),
         "corridor": pd.DataFrame(
@@ -167,15 +165,12 @@ def _profile(profile: PackingProfile, unit: str) -> pd.DataFrame:
 
 def _draw(runs: RunsByBed, found: Validation) -> dict[str, Figure]:
     """The figures of the page, by name."""
-    drawn = {
+    return {
         "comparison": _comparison(found.force, found.comparison, found.effects),
         "traces": _traces(runs.packings, found.comparison),
         "around": _around(found.statements),
         "corridor": _corridor(found.statements),
     }
-    if any(row.field for row in found.effects):
-        drawn["assumed"] = _assumed(found.effects)
-    return drawn
 
 
 def _traces(packings: Sequence[MeasuredRun], compared: Sequence[Compared]) -> Figure:
@@ -238,22 +233,6 @@ def _change(effect: Effect) -> Estimate:
 def _fidelity(effect: Effect) -> str:
     name = f"E x {effect.youngs_modulus_scale:g}, {100 * effect.timestep_fraction:g} %"
     return name if effect.speed_factor == 1.0 else f"{name}, speed x {effect.speed_factor:g}"
-
-
-def _assumed(effects: Sequence[Effect]) -> Figure:
-    """What each assumed input does to the mean drag."""
-    rows: list[_Row] = []
-    for one in effects:
-        if one.quantity == "drag_mean" and one.field:
-            name = f"{one.field} = {_value(one.value)} (assumed: {_value(one.reference_value)})"
-            rows.append((name, _change(one).over(0.01), BLUE))
-    figure = _rows(rows, "change of the mean drag (%); bars: 95 % CI")
-    figure.axes[0].axvline(0.0, color="black", linewidth=0.8)
-    return figure
-
-
-def _value(value: object) -> str:
-    return f"{value:g}" if isinstance(value, int | float) else str(value)
 
 
 def _rows(rows: Sequence[_Row], label: str) -> Figure:

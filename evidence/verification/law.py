@@ -49,8 +49,8 @@ class Particle:
         return impulse_n_s * self.radius_m / self.inertia_kg_m2
 
 
-_PLANE = Particle(math.inf, 0.0)
-"""Stands in for the partner of a particle on a plane."""
+_PLANE = Particle(1.0, 0.0)
+"""Stands in for the partner of a particle on a plane, which has no lever and never turns."""
 
 
 @dataclass(frozen=True)
@@ -190,7 +190,6 @@ def integrated_impacts(
     The spring is cut back where it exceeds friction, and the dashpot acts only where it does not;
     with the limit, attraction is cut off. Motions are NaN where an impact does not end.
     """
-    particles = [(c.particle, c.partner or _PLANE) for c in contacts]
     mass, root, modulus, shear, restitution, friction, limited = np.array(
         [
             (c.mass_kg, math.sqrt(c.radius_m), c.modulus_pa, c.shear_pa, c.restitution,
@@ -198,9 +197,11 @@ def integrated_impacts(
             for c in contacts
         ]
     ).T  # fmt: skip
-    radius, inertia = np.array(
-        [[(one.radius_m, one.inertia_kg_m2) for one in pair] for pair in particles]
-    ).T
+    partners = [c.partner or _PLANE for c in contacts]
+    radius = np.array([[c.particle.radius_m for c in contacts], [p.radius_m for p in partners]])
+    masses = np.array([[c.particle.mass_kg for c in contacts], [p.mass_kg for p in partners]])
+    with np.errstate(divide="ignore"):
+        turn = np.where(radius > 0, 1 / (SPHERE * masses * radius**2), 0.0)
     centres = np.where(radius > 0, 0.5, 0.0)
     # Tsuji et al. 1992 with the exact coefficient of Antypov and Elliott 2011
     alpha = -math.sqrt(5) * np.log(restitution) / np.hypot(math.pi, np.log(restitution))
@@ -232,6 +233,6 @@ def integrated_impacts(
             spring = np.where(slides, np.copysign(most / stiffness, spring), spring)
         speed = speed - dt * force / mass
         along = along - dt * pull / mass
-        spin = spin - dt * pull * arm / inertia
+        spin = spin - dt * pull * turn * arm
     ends = np.where(dt == 0.0, np.stack([-speed, along, *spin]), math.nan)
     return [RelativeMotion(*map(float, one)) for one in ends.T]

@@ -126,8 +126,8 @@ def test_impacts_end_as_the_law_integrated_with_an_adaptive_step() -> None:
             integrated(contact, *before), expected, strict=True
         ):
             assert after.normal_m_s == pytest.approx(normal, abs=1e-4)
-            assert after.tangential_m_s == pytest.approx(along, abs=2e-4)
-            assert after.spin_rad_s == pytest.approx(spin, abs=0.1)
+            assert after.tangential_m_s == pytest.approx(along, abs=5e-4)
+            assert after.spin_rad_s == pytest.approx(spin, abs=0.15)
 
 
 def test_a_huge_partner_is_a_plane_and_a_mirrored_impact_the_mirror_image() -> None:
