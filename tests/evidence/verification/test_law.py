@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from dragdeck.physics.contact_mechanics import hertz_overlap
 from evidence.verification import law
 from evidence.verification.law import ContactPair, Particle, RelativeMotion
 
@@ -26,17 +25,6 @@ def test_the_largest_overlap_stores_the_whole_energy() -> None:
     deepest = law.largest_overlap(PLANE, 0.5)
     work, _ = quad(lambda overlap: float(law.hertz_force(PLANE, overlap)), 0, deepest)
     assert work == pytest.approx(0.5 * PLANE.mass_kg * 0.5**2, rel=1e-9)
-
-
-def test_overlap_and_force_are_each_others_inverse() -> None:
-    force = float(law.hertz_force(PLANE, 3e-6))
-    assert hertz_overlap(force, PLANE.radius_m, PLANE.modulus_pa) == pytest.approx(3e-6)
-
-
-def test_effective_mass_and_radius_of_equal_particles_are_half() -> None:
-    pair = replace(PLANE, partner=PARTICLE)
-    assert pair.mass_kg == pytest.approx(PARTICLE.mass_kg / 2)
-    assert pair.radius_m == pytest.approx(PARTICLE.radius_m / 2)
 
 
 def linear_rebound(restitution: float) -> float:
