@@ -12,8 +12,6 @@ from tempfile import TemporaryDirectory
 from PIL import Image
 from records import ROOT
 
-from dragchain.export.frames import Selection
-from dragchain.export.write import write_export
 from dragchain.figures.style import few_colours
 from dragdeck.errors import DragdeckError
 
@@ -40,15 +38,6 @@ def _carousel(run: Path) -> bytes:
     return (ROOT / "results/carousel/preview.png").read_bytes()
 
 
-def _paraview(run: Path) -> bytes:
-    with TemporaryDirectory() as folder:
-        write_export(run, "paraview", Path(folder) / "out", Selection(every=50))
-        file = Path(folder) / "view.png"
-        words = [_program("pvpython"), "--force-offscreen-rendering", Path(folder) / "out/view.py"]
-        subprocess.run([*words, "--picture", file, "--frame", "1"], check=True)
-        return file.read_bytes()
-
-
 def _program(name: str) -> str:
     path = shutil.which(name)
     if path is None:
@@ -59,7 +48,6 @@ def _program(name: str) -> str:
 PICTURES: Mapping[str, Callable[[Path], bytes]] = {
     "carousel": _carousel,
     "network_page": _network_page,
-    "paraview": _paraview,
 }
 """What draws a picture from the folder of a process run, by the name of its file."""
 

@@ -35,7 +35,9 @@ from dragchain.network.chains import (
 from dragchain.network.frame import NetworkFrame, network_frames
 from dragchain.network.statistics import contact_counts
 from dragchain.network.write import chain_table
+from dragchain.run.workpiece import read_surface
 from dragchain.tables.run_folder import Run
+from dragdeck.records.case import load_case
 
 STEPS = range(0, LAST + 1, 20)
 COUNTED = range(40, LAST + 1, 20)
@@ -141,6 +143,31 @@ def test_each_particle_has_its_contacts_and_its_stress(run: Path) -> None:
     volume = 4 / 3 * np.pi * RADIUS_M**3
     along = 2 * RADIUS_M * float(force.iloc[0]) / volume  # of the chain, less the shear's part
     assert particles["major_stress_pa"][0] == pytest.approx(along, rel=0.05)
+
+
+def test_each_particle_has_the_largest_normal_force_of_its_contacts(run: Path) -> None:
+    particles = list(series(write_export(run, "paraview").file).values())[-1]["particles"]
+    contacts = table(run, "contacts").query(f"step == {LAST}")
+    for number, found in zip(particles["id"], particles["max_normal_force_n"], strict=True):
+        own = contacts[(contacts["a_id"] == number) | (contacts["b_id"] == number)]
+        assert found == own["normal_force_n"].max() > 0
+
+
+@pytest.mark.parametrize("missing", [None, 3])
+def test_the_load_map_is_on_the_right_facets(run: Path, missing: int | None) -> None:
+    """Only a table of this mesh is: one with fewer facets is not taken."""
+    surface = read_surface(run, load_case(run))
+    loads = 10.0 * np.arange(len(surface.corners))[missing:]
+    names = ("mean_pressure_pa", "friction_work_pa", "peak_normal_force_n")
+    pd.DataFrame(dict.fromkeys(names, loads)).to_parquet(run / "tables/facets.parquet")
+    mesh = series(write_export(run, "paraview").file)[LAST * TIMESTEP_S]["workpiece"]
+    if missing:
+        assert mesh.array_names == []
+        return
+    centres = mesh.cell_centers().points - [workpiece_x_m(LAST), 0, 0.02]
+    near = np.linalg.norm(centres[:, None] - surface.centres, axis=2).argmin(axis=1)
+    np.testing.assert_array_equal(mesh["mean_pressure_pa"], 10.0 * near)
+    assert len(set(near)) == mesh.n_cells
 
 
 def test_chains_mark_particles_and_contacts_where_they_were_searched(run: Path) -> None:
