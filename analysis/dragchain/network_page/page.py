@@ -12,6 +12,7 @@ from dragdeck.files import write_text
 from dragdeck.records.case import CaseOfRun
 from dragdeck.records.run import read_accepted
 
+
 def write_page(run_dir: Path) -> str:
     """Write ``network.html`` into the folder of a process run; what to say at the end.
 

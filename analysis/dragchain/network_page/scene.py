@@ -349,9 +349,7 @@ def _path(row: Mapping[Any, Any] | None) -> dict[str, JsonValue] | None:
 # --- workpiece and force -----------------------------------------------------------------------
 
 
-def _workpiece(
-    columns: PackedColumns, run: Run, shown: Shown, steps: Ints
-) -> dict[str, JsonValue]:
+def _workpiece(columns: PackedColumns, run: Run, shown: Shown, steps: Ints) -> dict[str, JsonValue]:
     """Add the workpiece's facets in its own frame and their loads; its poses, frame by frame."""
     case = run.case
     surface = read_surface(run.folder, case)
