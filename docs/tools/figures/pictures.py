@@ -12,7 +12,6 @@ from tempfile import TemporaryDirectory
 from PIL import Image
 from records import ROOT
 
-from dragchain.figures.style import few_colours
 from dragdeck.errors import DragdeckError
 
 STUDY = "half_minute"
@@ -56,7 +55,7 @@ def drawn_picture(name: str, run: Path) -> bytes:
     """A picture as PNG of few colours."""
     content = BytesIO()
     with Image.open(BytesIO(PICTURES[name](run))) as drawn:
-        few_colours(drawn.convert("RGB")).save(content, format="png", optimize=True)
+        drawn.convert("RGB").quantize(dither=Image.Dither.NONE).save(content, "png", optimize=True)
     return content.getvalue()
 
 
