@@ -13,8 +13,8 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 import pandas as pd
 
-from dragchain.arrays import Floats
-from dragchain.export.frames import FrameData, FrameSeries
+from dragchain.arrays import Floats, Ints
+from dragchain.export.frames import MEMBERSHIPS, FrameData, FrameSeries
 from dragchain.figures.network_picture import segments
 from dragchain.network.chains import major_stress, particle_stress
 from dragchain.network.frame import PARTICLE, NetworkFrame
@@ -28,7 +28,6 @@ MAIN = "run.pvd"
 
 _FRAMES = "frames"
 _LOADING = ("mean_pressure_pa", "friction_work_pa", "peak_normal_force_n")
-_CHAIN_ARRAYS = {"peters_chain": "peters", "widest_paths": "paths", "dominant": "dominant"}
 
 
 def write_paraview(folder: Path, series: FrameSeries, frames: Iterable[FrameData]) -> None:
@@ -102,7 +101,7 @@ def _particles_mesh(frame_data: FrameData, *, with_chains: bool) -> Any:
     """
     import pyvista as pv
 
-    particles = frame_data.particles
+    particles, found = frame_data.particles, frame_data.membership
     mesh = pv.PolyData(particles[["x_m", "y_m", "z_m"]].to_numpy(np.float64))
     data = mesh.point_data
     data["id"] = particles["particle_id"].to_numpy(np.int64)
@@ -114,7 +113,7 @@ def _particles_mesh(frame_data: FrameData, *, with_chains: bool) -> Any:
         data["major_stress_pa"] = major_stress(particle_stress(frame_data.network))[0]
         data["max_normal_force_n"] = _max_normal_force(frame_data.network)
     if with_chains:
-        _chains(data, frame_data, "particle", len(particles))
+        _chains(data, found.particles if found else None, len(particles))
     return mesh
 
 
@@ -139,6 +138,7 @@ def _contacts_mesh(frame_data: FrameData, *, with_chains: bool) -> Any:
     import pyvista as pv
 
     contacts, frame = frame_data.contacts, frame_data.network
+    found = frame_data.membership
     assert contacts is not None and frame is not None
     if contacts.empty:
         return pv.PolyData()
@@ -153,16 +153,12 @@ def _contacts_mesh(frame_data: FrameData, *, with_chains: bool) -> Any:
     for name in ("normal_force_n", "tangential_force_n", "overlap_m"):
         data[name] = contacts[name].to_numpy(np.float64)
     if with_chains:
-        _chains(data, frame_data, "contact", len(contacts))
+        _chains(data, found.contacts if found else None, len(contacts))
     return mesh
 
 
-def _chains(data: Any, frame_data: FrameData, what: str, size: int) -> None:
-    """Add number of the chain, number of workpiece paths, and dominance.
-
-    0 none, -1 not searched.
-    """
-    found = frame_data.membership
-    for name, field in _CHAIN_ARRAYS.items():
-        values = np.full(size, -1) if found is None else getattr(found, f"{what}_{field}")
+def _chains(data: Any, found: Mapping[str, Ints] | None, size: int) -> None:
+    """Add number of the chain, number of workpiece paths, and dominance; -1 if not searched."""
+    for name in MEMBERSHIPS:
+        values = np.full(size, -1) if found is None else found[name]
         data[name] = values.astype(np.int32)

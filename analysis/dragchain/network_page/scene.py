@@ -168,19 +168,19 @@ def read_shown(series: FrameSeries) -> Shown:
     """Read the frames of a series; errors are those of its iterator."""
     particles, contacts, poses, most = [], [], [], 0
     for number, data in enumerate(series):
-        network, chain = data.network, data.membership
-        assert network is not None and chain is not None
+        network, membership = data.network, data.membership
+        assert network is not None and membership is not None
         assert data.contacts is not None and data.workpiece is not None
-        kept = _near(network, data.workpiece[0])
+        kept, chain = _near(network, data.workpiece[0]), membership.contacts
         place = np.where(kept, np.cumsum(kept) - 1, -1)
         bodies = BODIES + data.contacts["b_id"].to_numpy(np.int64)
         found = data.contacts.assign(
             frame=number,
             a=place[network.a],
             b=np.where(network.between_particles(), place[network.b], bodies),
-            flags=QUASI_LINEAR * (chain.contact_peters > 0)
-            + PATH * (chain.contact_paths > 0)
-            + DOMINANT * chain.contact_dominant,
+            flags=QUASI_LINEAR * (chain["peters_chain"] > 0)
+            + PATH * (chain["widest_paths"] > 0)
+            + DOMINANT * chain["dominant"],
         )
         particles.append(data.particles[kept].assign(frame=number))
         contacts.append(found[(found["a"] >= 0) & (found["b"] >= 0)])

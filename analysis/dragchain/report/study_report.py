@@ -14,8 +14,8 @@ from dragchain.report.cases import (
     ReportedRun,
     StudyRuns,
     cases_of,
+    read_reported,
     read_study_runs,
-    read_upstream,
 )
 from dragchain.report.cost_check import CostRow, answers, cost_rows, prediction_for, read_advice
 from dragchain.report.findings import FIGURES, Findings
@@ -226,7 +226,7 @@ def write_study_report(
         write_bundle(
             out_dir,
             tables={"summary": table},
-            workbooks={"summary": summary_workbook(table, assumed, cases)},
+            files={"summary.xlsx": summary_workbook(table, assumed, cases)},
             pages={"report": page},
         )
     elif not any(run.scene == "process" for run in missing):
@@ -256,7 +256,7 @@ def _read(
             if scene_of(folder) == "process":
                 sections.append(_section(read_study_runs(folder), options))
             else:
-                read_upstream(folder)
+                read_reported(folder, Findings)
         except DragdeckError as error:
             missing.append(missing_run(folder, error))
     return sections, missing
