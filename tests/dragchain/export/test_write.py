@@ -15,7 +15,6 @@ from made_run import with_motion
 from tiny_run_files import (
     CHAIN_Z_M,
     LAST,
-    RADIUS_M,
     TIMESTEP_S,
     workpiece_x_m,
 )
@@ -98,15 +97,6 @@ def test_paraview_reads_what_the_tables_hold(run: Path) -> None:
             np.testing.assert_array_equal(lines[name], of_contacts[name])
 
 
-def test_the_parts_are_series_of_their_own_too(run: Path) -> None:
-    folder = write_export(run, "paraview").file.parent
-    whole = series(folder / "run.pvd")
-    for name in ("particles", "contacts", "workpiece"):
-        part = series(folder / f"{name}.pvd")
-        assert list(part) == list(whole)
-        assert all(part[time_s] == whole[time_s][name] for time_s in whole)
-
-
 def test_lines_go_from_centre_to_centre_or_to_the_contact_point(run: Path) -> None:
     last = list(series(write_export(run, "paraview").file).values())[-1]
     lines, particles = last["contacts"], last["particles"]
@@ -125,21 +115,6 @@ def test_lines_go_from_centre_to_centre_or_to_the_contact_point(run: Path) -> No
         other = int(lines["id2"][row])
         np.testing.assert_array_equal(start, centre[int(lines["id1"][row])])
         np.testing.assert_array_equal(end, centre[other] if other > 0 else point[row])
-
-
-def test_each_particle_has_its_contacts_and_its_stress(run: Path) -> None:
-    """Particle 1 touches workpiece and particle 2, particle 2 the side too, 3 floor and 4, and 4
-    only 3."""
-    particles = list(series(write_export(run, "paraview").file).values())[-1]["particles"]
-    assert dict(zip(particles["id"], particles["coordination_number"], strict=True)) == {
-        1: 2, 2: 2, 3: 2, 4: 1
-    }  # fmt: skip
-    force = table(run, "contacts").query(f"step == {LAST} and kind == 'particle-workpiece'")[
-        "normal_force_n"
-    ]
-    volume = 4 / 3 * np.pi * RADIUS_M**3
-    along = 2 * RADIUS_M * float(force.iloc[0]) / volume  # of the chain, less the shear's part
-    assert particles["major_stress_pa"][0] == pytest.approx(along, rel=0.05)
 
 
 def test_each_particle_has_the_largest_normal_force_of_its_contacts(run: Path) -> None:
@@ -395,14 +370,6 @@ def test_a_missing_table_is_named_with_its_command(run: Path, name: str) -> None
     with pytest.raises(TableError, match=rf"{name}.parquet is missing: run `dragchain tables"):
         write_export(run, "xyz")
     assert not any((run / "export").glob("*"))
-
-
-def test_an_unknown_format_is_an_error(run: Path, capsys) -> None:
-    with pytest.raises(ExportError, match="'vtk'; known: paraview, xyz"):
-        write_export(run, "vtk")
-    with pytest.raises(SystemExit) as caught:
-        main(["export", str(run), "--to", "vtk"])
-    assert caught.value.code == 2
 
 
 def test_an_interval_without_frames_says_where_they_are(run: Path) -> None:

@@ -24,7 +24,6 @@ from PIL import Image
 from dragchain.errors import TableError
 from dragchain.figures import network_picture as scene
 from dragchain.figures.rendering import RenderError, check_rendering
-from dragchain.figures.style import COLOURS
 from dragchain.network.frame import NetworkFrame
 from dragchain.report.findings import (
     FIGURES,
@@ -36,7 +35,6 @@ from dragchain.report.findings import (
 from dragchain.report.run_data import RunData, dominant_bottlenecks, process_findings
 from dragchain.report.run_figures import (
     energy_ratio,
-    forces,
     write_figures,
 )
 from dragchain.run.reference import reference_drags
@@ -317,13 +315,3 @@ def test_a_drop_is_drawn_with_its_restitution(tmp_path: Path) -> None:
     ratio = DropFindings.read(tmp_path / FILE).restitution
     assert ratio.mean == pytest.approx(0.72)
     assert ratio.input == 0.7
-
-
-def test_the_experiment_lies_over_the_mean_in_its_own_colour(process: Path) -> None:
-    run, found = RunData(process, load_case(process)), ProcessFindings.read(process / FILE)
-    ours = found.forces["drag_n"].mean
-    published = reference_drags(reference(drag_mean_n=ours, drag_std_n=0.66))
-    (axes,) = forces(run, changed(found, comparison=published)).axes
-    at_mean = [line for line in axes.get_lines() if set(line.get_ydata()) == {ours}]
-    assert [line.get_color() for line in at_mean] == ["black", COLOURS["experiment"]]
-    assert at_mean[1].get_zorder() >= at_mean[0].get_zorder() and at_mean[1].is_dashed()
