@@ -16,7 +16,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 from attack.arena import ENDS_WITHIN_S, Arena, assert_no_engine
-from attack.calls import PACKAGES, Call, Said, call, kill, main_of, refused
+from attack.calls import Call, Said, call, kill, main_of, refused
 from attack.ground import (
     PLACES,
     STUDY,
@@ -30,6 +30,7 @@ from attack.ground import (
     write_study,
 )
 from paths import ROOT
+from preloaded import PACKAGES
 
 pytestmark = [pytest.mark.engine, pytest.mark.slow]
 

@@ -1,8 +1,8 @@
 """Commands of the project in processes forked from one that has imported what they need.
 
 A fresh interpreter imports for 2 to 5 s of processor time before a command does its work, and a
-small study takes 20 commands. That each command also starts by itself is what
-tests/docs/test_commands.py and the attacks show.
+small study takes 20 commands. That they start by themselves too is what tests/docs/test_commands.py
+and the attacks on running commands show.
 """
 
 import atexit
@@ -11,7 +11,9 @@ import functools
 import gc
 import json
 import os
+import resource
 import select
+import shutil
 import signal
 import socket
 import subprocess
@@ -28,6 +30,7 @@ PROGRAMS = {
     "dragdeck": "dragdeck.cli",
     "dragchain": "dragchain.cli",
     "snakemake": "snakemake.cli",
+    "fuzz": "attack.fuzz",
 }
 PRELOADED = (
     *("dragdeck.commands", "dragdeck.engine.run_folder", "dragdeck.rules"),
@@ -38,16 +41,20 @@ PRELOADED = (
 PLACE = "DRAGDECK_TESTS_PRELOADED"
 """Variable with the socket of the process that forks."""
 
+USER = "DRAGDECK_TESTS_USER"
+"""Variable with the number of the user that a call is made as, if not of the one who calls."""
+
 CALLER = f"""#!{sys.executable} -IS
-import json, os, socket, sys
+import json, os, resource as r, socket, sys
+limits = [(n, r.getrlimit(n)) for n in (r.RLIMIT_CPU, r.RLIMIT_AS, r.RLIMIT_FSIZE, r.RLIMIT_CORE)]
 server = socket.socket(socket.AF_UNIX)
 server.connect(os.environ["{PLACE}"])
 socket.send_fds(server, [b"\\0"], [0, 1, 2])
-call = [sys.argv, os.getcwd(), dict(os.environ)]
+call = [sys.argv, os.getcwd(), dict(os.environ), limits]
 server.sendall(json.dumps(call).encode() + b"\\n")
 sys.exit(int(server.makefile().readline() or 1))
 """
-"""A program that has its call made by that process."""
+"""A program that has its call made by that process, within its own limits."""
 
 
 @functools.cache
@@ -64,6 +71,7 @@ def programs() -> tuple[Path, str]:
         stdout=subprocess.PIPE,
     )
     assert server.stdout is not None and server.stdout.readline() == b"ready\n"
+    atexit.register(shutil.rmtree, folder)
     atexit.register(server.communicate)
     return folder, str(folder / "socket")
 
@@ -103,7 +111,7 @@ def _serve(place: str) -> None:
 def _answer(connection: socket.socket) -> NoReturn:
     """Make a call in a further process, say how it ended; end it if its caller ends before."""
     _, files, *_ = socket.recv_fds(connection, 1, 3)
-    (program, *arguments), folder, variables = json.loads(connection.makefile().readline())
+    (program, *arguments), folder, variables, limits = json.loads(connection.makefile().readline())
     process = os.fork()
     if process:
         ended = os.pidfd_open(process)
@@ -120,6 +128,12 @@ def _answer(connection: socket.socket) -> NoReturn:
     os.chdir(folder)
     os.environ.clear()
     os.environ.update(variables)
+    for which, most in limits:
+        resource.setrlimit(which, most)
+    if user := int(variables.get(USER, 0)):
+        os.setgroups([])
+        os.setgid(user)
+        os.setuid(user)
     sys.argv = [program, *arguments]
     sys.stdin, sys.stdout, sys.stderr = (os.fdopen(n, "rw"[n > 0]) for n in range(3))
     sys.exit(import_module(PROGRAMS[Path(program).name]).main(arguments))

@@ -260,3 +260,10 @@ def fuzzed(name: str, number: int, examples: int) -> None:
         for content in known:
             attempt(Path(folder), content)
     each()
+
+
+def main(arguments: list[str]) -> int:
+    """The program ``fuzz``: name, seed and number of examples."""
+    name, number, examples = arguments
+    fuzzed(name, int(number), int(examples))
+    return 0
