@@ -318,10 +318,3 @@ def test_a_failed_case_is_listed_and_the_others_are_reported(finished: Path) -> 
     data["sweep"]["motion.immersion_depth_m"] = [0.012, 0.016]
     file.write_text(yaml.safe_dump(data))
     assert "write_report" in jobs(finished, *STUDY)
-
-
-def test_an_unknown_study_stops_before_anything_runs(finished: Path) -> None:
-    done = snakemake(finished, "all", "--config", "study=large")
-    assert done.returncode != 0
-    assert "unknown study 'large'" in done.stdout + done.stderr
-    assert not (finished / "results/large").exists()
