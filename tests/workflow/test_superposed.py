@@ -33,6 +33,7 @@ from dragdeck.decks.templates import environment
 from dragdeck.engine.process import find_engine
 from dragdeck.engine.reports import silent
 from dragdeck.engine.run_folder import run_to_outcome
+from dragdeck.physics.packing import Bed
 from dragdeck.project import Project
 from dragdeck.records.case import CaseOfRun
 from dragdeck.scenes.filling import FILLING
@@ -127,6 +128,8 @@ class Runs:
         (self.study / "templates").mkdir(parents=True)
         (self.study / "templates/process.in.j2").write_text(CORNERS)
         self.project = Project(folder)
+        self.templates = environment(self.project.templates, self.study / "templates")
+        self.beds: dict[int, Bed] = {}
 
     def rendered(self, count: int, force_hz: float = 1000, **motion: Any) -> Path:
         """The folder of a process run, not yet run, with a filling that is."""
@@ -136,18 +139,19 @@ class Runs:
         data["outputs"] = {"n_checkpoints": 3, "workpiece_force_hz": force_hz}
         (self.study / "study.yaml").write_text(yaml.safe_dump(data))
         (case,) = load_cases(self.study / "study.yaml")
-        templates = environment(self.project.templates, self.study / "templates")
-        filling, process = (self.project.run_folder(case, kind) for kind in (FILLING, PROCESS))
-        write_run(FILLING.build(case, None), filling, templates)
-        run_to_outcome(filling, filling / "outcome.json", silent)
-        write_tables(filling)
-        bed = read_bed(filling / "tables/packing.json")
-        write_run(PROCESS.build(case, bed), process, templates)
+        if count not in self.beds:
+            filling = self.project.run_folder(case, FILLING)
+            write_run(FILLING.build(case, None), filling, self.templates)
+            run_to_outcome(filling, filling / "outcome.json", silent)
+            write_tables(filling)
+            self.beds[count] = read_bed(filling / "tables/packing.json")
+        process = self.project.run_folder(case, PROCESS)
+        write_run(PROCESS.build(case, self.beds[count]), process, self.templates)
         return process
 
     def shallow(self, **motion: Any) -> Path:
         """The same in a shallow bed, with the reference point at each step."""
-        return self.rendered(120, 1e5, immersion_depth_m=0.004, transient_m=0.0, **motion)
+        return self.rendered(80, 1e5, immersion_depth_m=0.004, transient_m=0.0, **motion)
 
 
 @pytest.fixture(scope="module")
