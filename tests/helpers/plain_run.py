@@ -7,7 +7,6 @@ whose orientation follows the path, without superposed motions, in a bowl of pri
 
 import json
 import math
-import struct
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -16,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from plain_dumps import binary_frames, text_frames
 
 Vector = np.ndarray
 Row = dict[str, float]
@@ -35,38 +35,6 @@ def vector(row: Row, what: str) -> Vector:
 def print_rows(file: Path, names: list[str]) -> Iterator[Row]:
     for line in file.read_text().splitlines()[1:]:
         yield dict(zip(names, map(float, line.split()), strict=True))
-
-
-def text_frames(file: Path, names: list[str]) -> Iterator[tuple[int, list[Row]]]:
-    lines = file.read_text().splitlines()
-    while lines:
-        assert lines[0] == "ITEM: TIMESTEP"
-        step, count = int(lines[1]), int(lines[3])
-        rows = (map(float, line.split()) for line in lines[9 : 9 + count])
-        yield step, [dict(zip(names, row, strict=True)) for row in rows]
-        del lines[: 9 + count]
-
-
-def binary_frames(file: Path, names: list[str]) -> Iterator[tuple[int, list[Row]]]:
-    data, at = file.read_bytes(), 0
-
-    def take(form: str) -> tuple[Any, ...]:
-        nonlocal at
-        values = struct.unpack_from(form, data, at)
-        at += struct.calcsize(form)
-        return values
-
-    while at < len(data):
-        step, count, tilted = take("<qqi")
-        take("<6i" + ("9d" if tilted else "6d"))
-        width, chunks = take("<ii")
-        values: list[float] = []
-        for _ in range(chunks):
-            (size,) = take("<i")
-            values += take(f"<{size}d")
-        assert width == len(names) and len(values) == count * width
-        table = np.reshape(values, (count, width)).tolist()
-        yield step, [dict(zip(names, row, strict=True)) for row in table]
 
 
 @dataclass
@@ -109,8 +77,11 @@ class PlainRun:
         return self.folder / output["pattern"].format(part=1), output["columns"]
 
     def frames(self, name: str) -> Iterator[tuple[int, list[Row]]]:
-        read = binary_frames if self.outputs[name]["binary"] else text_frames
-        return read(*self.file(name))
+        file, names = self.file(name)
+        binary, content = self.outputs[name]["binary"], file.read_bytes()
+        for step, columns in binary_frames(content, names) if binary else text_frames(content):
+            rows = zip(*columns.values(), strict=True)
+            yield step, [dict(zip(names, row, strict=True)) for row in rows]
 
     def pairs(self, one: str, other: str) -> Iterator[tuple[int, list[Row], list[Row]]]:
         """Step and rows of two outputs that are written together."""
