@@ -44,7 +44,9 @@ PLACE = "DRAGDECK_TESTS_PRELOADED"
 USER = "DRAGDECK_TESTS_USER"
 """Variable with the number of the user that a call is made as, if not of the one who calls."""
 
-CALLER = f"""#!{sys.executable} -IS
+CALLER = f"""#!/bin/sh
+'''exec' "{sys.executable}" -IS "$0" "$@"
+' '''
 import json, os, resource as r, socket, sys
 limits = [(n, r.getrlimit(n)) for n in (r.RLIMIT_CPU, r.RLIMIT_AS, r.RLIMIT_FSIZE, r.RLIMIT_CORE)]
 server = socket.socket(socket.AF_UNIX)
@@ -54,7 +56,8 @@ call = [sys.argv, os.getcwd(), dict(os.environ), limits]
 server.sendall(json.dumps(call).encode() + b"\\n")
 sys.exit(int(server.makefile().readline() or 1))
 """
-"""A program that has its call made by that process, within its own limits."""
+"""A program that has its call made by that process, within its own limits. It is Python that the
+shell starts, as a path in the first line may have no space."""
 
 
 @functools.cache
