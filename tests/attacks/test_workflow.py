@@ -4,7 +4,6 @@ import json
 import os
 import random
 import re
-import shutil
 import signal
 import stat
 import subprocess
@@ -25,7 +24,7 @@ from attack.ground import (
     tiny_study,
     write_study,
 )
-from paths import ROOT
+from entry import write_entry
 from preloaded import PACKAGES
 
 pytestmark = [pytest.mark.engine, pytest.mark.slow]
@@ -42,19 +41,11 @@ _TOOLS = {
 def entry(folder: Path) -> Path:
     """A project with the script ``run`` and an environment that it takes for its own."""
     project = new_project(folder, whole=True)
-    for name in ("run", "pyproject.toml", "constraints.txt"):
-        shutil.copy2(ROOT / name, project / name)
-    (project / ".venv/bin").mkdir(parents=True)
+    programs = write_entry(project)
     for name, words in _TOOLS.items():
-        tool = project / ".venv/bin" / name
         command = words.format(python=sys.executable)
-        tool.write_text(f'#!/bin/sh\nPYTHONPATH="{PACKAGES}" exec {command} "$@"\n')
-        tool.chmod(0o755)
-    sums = subprocess.run(
-        "cat pyproject.toml constraints.txt | cksum",
-        shell=True, cwd=project, capture_output=True, text=True, check=True,
-    )  # fmt: skip
-    (project / ".venv/dragdeck-stamp").write_text(f"{project.resolve()}\n{sums.stdout}")
+        (programs / name).write_text(f'#!/bin/sh\nPYTHONPATH="{PACKAGES}" exec {command} "$@"\n')
+        (programs / name).chmod(0o755)
     write_study(project, tiny_study())
     return project
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 import yaml
 from doc_pages import PAGES, fences, name_of
+from entry import write_entry
 from paths import PROJECT, ROOT
 from preloaded import environment, programs
 
@@ -40,15 +41,9 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
         if not (folder / name).exists():
             (folder / name).symlink_to(ROOT / name)
     shutil.copytree(ROOT / "studies", folder / "studies")
-    for name in ("run", "pyproject.toml", "constraints.txt"):
-        shutil.copy(ROOT / name, folder / name)
-    (folder / ".venv/bin").mkdir(parents=True)
+    own = write_entry(folder, ("cad", "crate", "docs", "notebook", "test"))
     for tool in Path(sys.executable).parent.iterdir():
-        (folder / ".venv/bin" / tool.name).symlink_to(tool)
-    wanted = "printf '%s\\n' \"$PWD\" && cat pyproject.toml constraints.txt | cksum"
-    stamp = subprocess.run(["sh", "-c", wanted], cwd=folder, capture_output=True, check=True)
-    extras = "".join(f"{extra}\n" for extra in ("cad", "crate", "docs", "notebook", "test"))
-    (folder / ".venv/dragdeck-stamp").write_bytes(stamp.stdout + extras.encode())
+        (own / tool.name).symlink_to(tool)
     return folder
 
 
