@@ -35,7 +35,7 @@ TABLES = (
     *("clusters", "facets", "contact_events", "impacts", "thermo", "summary"),
 )
 SOME_RUNS_ONLY = {*BODY, *BODY_IMPULSE, ATTRACTION, "fastest_particle_m_s"}
-"""Columns of workpieces that spin and of cohesive particles, and one that the small run does not write."""
+"""Columns of workpieces that spin or attract, and one that the small run does not write."""
 
 
 def write_drop(folder: Path) -> None:
