@@ -47,8 +47,13 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 def _longest_files_first(items: list[pytest.Item]) -> None:
     """Let no process begin with a long file when the others have nothing left to do."""
-    slow = {item.path for item in items if item.get_closest_marker("slow")}
-    items.sort(key=lambda item: ("workflow" not in item.path.parts[-2:], item.path not in slow))
+    marked = {
+        item.path
+        for item in items
+        for mark in item.iter_markers()
+        if mark.name in ("slow", "engine")
+    }
+    items.sort(key=lambda item: ("workflow" not in item.path.parts[-2:], item.path not in marked))
 
 
 @pytest.fixture
