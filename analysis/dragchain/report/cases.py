@@ -4,7 +4,7 @@ Process runs that differ in the packing (seed) alone are one case.
 """
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
@@ -34,14 +34,17 @@ from dragchain.report.values import (
 from dragchain.run.case import changed_inputs, upstream_folders
 from dragchain.run.kinematics import axis_speed, drag_phase, motion_of, needed, path_passed
 from dragdeck.errors import DocumentError, RejectedRunError
-from dragdeck.records.case import CaseOfRun, load_case
+from dragdeck.records.case import CaseOfRun, ClassOfRun, load_case
 from dragdeck.records.run import RunRecord, read_accepted
 
 # --- what was simulated --------------------------------------------------------------------------
 
 
 def set_up(
-    case: CaseOfRun, packings: int, filling: FillingFindings | None
+    case: CaseOfRun,
+    packings: int,
+    filling: FillingFindings | None,
+    segregation: Sequence[Mapping[str, tuple[float, float]]],
 ) -> list[tuple[str, str]]:
     """Workpiece, path, speed, media, bowl and settings of a case.
 
@@ -53,6 +56,8 @@ def set_up(
         Number of packings (seeds) that are averaged.
     filling : FillingFindings or None
         Of its packing.
+    segregation : sequence of mapping of str to (float, float)
+        Of each class in each packing, at the start and the end of the drag.
 
     Returns
     -------
@@ -64,6 +69,7 @@ def set_up(
         ("Path and depth", "; ".join(_path(case))),
         ("Speed", "; ".join(_speed(case))),
         ("Media", "; ".join(_media(case))),
+        *((f"Class {one.name}", "; ".join(_class(one, case, segregation))) for one in case.classes),
         ("Bowl", "; ".join(_bowl(case, filling))),
         ("Settings", "; ".join(_settings(case, packings))),
     ]
@@ -98,6 +104,9 @@ def _speed(case: CaseOfRun) -> Iterator[str]:
 
 def _media(case: CaseOfRun) -> Iterator[str]:
     media, material = case.media, _text(case.inputs.get("media.material"))
+    if case.classes:
+        yield f"{number(media.count)} spheres in {len(case.classes)} classes"
+        return
     yield " ".join(filter(None, (number(media.count), material, "spheres")))
     spread = (
         f" \N{PLUS-MINUS SIGN} {_mm(2 * media.radius_std_m)} (standard deviation)"
@@ -105,6 +114,33 @@ def _media(case: CaseOfRun) -> Iterator[str]:
         else ""
     )
     yield f"diameter {_mm(2 * media.radius_mean_m)}{spread}"
+
+
+def _class(
+    one: ClassOfRun, case: CaseOfRun, segregation: Sequence[Mapping[str, tuple[float, float]]]
+) -> Iterator[str]:
+    """Asked and obtained amounts of a class, and how it moves in the bed."""
+    amounts: Mapping[str, Mapping[str, float]] = {
+        "number": {each.name: each.count for each in case.classes},
+        "volume": {each.name: each.volume_m3 for each in case.classes},
+        "mass": {each.name: each.density_kg_m3 * each.volume_m3 for each in case.classes},
+    }
+    of = str(case.inputs.get("media.fractions_of", "mass"))
+    asked = case.inputs.get(f"media.classes.{one.name}.fraction")
+    yield f"{number(one.count)} {one.material} spheres"
+    mean, spread = _mm(2 * one.radius_mean_m), _mm(2 * one.radius_std_m)
+    yield f"diameter {mean} \N{PLUS-MINUS SIGN} {spread} (standard deviation)"
+    got = amounts[of][one.name] / sum(amounts[of].values())
+    yield f"{number(100 * got)} % of the {of}" + (
+        f" (asked: {number(100 * asked)} %)" if isinstance(asked, int | float) else ""
+    )
+    found = np.array([of_packing[one.name] for of_packing in segregation if of_packing])
+    if len(found):
+        start, end = (f"{value:+.3f}" for value in found.mean(axis=0))
+        change = np.diff(found, axis=1)[:, 0]
+        scatter = f" (standard deviation of the change {change.std(ddof=1):.3f})"
+        packings = scatter if len(found) > 1 else ""
+        yield f"segregation {start} at the start of the drag, {end} at its end{packings}"
 
 
 def _bowl(case: CaseOfRun, filling: FillingFindings | None) -> Iterator[str]:
@@ -251,7 +287,8 @@ class ReportedCase:
         """What was simulated, in six lines."""
         filling = self.first.filling
         bed = filling.findings if filling else None
-        return set_up(self.first.process.case, len(self.studies), bed)
+        moved = [study.process.findings.segregation for study in self.studies]
+        return set_up(self.first.process.case, len(self.studies), bed, moved)
 
 
 def cases_of(studies: Iterable[StudyRuns]) -> list[ReportedCase]:

@@ -8,7 +8,7 @@ from dragchain.run.reference import ReferenceDrag
 from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import Estimate, EstimateColumns, Real
 from dragchain.tables.impacts import Restitution
-from dragdeck.documents import Document, Part
+from dragdeck.documents import Document, Part, omitted
 
 FILE = Path("tables") / "figures.json"
 
@@ -190,6 +190,9 @@ class ProcessFindings(Findings):
         Samples of the contacts on the workpiece.
     ahead_behind, azimuth, depth : AheadBehind, AzimuthProfile, DepthProfile
         Distribution of the normal force on the workpiece.
+    segregation : mapping of str to (float, float)
+        Of each class of the media, at the first and the last frame of the drag; see
+        `segregation`. Absent if the media have no classes.
     """
 
     scene: Literal["process"] = "process"
@@ -205,6 +208,7 @@ class ProcessFindings(Findings):
     azimuth: AzimuthProfile
     depth: DepthProfile
     wake: Wake | None = None
+    segregation: Mapping[str, tuple[float, float]] = omitted({})
 
 
 class FillingFindings(Findings):

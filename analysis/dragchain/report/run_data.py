@@ -43,7 +43,8 @@ from dragchain.run.kinematics import drag_start_s, needed, path_passed, process_
 from dragchain.run.reference import reference_drags
 from dragchain.statistics.correlated import estimate_mean
 from dragchain.statistics.estimate import CONFIDENCE, EstimateColumns
-from dragchain.tables.by_step import read_table
+from dragchain.tables.bed import segregation
+from dragchain.tables.by_step import read_groups, read_table
 from dragchain.tables.impacts import effective_restitution
 from dragdeck.decks.outputs import load_outputs
 from dragdeck.records.case import CaseOfRun
@@ -179,7 +180,17 @@ def process_findings(run: RunData) -> ProcessFindings:
             slope_n_per_m=depth_slope(frame, frames, depth, force),
         ),
         wake=_wake(samples, run.case),
+        segregation=_segregation(run) if run.case.classes else {},
     )
+
+
+def _segregation(run: RunData) -> dict[str, tuple[float, float]]:
+    file = run.folder / "tables" / "particles.parquet"
+    steps = [int(run.network["step"].iloc[at]) for at in (0, -1)]
+    columns = ["step", "z_m", "radius_m", "class"]
+    rows = pd.concat(read_groups(file, columns, np.array(steps)))
+    first, last = (segregation(rows[rows["step"] == step]) for step in steps)
+    return {name: (first[name], last[name]) for name in first}
 
 
 def _wake(samples: pd.DataFrame, case: CaseOfRun) -> Wake | None:

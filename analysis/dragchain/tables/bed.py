@@ -1,6 +1,7 @@
 """The settled bed: how high it stands and how dense it is."""
 
 import numpy as np
+import pandas as pd
 
 from dragchain.arrays import Floats
 from dragchain.errors import TableError
@@ -45,6 +46,29 @@ def describe_bed(particles: Frame, case: CaseOfRun) -> Packing:
         radius_std_m=float(radius.std()),
         kinetic_energy_ratio=float(energy.mean() / scale),
     )
+
+
+def segregation(particles: pd.DataFrame) -> dict[str, float]:
+    """How far each class of the media has risen above the others, from -1 to 1.
+
+    Mean height of the particles of a class less that of all particles, both weighted by volume,
+    over the mean height of all: 0 in a mixed bed; in a bed of two classes with equal volumes, 0.5
+    and -0.5 if one lies on top of the other.
+
+    Parameters
+    ----------
+    particles : DataFrame
+        ``z_m``, ``radius_m`` and ``class`` of one frame.
+    """
+    volume = particles["radius_m"] ** 3
+    lifted = particles["z_m"] * volume
+    every = lifted.sum() / volume.sum()
+    by_class = particles["class"]
+    heights = (
+        lifted.groupby(by_class, observed=True).sum()
+        / volume.groupby(by_class, observed=True).sum()
+    )
+    return {str(name): float(height / every - 1) for name, height in heights.items()}
 
 
 def probed_height(centre_m: Floats, radius_m: Floats, bowl_radius_m: float) -> float:

@@ -68,6 +68,8 @@ class ClassOfRun(Part):
     name, material : str
     first_id, count : int
         Its particles have the ids from `first_id` on.
+    volume_m3 : float
+        Of all of them.
     radius_mean_m, radius_std_m : float
         Of the particles as placed, m.
     density_kg_m3 : float
@@ -79,6 +81,7 @@ class ClassOfRun(Part):
     material: str
     first_id: int
     count: int
+    volume_m3: PositiveFloat
     radius_mean_m: PositiveFloat
     radius_std_m: float
     density_kg_m3: PositiveFloat

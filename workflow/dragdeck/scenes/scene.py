@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
+import numpy as np
+
 from dragdeck import __version__
 from dragdeck.cases.bed import bed_classes, bed_density, skin
 from dragdeck.cases.case import Case, digest, slug
@@ -205,6 +207,7 @@ def _classes(study: Study, scale: float) -> tuple[ClassOfRun, ...]:
                 material=one.material,
                 first_id=first,
                 count=len(one.radii_m),
+                volume_m3=float((4 / 3 * np.pi * one.radii_m**3).sum()),
                 radius_mean_m=float(one.radii_m.mean()),
                 radius_std_m=float(one.radii_m.std()),
                 density_kg_m3=study.materials[one.material].density_kg_m3,
