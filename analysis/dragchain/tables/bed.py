@@ -5,6 +5,7 @@ import pandas as pd
 
 from dragchain.arrays import Floats
 from dragchain.errors import TableError
+from dragchain.run.case import class_of
 from dragchain.run.kinematics import needed
 from dragdeck.dumps.frame import Frame
 from dragdeck.records.case import CaseOfRun
@@ -34,7 +35,11 @@ def describe_bed(particles: Frame, case: CaseOfRun) -> Packing:
     bowl_radius = needed(case.bowl, "bowl").radius_m
     height = probed_height(particles.vectors("x_m", "y_m", "z_m"), radius, bowl_radius)
     volume = 4.0 / 3.0 * np.pi * radius**3
-    mass = volume * case.media.density_kg_m3
+    density: Floats | float = case.media.density_kg_m3
+    if case.classes:
+        own = class_of(case, particles.ids("particle_id"))
+        density = np.array([one.density_kg_m3 for one in case.classes])[own]
+    mass = volume * density
     energy = 0.5 * mass * (particles.vectors("vx_m_s", "vy_m_s", "vz_m_s") ** 2).sum(axis=1)
     scale = mass.mean() * case.gravity_m_s2 * 2.0 * radius.mean()
     return Packing(

@@ -1,13 +1,14 @@
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from changed import changed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dragchain import Frame, TableError, load_case
-from dragchain.tables.bed import describe_bed, probed_height
+from dragchain.tables.bed import describe_bed, probed_height, segregation
 
 NAMES = ("x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s", "radius_m")
 
@@ -96,3 +97,21 @@ def test_the_spread_of_radii_is_that_of_the_bed(tiny_run: Path) -> None:
 def test_an_empty_bowl_is_an_error(tiny_run: Path) -> None:
     with pytest.raises(TableError, match="there is no packing"):
         describe_bed(frame([]), load_case(tiny_run))
+
+
+@pytest.mark.parametrize(
+    ("heights", "index"), [([1.0, 3.0, 1.0, 3.0], 0.0), ([3.0, 3.0, 1.0, 1.0], 0.5)]
+)
+def test_segregation_is_half_where_one_of_two_equal_classes_lies_on_top(
+    heights: list[float], index: float
+) -> None:
+    rows = pd.DataFrame({"z_m": heights, "radius_m": 1.0, "class": list("aabb")})
+    assert segregation(rows) == {"a": pytest.approx(index), "b": pytest.approx(-index)}
+
+
+def test_segregation_counts_particles_by_their_volume() -> None:
+    """Eight particles of half the radius weigh as much as one: it lies above them."""
+    rows = pd.DataFrame(
+        {"z_m": [3.0] + 8 * [1.0], "radius_m": [2.0] + 8 * [1.0], "class": ["a"] + 8 * ["b"]}
+    )
+    assert segregation(rows) == {"a": pytest.approx(0.5), "b": pytest.approx(-0.5)}

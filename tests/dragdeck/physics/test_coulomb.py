@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from dragdeck.physics.coulomb import within_friction
+from dragdeck.physics.coulomb import FrictionLimit, within_friction
 
 Z = np.array([[0.0, 0.0, 1.0]])
 
@@ -40,3 +40,16 @@ def test_no_force_is_above_the_limit_and_the_normal_part_stays(force, friction) 
     size = np.linalg.norm(cut[:, :2], axis=1)
     assert (size <= friction * np.abs(force[:, 2]) * (1 + 1e-9) + 1e-9).all()
     np.testing.assert_allclose(size + removed, np.linalg.norm(force[:, :2], axis=1), atol=1e-9)
+
+
+def test_each_pair_of_classes_has_its_own_limit() -> None:
+    """Particles 1 to 3 are of the first class, 4 and 5 of the second."""
+    friction = np.array([[0.1, 0.2], [0.2, 0.3]])
+    limit = FrictionLimit(friction, {"cohesion_j_m3": 1e5 * friction}, False, (1, 4))
+    found = limit.at(np.array([1, 3, 4, 5]), np.array([2, 4, 3, 4]))
+    np.testing.assert_array_equal(found.friction, [0.1, 0.2, 0.2, 0.3])
+    area = 4 * np.pi * 1e-3 * 1e-6
+    attraction = found.attraction_n(np.full(4, 1e-3), np.full(4, 1e-6))
+    np.testing.assert_allclose(attraction, 1e5 * area * np.array([0.1, 0.2, 0.2, 0.3]))
+    wall = FrictionLimit(np.array([0.1, 0.2]), first_ids=(1, 4))
+    np.testing.assert_array_equal(wall.at(np.array([3, 4]), np.zeros(2, int)).friction, [0.1, 0.2])
