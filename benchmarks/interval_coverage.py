@@ -32,7 +32,7 @@ from paper_drops import FALL_S, HEIGHT, paper_drop, paper_drops  # noqa: E402
 from dragchain.arrays import Floats  # noqa: E402
 from dragchain.calibration.fit import calibrate  # noqa: E402
 from dragchain.calibration.measured_impacts import measure_impacts  # noqa: E402
-from dragchain.calibration.simulated_drops import Sweep, prepare  # noqa: E402
+from dragchain.calibration.simulated_drops import Drops  # noqa: E402
 from dragchain.loading.samples import (  # noqa: E402
     LEAST_EVENTS,
     Sampled,
@@ -185,8 +185,8 @@ def exponent(random: Random, packings: int, fraction: float = 0.3) -> tuple[Esti
 
 
 @cache
-def _sweep() -> Sweep:
-    return prepare(paper_drops())
+def _sweep() -> Drops:
+    return paper_drops()
 
 
 def calibration(random: Random, impacts: int) -> tuple[Estimate, float]:

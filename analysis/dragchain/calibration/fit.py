@@ -13,7 +13,6 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from numpy.polynomial import Polynomial
 from scipy.linalg import block_diag
 from scipy.optimize import brentq, minimize_scalar
 from scipy.stats import chi2
@@ -21,7 +20,7 @@ from scipy.stats import chi2
 from dragchain.arrays import Floats
 from dragchain.calibration.force_record import read_record
 from dragchain.calibration.measured_impacts import Impact, Measured, measure_impacts, pulse
-from dragchain.calibration.simulated_drops import DropRun, Drops, Emulator, Sweep, Waveform, prepare
+from dragchain.calibration.simulated_drops import DropRun, Drops, Emulator, Waveform
 from dragchain.errors import RecordError
 from dragchain.statistics.estimate import CONFIDENCE
 from dragdeck.records.calibration import IMPACTS, Fit
@@ -176,14 +175,14 @@ class Misfit:
     observed : Observed
     emulator : Emulator
         The sweep at production.
-    contact : sequence of Polynomial
-        Contact part of the times, at the full modulus: the real particle is hard.
+    contact_s : callable
+        Contact part of the times by deck value, at the full modulus: the real particle is hard.
     height_m, height_std_m : float
     """
 
     observed: Observed
     emulator: Emulator
-    contact: Sequence[Polynomial]
+    contact_s: Callable[[float], Floats]
     height_m: float
     height_std_m: float
 
@@ -202,12 +201,12 @@ class Misfit:
 
     def _parts(self, restitution: float) -> tuple[Floats, Floats]:
         """Whitened: measured less what does not depend on the height, and what does."""
-        e, flights = self.emulator, len(self.observed.times_s)
-        flight = np.cumsum([f(restitution) for f in e.flights_s[:flights]])
-        touch = np.cumsum([c(restitution) for c in self.contact[:flights]])
-        logs = [p(math.log(restitution)) for p in e.log_peaks[: len(self.observed.log_peaks)]]
-        rest = np.concatenate([self.observed.times_s - touch, self.observed.log_peaks - logs])
-        with_height = np.concatenate([flight, np.zeros(len(logs))])
+        e, flights, peaks = self.emulator, len(self.observed.times_s), len(self.observed.log_peaks)
+        touch = np.cumsum(self.contact_s(restitution)[:flights])
+        logs = self.observed.log_peaks - e.log_peaks(restitution)[:peaks]
+        rest = np.concatenate([self.observed.times_s - touch, logs])
+        flight = np.cumsum(e.flights_s(restitution)[:flights])
+        with_height = np.concatenate([flight, np.zeros(peaks)])
         return np.linalg.solve(self._root, rest), np.linalg.solve(self._root, with_height)
 
     def best(self, restitution: float) -> tuple[float, Floats]:
@@ -236,10 +235,8 @@ def fit(misfit: Misfit) -> Fit:
         ``range``: the best value or its interval leaves the sweep.
     """
     e = misfit.emulator
-    grid = np.linspace(e.low, e.high, 241)
-    near = int(np.argmin([misfit(value) for value in grid]))
-    bounds = (float(grid[max(near - 1, 0)]), float(grid[min(near + 1, len(grid) - 1)]))
-    found = minimize_scalar(misfit, bounds=bounds, method="bounded", options={"xatol": 1e-9})
+    bounds, options = (e.low, e.high), {"xatol": 1e-9}
+    found = minimize_scalar(misfit, bounds=bounds, method="bounded", options=options)
     best, least = float(found.x), float(found.fun)
     degrees = len(misfit.observed.times_s) + len(misfit.observed.log_peaks) - 1
     inflation = math.sqrt(max(1.0, least / degrees)) if degrees else 1.0
@@ -279,7 +276,7 @@ def _edge(above: Callable[[float], float], best: float, end: float) -> float:
 
 @dataclass(frozen=True)
 class RecordFit:
-    """A record, the sweep, and what follows.
+    """A record, the drops that it is compared with, and what follows.
 
     Attributes
     ----------
@@ -288,40 +285,32 @@ class RecordFit:
     observed : Observed
     width_ratio : float
         Width of the first impact over that of the simulated one, sampled alike.
-    sweep : Sweep
+    drops : Drops
     fit, fit_reference : Fit
-        Deck value at production, and at the full modulus with the fine step.
-    misfit : Misfit
-        At production.
+        At production and at the full modulus.
     """
 
     measured: Measured
     samplings: tuple[Sampling, ...]
     observed: Observed
     width_ratio: float
-    sweep: Sweep
+    drops: Drops
     fit: Fit
     fit_reference: Fit
-    misfit: Misfit
 
     @property
     def with_peaks(self) -> bool:
         """Whether the peaks are compared."""
         return len(self.observed.log_peaks) > 0
 
-    @property
-    def rise(self) -> float:
-        """How far the misfit has risen where the interval of `fit` ends."""
-        return _RISE * self.fit.inflation**2
-
 
 def calibrate_file(record: Path, drops: Drops) -> RecordFit:
     """Fit the restitution to the CSV of a record."""
     measured = measure_impacts(read_record(record), fall_time_s=drops.known.fall_time_s)
-    return calibrate(measured, prepare(drops))
+    return calibrate(measured, drops)
 
 
-def calibrate(measured: Measured, sweep: Sweep) -> RecordFit:
+def calibrate(measured: Measured, drops: Drops) -> RecordFit:
     """Fit the restitution to a record.
 
     Raises
@@ -329,8 +318,8 @@ def calibrate(measured: Measured, sweep: Sweep) -> RecordFit:
     RecordError
         ``coarse`` or ``range``.
     """
-    known = sweep.known
-    shapes = _nearest_shapes(measured.impacts, sweep.reference_runs)
+    known = drops.known
+    shapes = _nearest_shapes(measured.impacts, drops.select("reference", known.limit_force))
     samplings = tuple(
         sample_impact(shape, measured, impact.peak_n)
         for shape, impact in zip(shapes, measured.impacts, strict=False)
@@ -340,20 +329,12 @@ def calibrate(measured: Measured, sweep: Sweep) -> RecordFit:
     if ratio > WIDTH_LIMIT:
         samplings = _as_the_sensor_shows(measured, samplings)
     observed = observe(measured, samplings, with_peaks=with_peaks)
-    misfit, reference = (
-        Misfit(observed, e, sweep.reference.contact_s, known.height_m, known.height_std_m)
-        for e in (sweep.production, sweep.reference)
+    contact_s = drops.reference.contact_s
+    production, reference = (
+        fit(Misfit(observed, emulator, contact_s, known.height_m, known.height_std_m))
+        for emulator in (drops.production, drops.reference)
     )
-    return RecordFit(
-        measured=measured,
-        samplings=samplings,
-        observed=observed,
-        width_ratio=ratio,
-        sweep=sweep,
-        fit=fit(misfit),
-        fit_reference=fit(reference),
-        misfit=misfit,
-    )
+    return RecordFit(measured, samplings, observed, ratio, drops, production, reference)
 
 
 def _nearest_shapes(impacts: Sequence[Impact], runs: Sequence[DropRun]) -> tuple[Waveform, ...]:

@@ -89,10 +89,6 @@ LONG_WAVE, SHORT_WAVE = 2.0, 0.25
 # --- blocks of the path --------------------------------------------------------------------------
 
 
-FORCE_BINS = np.logspace(-5.0, 2.0, 71)
-"""Edges of the histogram of normal forces on the workpiece, N."""
-
-
 Rows = tuple[Ints, Floats]
 """Steps, (N,), and values, (N, ...), of N rows of a table."""
 
@@ -160,14 +156,13 @@ def quantities_along(run_dir: Path, case: CaseOfRun) -> PathQuantities:
     """The quantities of a complete run with tables and chains."""
     force = read_counted(run_dir, ("step", "drag_n", "lateral_n", "vertical_n"))
     path = CountedPath.of(case, force["step"].to_numpy(np.int64))
-    on_workpiece, counts = _of_workpiece_contacts(run_dir, path)
     loading, load_map = loading_along(run_dir, case, path.blocks)
-    blocks = {**_of_force(force, path), **on_workpiece, **loading, **_of_network(run_dir, path)}
+    on_workpiece, network = _of_workpiece_contacts(run_dir, path), _of_network(run_dir, path)
+    blocks = {**_of_force(force, path), **on_workpiece, **loading, **network}
     return PathQuantities(
         arc_m=path.length_m,
         block_m=path.length_m / path.blocks,
         blocks={name: tuple(map(finite, values)) for name, values in blocks.items()},
-        force_histogram=tuple(counts.tolist()),
         load_map=tuple(load_map.ravel().tolist()),
     )
 
@@ -238,11 +233,9 @@ def _pushing_contacts(run_dir: Path) -> Iterator[Rows]:
             )
 
 
-def _of_workpiece_contacts(run_dir: Path, path: CountedPath) -> tuple[dict[str, Floats], Ints]:
-    """Quantities of the contacts on the workpiece, and their number between `FORCE_BINS`."""
+def _of_workpiece_contacts(run_dir: Path, path: CountedPath) -> dict[str, Floats]:
     frames = np.bincount(path.block(_frames(run_dir, path)), minlength=path.blocks)
     contacts = np.zeros(path.blocks)
-    histogram = np.zeros(len(FORCE_BINS) - 1, dtype=np.int64)
     names = ("mean", "p50", "p90", "p99")
     found = {f"contact_force_{name}": np.full(path.blocks, math.nan) for name in names}
     overlap = np.full(path.blocks, math.nan)
@@ -254,12 +247,7 @@ def _of_workpiece_contacts(run_dir: Path, path: CountedPath) -> tuple[dict[str, 
         found["contact_force_mean"][number] = _mean(normal)
         for fraction in (50, 90, 99):
             found[f"contact_force_p{fraction}"][number] = np.percentile(normal, fraction)
-        histogram += np.histogram(normal, FORCE_BINS)[0]
-    return {
-        "workpiece_contacts": contacts / frames,
-        **found,
-        "workpiece_overlap": overlap,
-    }, histogram
+    return {"workpiece_contacts": contacts / frames, **found, "workpiece_overlap": overlap}
 
 
 def _mean(values: Floats) -> float:

@@ -129,9 +129,6 @@ MAIN = tuple(quantity.name for quantity in QUANTITIES if quantity.short)
 
 FILE = "measures.json"
 
-_TELLING_CHECKS = ("within_limits", "no_engine_error")
-"""Acceptance checks that say more than others why a run failed, the most telling first."""
-
 
 class RunCost(Part):
     """The cost of a run.
@@ -177,8 +174,6 @@ class PathQuantities(Part):
         Length of a block, m.
     blocks : mapping
         Quantity to a sequence of B values, None where a block has none.
-    force_histogram : sequence of int
-        Counts of contacts on the workpiece between `FORCE_BINS`.
     load_map : sequence of float
         Mean normal load by depth and azimuth, N, a depth after the other.
     """
@@ -186,7 +181,6 @@ class PathQuantities(Part):
     arc_m: float = 0.0
     block_m: float = 0.0
     blocks: Mapping[str, tuple[float | None, ...]] = {}
-    force_histogram: tuple[int, ...] = ()
     load_map: tuple[float, ...] = ()
 
     def of_blocks(self, name: str) -> Floats:
@@ -240,8 +234,6 @@ class Measures(PathQuantities, Document):
         return seed
 
     @property
-    def telling_failure(self) -> AcceptanceCheck | None:
-        """The acceptance check that says most about why the run failed, None if it did not."""
-        by_code = {check.code: check for check in self.failure}
-        first = self.failure[0] if self.failure else None
-        return next((by_code[code] for code in _TELLING_CHECKS if code in by_code), first)
+    def why_failed(self) -> str:
+        """The checks that did not pass, and what was seen."""
+        return "; ".join(f"{check.name}: {check.seen}" for check in self.failure)

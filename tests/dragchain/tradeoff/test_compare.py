@@ -29,7 +29,7 @@ from dragchain.errors import TableError
 from dragchain.statistics.estimate import student_quantile
 from dragchain.tradeoff.compare import Setting, compare_quantity, read_plan_runs
 from dragchain.tradeoff.measures import QUANTITIES
-from dragchain.tradeoff.outcome import Tradeoff, breaks, choose, largest_bound
+from dragchain.tradeoff.outcome import Tradeoff, breaks, by_modulus, choose
 from dragchain.tradeoff.report import errors_by_setting, run_table
 from dragdeck.errors import DocumentError
 
@@ -67,21 +67,21 @@ def test_a_signed_quantity_counts_in_mean_drags(tradeoff: Tradeoff) -> None:
 
 def test_costs_and_the_certified_choice(tradeoff: Tradeoff) -> None:
     assert tradeoff.cost(Setting(*SOFT)) == pytest.approx(0.1)
-    assert choose(tradeoff, ["workpiece_contacts"], 0.05).setting == Setting(*BOTH)
-    assert choose(tradeoff, ["drag_mean"], 0.05).setting == Setting(*COARSE)
-    assert choose(tradeoff, ["drag_mean"], 0.2).setting == Setting(*BOTH)
-    assert choose(tradeoff, ["drag_mean"], 1e-6).setting is None
-    assert choose(tradeoff, ["no such quantity"], 1.0).setting is None
-    assert choose(tradeoff, ["workpiece_contacts", "drag_mean"], 0.05).setting == Setting(*COARSE)
+    assert choose(tradeoff, "workpiece_contacts", 0.05).setting == Setting(*BOTH)
+    assert choose(tradeoff, "drag_mean", 0.05).setting == Setting(*COARSE)
+    assert choose(tradeoff, "drag_mean", 0.2).setting == Setting(*BOTH)
+    assert choose(tradeoff, "drag_mean", 1e-6).setting is None
 
 
 def test_a_tolerance_is_compared_with_the_bound(tradeoff: Tradeoff) -> None:
-    bound = largest_bound(tradeoff, ["drag_mean"], Setting(*COARSE))
-    error = tradeoff.comparisons["drag_mean"].errors[Setting(*COARSE)].value
+    error, bound = (
+        getattr(tradeoff.comparisons["drag_mean"].errors[Setting(*COARSE)], name)
+        for name in ("value", "bound")
+    )
     between = 0.5 * (abs(error) + bound)
-    assert choose(tradeoff, ["drag_mean"], between).setting is None
-    assert choose(tradeoff, ["drag_mean"], bound).setting == Setting(*COARSE)
-    choice = choose(tradeoff, ["drag_mean"], between)
+    assert choose(tradeoff, "drag_mean", between).setting is None
+    assert choose(tradeoff, "drag_mean", bound).setting == Setting(*COARSE)
+    choice = choose(tradeoff, "drag_mean", between)
     assert choice.setting is None and choice.nearest == Setting(*COARSE)
     assert choice.bound == bound
 
@@ -94,7 +94,7 @@ def test_a_setting_with_one_run_or_a_failed_one_is_not_offered(tmp_path: Path) -
         measures(BOTH, 4, rng, cpu_time_s=5.0, failure=FAILURE),
     ]
     tradeoff = made(tmp_path, found)
-    assert choose(tradeoff, ["workpiece_contacts"], 0.2).setting == Setting(*SOFT)
+    assert choose(tradeoff, "workpiece_contacts", 0.2).setting == Setting(*SOFT)
     table = run_table(tradeoff)
     assert table["failure"].tolist()[-1] == "no particle lost: 12 particles"
     assert table["complete"].sum() == len(found) - 1
@@ -132,7 +132,6 @@ def test_a_quantity_that_is_missing_or_changes_sign_is_skipped(tmp_path: Path) -
     assert set(tradeoff.skipped) == {"chain_length", "chain_count"}
     assert "no run at the reference" in tradeoff.skipped["chain_length"]
     assert "changes its sign" in tradeoff.skipped["chain_count"]
-    assert choose(tradeoff, ["chain_length"], 1.0).setting is None
 
 
 def test_every_combination_has_an_error_of_its_own(tmp_path: Path) -> None:
@@ -155,6 +154,12 @@ def test_parameters_that_were_never_turned_alone_are_not_told_apart(tmp_path: Pa
     assert own.errors[Setting(*BOTH)].value == pytest.approx(0.1, abs=WITHIN)
 
 
+def test_a_modulus_stands_for_itself_or_with_as_little_else_as_was_run(tmp_path: Path) -> None:
+    assert by_modulus(made(tmp_path / "all", contents())) == [Setting(*SOFT)]
+    confounded = [one for one in contents() if point_of(one) in (REFERENCE, BOTH)]
+    assert by_modulus(made(tmp_path / "few", confounded)) == [Setting(*BOTH)]
+
+
 def test_a_step_that_changes_the_drag_breaks(tmp_path: Path) -> None:
     found = contents()
     for content in found:
@@ -163,7 +168,7 @@ def test_a_step_that_changes_the_drag_breaks(tmp_path: Path) -> None:
     tradeoff = made(tmp_path, found)
     assert breaks(tradeoff, Setting(*COARSE))
     assert not breaks(tradeoff, Setting(*SOFT)) and not breaks(tradeoff, Setting(*REFERENCE))
-    assert choose(tradeoff, ["workpiece_contacts"], 0.5).setting != Setting(*COARSE)
+    assert choose(tradeoff, "workpiece_contacts", 0.5).setting != Setting(*COARSE)
 
 
 def test_files_that_cannot_be_used_are_refused(tmp_path: Path) -> None:
