@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from dragchain.arrays import Floats, Ints
 from dragchain.network import graph_kernels as kernels
 from dragchain.network.frame import WORKPIECE, NetworkFrame
+from dragchain.tables.workpiece_contacts import sums
 
 ALPHA_RAD = np.pi / 4
 """Largest angle between a particle's principal direction and the line to the next particle of a
@@ -98,8 +99,13 @@ def particle_stress(frame: NetworkFrame) -> Floats:
     the particle, over the particle's volume, made symmetric (Weber 1966; Peters et al. 2005, eq.
     1). Contacts with workpiece and bowl count too.
     """
-    other = np.where(frame.between_particles(), frame.b, -1)
-    total: Floats = kernels.particle_moments(frame.a, other, frame.centre, frame.point, frame.force)
+    inner = np.flatnonzero(frame.between_particles())
+    particle = np.concatenate([frame.a, frame.b[inner]])
+    contact = np.concatenate([np.arange(len(frame.a)), inner])
+    force = np.concatenate([-frame.force, frame.force[inner]])
+    branch = frame.point[contact] - frame.centre[particle]
+    moments = (branch[:, :, None] * force[:, None, :]).reshape(-1, 9)
+    total = sums(particle, moments, len(frame.centre)).reshape(-1, 3, 3)
     volume = 4.0 / 3.0 * np.pi * frame.radius**3
     return (total + total.transpose(0, 2, 1)) / (2.0 * volume[:, None, None])
 

@@ -98,30 +98,27 @@ def find_clusters(frame: NetworkFrame, force_n: Floats) -> Clusters:
     ----------
     frame : NetworkFrame
     force_n : (T,) ndarray
-        Thresholds in N, not below 0.
+        Rising thresholds in N, not below 0.
     """
     thresholds = np.asarray(force_n, dtype=np.float64)
     pressed = np.flatnonzero(frame.normal_force > 0.0)
     order = pressed[np.argsort(-frame.normal_force[pressed])]
     force = frame.normal_force[order]
     stops = np.searchsorted(-force, -thresholds)
-    by_stop = np.argsort(stops, kind="stable")
     pairs = [pair for ways in SPANS.values() for pair in ways]
     counts, joined = kernels.grow_clusters(
         frame.a.astype(np.int32)[order],
         np.where(frame.between_particles(), frame.b, -1).astype(np.int32)[order],
         _touched(frame)[order],
         np.array(pairs, dtype=np.uint8),
-        stops[by_stop],
+        stops[::-1],
         frame.particle_id.size,
     )
-    in_order = np.empty_like(counts)
-    in_order[by_stop] = counts
     reached = iter(
         np.where(joined >= 0, force[joined], 0.0) if force.size else np.zeros(joined.shape)
     )
     percolation = {name: float(max(next(reached) for _ in ways)) for name, ways in SPANS.items()}
-    clusters, members, largest, squares = in_order.T
+    clusters, members, largest, squares = counts[::-1].T
     size = frame.particle_id.size
     return Clusters(thresholds, stops, clusters, members, largest, squares, size, percolation)
 

@@ -251,8 +251,6 @@ class QuantityComparison:
     errors : dict of Setting to Error
     model : EffectsModel
         What `errors` and `between` draw on.
-    added : EffectsModel
-        Of single parameters, whose effects add up: what `alone` draws on.
     """
 
     quantity: Measurand
@@ -262,26 +260,11 @@ class QuantityComparison:
     bed_fraction: float
     errors: Mapping[Setting, Error]
     model: EffectsModel = field(repr=False)
-    added: EffectsModel = field(repr=False)
 
     @property
     def reference_halfwidth(self) -> float:
         """Relative half-width of the reference's interval."""
         return self.model.fit.quantile * self.se
-
-    def alone(self, setting: Setting, reference: Setting) -> float:
-        """The largest error that one of a setting's parameters makes when it is turned alone.
-
-        A setting may be right because the errors of two parameters cancel. That need
-        not hold in another scene. 0 where the runs do not tell.
-        """
-        own, levels = setting.factors(), reference.factors()
-        errors = [
-            self.added.error(one, levels, self.quantity.signed)
-            for one in ({**levels, name: own[name]} for name in levels)
-            if self.added.factors.tells(one)
-        ]
-        return max(abs(error.value) for error in errors)
 
     def between(self, setting: Setting, base: Setting) -> Error | None:
         """Difference of one setting to another; None if the runs cannot tell it."""
@@ -318,7 +301,7 @@ def compare_quantity(
         scale = float(np.sign(values[0]))
         values = np.log(np.abs(values))
     levels = reference.factors()
-    model, added = _models(settings, values, [run.bed for run, _ in rows], levels)
+    model = _model(settings, values, [run.bed for run, _ in rows], levels)
     level, uncertainty = model.fit.contrast(model.factors.row(levels))
     return QuantityComparison(
         quantity=quantity,
@@ -331,28 +314,23 @@ def compare_quantity(
             for setting in dict.fromkeys(settings)
         },
         model=model,
-        added=added,
     )
 
 
-def _models(
+def _model(
     settings: Sequence[Setting], values: Floats, beds: Sequence[str | None], reference: Levels
-) -> tuple[EffectsModel, EffectsModel]:
-    """A model with an effect of every combination, and one whose effects add up.
+) -> EffectsModel:
+    """A model with an effect of every combination.
 
-    One stands for both if the runs do not allow the other: without repetitions effects are
-    added up on trust, and what does not fit is scatter.
+    If the runs do not allow it, one whose effects add up: without repetitions effects are added
+    up on trust, and what does not fit is scatter.
     """
     levels = [setting.factors() for setting in settings]
-    found: list[EffectsModel] = []
-    for additive in (False, True):
-        factors = Factors(levels, reference, additive)
-        try:
-            found.append(EffectsModel(factors, fit_effects(factors.design(), values, beds)))
-        except SeriesError:
-            if additive and not found:
-                raise
-    return found[0], found[-1]
+    separate, added = (Factors(levels, reference, additive) for additive in (False, True))
+    try:
+        return EffectsModel(separate, fit_effects(separate.design(), values, beds))
+    except SeriesError:
+        return EffectsModel(added, fit_effects(added.design(), values, beds))
 
 
 def relative_error(

@@ -11,7 +11,6 @@ import pandas as pd
 from dragchain.arrays import Floats, Ints
 from dragchain.drag import parts, read_counted
 from dragchain.errors import TableError
-from dragchain.loading.contact_events import Thresholds
 from dragchain.loading.samples import Sampled, sample
 from dragchain.network.write import write_chains
 from dragchain.run.kinematics import drag_phase, needed
@@ -53,7 +52,7 @@ def loading_along(run_dir: Path, case: CaseOfRun, blocks: int) -> tuple[dict[str
     TableError
         If the slip of the contacts is not known, or no particle touches the workpiece.
     """
-    counted = sample(run_dir, case, Thresholds())
+    counted = sample(run_dir, case)
     block = np.arange(counted.frames) * blocks // counted.frames
     frames = np.bincount(block, minlength=blocks)
 
@@ -317,6 +316,26 @@ def _of_chains(chains: pd.DataFrame, frames: Ints, path: CountedPath) -> dict[st
 # --- measures ------------------------------------------------------------------------------------
 
 
+def read_outcome(run_dir: Path) -> RunRecord:
+    """The ``outcome.json`` of a run.
+
+    Raises
+    ------
+    TableError
+        If the run has none.
+    """
+    file = run_dir / "outcome.json"
+    if not file.is_file():
+        raise TableError(f"{file} is missing: `dragdeck run --outcome` writes it")
+    return RunRecord.read(file)
+
+
+def make_tables(run_dir: Path) -> None:
+    """Make the tables and chains that the quantities of a complete run come from."""
+    write_tables(run_dir)
+    write_chains(run_dir)
+
+
 def write_measures(run_dir: Path, packing_table: Path) -> Measures:
     """Measure a run of a trade-off and write ``measures.json``.
 
@@ -335,10 +354,7 @@ def write_measures(run_dir: Path, packing_table: Path) -> Measures:
     TableError
         If the run has no outcome, or its raw outputs cannot be read.
     """
-    file = run_dir / "outcome.json"
-    if not file.is_file():
-        raise TableError(f"{file} is missing: `dragdeck run --outcome` writes it")
-    outcome, case = RunRecord.read(file), load_case(run_dir)
+    outcome, case = read_outcome(run_dir), load_case(run_dir)
     measures = Measures.model_validate(
         {
             **dict(case),
@@ -347,14 +363,10 @@ def write_measures(run_dir: Path, packing_table: Path) -> Measures:
             "cost": _cost(case, outcome),
             "versions": {**case.versions, "engine": outcome.engine_version},
             "started": outcome.started,
-            "stability_number": next(
-                (one.number for one in outcome.checks if one.code == "stable_timestep"), None
-            ),
         }
     )
     if measures.complete:
-        write_tables(run_dir)
-        write_chains(run_dir)
+        make_tables(run_dir)
         measures = with_quantities(measures, run_dir, case, Packing.read(packing_table))
     else:
         measures = measures.model_copy(update={"failure": outcome.failed_checks})

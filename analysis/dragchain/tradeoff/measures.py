@@ -5,7 +5,7 @@ quantity has one value a block. A run's value is the mean over its blocks.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -130,6 +130,11 @@ MAIN = tuple(quantity.name for quantity in QUANTITIES if quantity.short)
 FILE = "measures.json"
 
 
+def checks_in_words(checks: Iterable[AcceptanceCheck]) -> str:
+    """Acceptance checks and what was seen."""
+    return "; ".join(f"{check.name}: {check.seen}" for check in checks)
+
+
 class RunCost(Part):
     """The cost of a run.
 
@@ -206,8 +211,6 @@ class Measures(PathQuantities, Document):
         Checks that did not pass; a failed run has no quantities.
     single : mapping
         The quantities of the bed.
-    stability_number : float or None
-        Stability number of the time step from the acceptance check.
     """
 
     remedy = "make it with: dragchain step measure"
@@ -224,7 +227,6 @@ class Measures(PathQuantities, Document):
     started: str
     failure: tuple[AcceptanceCheck, ...] = ()
     single: Mapping[str, float] = {}
-    stability_number: float | None = None
 
     @property
     def seed(self) -> int:
@@ -236,4 +238,4 @@ class Measures(PathQuantities, Document):
     @property
     def why_failed(self) -> str:
         """The checks that did not pass, and what was seen."""
-        return "; ".join(f"{check.name}: {check.seen}" for check in self.failure)
+        return checks_in_words(self.failure)

@@ -214,15 +214,9 @@ class Choice:
 
 
 def choose(tradeoff: Tradeoff, quantity: str, tolerance: float) -> Choice:
-    """The cheapest setting at which a quantity is within a tolerance, with confidence.
-
-    The bound of its error, and the error of each of its parameters alone, are below the tolerance.
-    """
+    """The cheapest setting at which a quantity is within a tolerance, with confidence."""
     comparison = tradeoff.comparisons[quantity]
-    bounds = {
-        one: max(comparison.errors[one].bound, comparison.alone(one, tradeoff.reference))
-        for one in _candidates(tradeoff, comparison)
-    }
+    bounds = {one: comparison.errors[one].bound for one in _candidates(tradeoff, comparison)}
     able = [one for one, bound in bounds.items() if bound <= tolerance]
     setting = min(able, key=tradeoff.cost, default=None)
     nearest = min(bounds, key=bounds.__getitem__, default=None)

@@ -198,10 +198,7 @@ def _setting_entry(tradeoff: Tradeoff, setting: Setting) -> SettingEntry:
         breaks=breaks(tradeoff, setting),
         relative_cost=tradeoff.cost(setting),
         errors={
-            name: ErrorEntry(
-                **vars(own.errors[setting]),
-                single_parameter_error=own.alone(setting, tradeoff.reference),
-            )
+            name: ErrorEntry(**vars(own.errors[setting]))
             for name, own in tradeoff.comparisons.items()
             if setting in own.errors
         },

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pandas as pd
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from networks import random_frame, real_frame
@@ -80,14 +79,6 @@ def test_the_table_of_a_real_frame() -> None:
     assert frame.normal_force.size == 3442
     assert len(chain_table(frame)) > 50
     assert_same_table(frame)
-
-
-@pytest.mark.parametrize("with_workpiece", [True, False])
-def test_paths_of_a_real_frame_at_every_threshold(with_workpiece: bool) -> None:
-    frame = real_frame()
-    for threshold in (0.0, 0.5, 1.0, 2.0, 10.0):
-        found = widest_paths(frame, threshold, with_workpiece=with_workpiece)
-        assert found == plain_paths(frame, threshold, with_workpiece=with_workpiece)
 
 
 def test_a_real_frame_with_rounded_forces_has_ties() -> None:

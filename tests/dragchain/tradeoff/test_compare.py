@@ -150,7 +150,7 @@ def test_every_combination_has_an_error_of_its_own(tmp_path: Path) -> None:
 def test_parameters_that_were_never_turned_alone_are_not_told_apart(tmp_path: Path) -> None:
     mixed = [one for one in contents() if point_of(one) in (REFERENCE, BOTH)]
     own = made(tmp_path, mixed).comparisons["drag_mean"]
-    assert own.added is own.model and not own.model.factors.additive
+    assert not own.model.factors.additive
     assert own.errors[Setting(*BOTH)].value == pytest.approx(0.1, abs=WITHIN)
 
 

@@ -132,7 +132,7 @@ def test_settings_for_the_advisor_change_the_fidelity_alone(summary: dict[str, A
     assert (own["seeds"], own["runs"], own["failed"]) == (3, 3, 0)
     assert own["relative_cost"] == pytest.approx(0.05)
     assert set(own["errors"]["drag_mean"]) == {
-        "value", "se", "ci95_low", "ci95_high", "bound", "significant", "single_parameter_error"
+        "value", "se", "ci95_low", "ci95_high", "bound", "significant"
     }  # fmt: skip
     failed = settings[0.01, 0.8, 1.0]
     assert (failed["failed"], failed["errors"]) == (1, {})
