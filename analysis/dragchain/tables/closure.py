@@ -140,7 +140,7 @@ class Closure:
                 "no step has both workpiece_force and workpiece_particles, so closure "
                 "cannot be tested"
             )
-        worst = errors.loc[errors["relative"].idxmax()]
+        worst = errors.iloc[int(errors["relative"].argmax())]
         if worst["relative"] > self.limit:
             return (
                 f"at step {worst['step']:.0f} the forces on the particles miss the force on the "
@@ -157,8 +157,8 @@ class Closure:
     def record(self) -> ClosureRecord:
         """The content of ``closure.json``."""
         problem, errors = self.problem(), self._steps(opening=False)
-        opening, relative = self._steps(opening=True)["relative"], errors["relative"]
-        worst = errors.loc[relative.idxmax()] if len(errors) else None
+        opening = self._steps(opening=True)["relative"]
+        worst = errors.iloc[int(errors["relative"].argmax())] if len(errors) else None
         evaluated = errors["evaluated_relative"][errors["counted"] == 1.0].to_numpy()
         return ClosureRecord(
             verdict="pass" if problem is None else "fail",
