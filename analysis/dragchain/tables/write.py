@@ -9,7 +9,7 @@ from typing import Protocol, TypeVar
 import numpy as np
 import pyarrow as pa
 
-from dragchain.arrays import Floats, Ints, places
+from dragchain.arrays import Floats, Ints
 from dragchain.errors import TableError
 from dragchain.run.case import attracts, friction_with
 from dragchain.run.kinematics import (
@@ -170,11 +170,12 @@ class WorkpieceSamples:
         The force is NaN there, because nobody wrote it.
         """
         wanted = np.maximum(steps, self._steps[0])
-        rows = places(wanted, self._steps)
-        if (rows < 0).any():
+        rows = np.minimum(np.searchsorted(self._steps, wanted), len(self._steps) - 1)
+        lost = steps[self._steps[rows] != wanted]
+        if lost.size:
             raise TableError(
-                f"workpiece_particles has step {steps[rows < 0][0]} but workpiece_force does not: "
-                "the period of workpiece_force must divide that of workpiece_particles"
+                f"workpiece_particles has step {lost[0]} but workpiece_force does not: the period "
+                "of workpiece_force must divide that of workpiece_particles"
             )
         force, place = np.split(self._values[rows], 2, axis=1)
         return np.where((steps < self._steps[0])[:, None], np.nan, force), place
