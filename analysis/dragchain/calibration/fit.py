@@ -235,8 +235,8 @@ def fit(misfit: Misfit) -> Fit:
         ``range``: the best value or its interval leaves the sweep.
     """
     e = misfit.emulator
-    bounds, options = (e.low, e.high), {"xatol": 1e-9}
-    found = minimize_scalar(misfit, bounds=bounds, method="bounded", options=options)
+    bounds = (e.low, e.high)
+    found = minimize_scalar(misfit, bounds=bounds, method="bounded", options={"xatol": 1e-9})
     best, least = float(found.x), float(found.fun)
     degrees = len(misfit.observed.times_s) + len(misfit.observed.log_peaks) - 1
     inflation = math.sqrt(max(1.0, least / degrees)) if degrees else 1.0

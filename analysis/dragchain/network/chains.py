@@ -212,7 +212,7 @@ def path_rows(
     strength, start = force[links], frame.a[workpieces]
     width = kernels.widths(*ends, strength, np.argsort(-strength), bowl + 1, bowl)[start]
     least = np.minimum(width, force[workpieces]) if with_workpiece else width
-    net, space = kernels.adjacency(*ends, bowl + 1), kernels.search_space(bowl + 1)
+    net, space = adjacency(*ends, bowl + 1), kernels.search_space(bowl + 1)
     particles, contacts = [], []
     for number in range(len(workpieces)):
         particle, link = start[number : number + 1], links[:0]
@@ -223,6 +223,29 @@ def path_rows(
         particles.append(particle)
         contacts.append(np.append(workpieces[number], links[link]))
     return ChainRows(_joined(particles), _joined(contacts), _starts(particles), _starts(contacts))
+
+
+def adjacency(a: Ints, b: Ints, nodes: int) -> tuple[Ints, NDArray[np.int32], NDArray[np.int32]]:
+    """List the edges of every node in their order.
+
+    Parameters
+    ----------
+    a, b : (M,) ndarray
+        The nodes that each edge joins.
+    nodes : int
+        Number of nodes.
+
+    Returns
+    -------
+    starts : (nodes + 1,) ndarray
+        Where each node's edges begin in the other two, and where the last one's end.
+    near, edge : (2 M,) ndarray
+        The node on the other side, and the edge.
+    """
+    ends, others = np.column_stack([a, b]).ravel(), np.column_stack([b, a]).ravel()
+    order = np.argsort(ends, kind="stable")
+    starts = np.append(0, np.cumsum(np.bincount(ends, minlength=nodes)))
+    return starts, others[order].astype(np.int32), (order // 2).astype(np.int32)
 
 
 def _joined(parts: list[Ints]) -> Ints:

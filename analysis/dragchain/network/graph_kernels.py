@@ -162,22 +162,6 @@ def widths(a, b, force, order, nodes, target):
     return width
 
 
-def adjacency(a, b, nodes):
-    """List the edges of every node in their order.
-
-    Returns
-    -------
-    starts : (nodes + 1,) ndarray of int64
-        Where each node's edges begin in the other two, and where the last one's end.
-    near, edge : (2 M,) ndarray of int32
-        The node on the other side, and the edge.
-    """
-    ends, others = np.column_stack([a, b]).ravel(), np.column_stack([b, a]).ravel()
-    order = np.argsort(ends, kind="stable")
-    starts = np.append(0, np.cumsum(np.bincount(ends, minlength=nodes)))
-    return starts, others[order].astype(np.int32), (order // 2).astype(np.int32)
-
-
 @njit(nogil=True, cache=True)
 def search_space(nodes):
     """What `shortest_path` notes of every node, to be used for many searches."""
@@ -198,7 +182,7 @@ def shortest_path(net, force, start, target, least, search, space):
     Parameters
     ----------
     net : tuple
-        As `adjacency` returns it.
+        As `dragchain.network.chains.adjacency` returns it.
     force : (M,) ndarray
         Of the edges.
     start, target : int

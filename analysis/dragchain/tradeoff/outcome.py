@@ -32,9 +32,10 @@ StepCosts = Mapping[str, Mapping[float, float]]
 def step_costs(costs: CostsFile | None) -> StepCosts:
     """What a step costs at other moduli, steps and speeds; empty if that was not timed."""
     levels: dict[str, dict[float, float]] = {}
-    for entry in costs.costs if costs and costs.fidelity else ():
+    fidelity = costs.fidelity if costs else None
+    for entry in costs.costs if costs and fidelity else ():
         if entry.parameter and entry.level is not None and entry.per_step is not None:
-            base = {float(getattr(costs.fidelity, entry.parameter)): 1.0}
+            base = {float(getattr(fidelity, entry.parameter)): 1.0}
             levels.setdefault(entry.parameter, base)[entry.level] = entry.per_step
     return levels
 
