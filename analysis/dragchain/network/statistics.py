@@ -171,15 +171,6 @@ def contact_counts(frame: NetworkFrame) -> Ints:
     )
 
 
-def coordination_number(counts: NDArray[np.integer[Any]]) -> float:
-    """The mean number of contacts per particle.
-
-    Without walls that is 2 M / N for M contacts (Thornton 2000, Geotechnique 50, 43-53); a contact
-    with workpiece or bowl counts once, for the particle.
-    """
-    return _mean(counts)
-
-
 def mechanical_coordination_number(
     counts: NDArray[np.integer[Any]], least: int = _LEAST_CONTACTS
 ) -> float:
@@ -189,11 +180,15 @@ def mechanical_coordination_number(
     ``least=2``: particles with fewer than `least` contacts are left out as carriers, while their
     contacts still count for the carriers that they touch. NaN where no particle is left.
     """
-    return coordination_number(counts[counts >= least])
+    return _mean(counts[counts >= least])
 
 
 def frame_statistics(frame: NetworkFrame, clusters: Clusters | None = None) -> dict[str, float]:
     """Return one row of ``network.parquet``; forces in N, NaN where a frame has no contact.
+
+    The coordination number is the mean number of contacts per particle. Without walls that is
+    2 M / N for M contacts (Thornton 2000, Geotechnique 50, 43-53); a contact with workpiece or
+    bowl counts once, for the particle.
 
     `clusters` is what `frame_clusters` returns for the frame, if it is known already.
     """
@@ -211,7 +206,7 @@ def frame_statistics(frame: NetworkFrame, clusters: Clusters | None = None) -> d
         "n_particles": frame.particle_id.size,
         "n_contacts": normal.size,
         **of_kind,
-        "coordination_number": coordination_number(counts),
+        "coordination_number": _mean(counts),
         "mechanical_coordination_number": mechanical_coordination_number(counts),
         "rattler_fraction": _mean(counts < _LEAST_CONTACTS),
         "normal_force_mean_n": mean,

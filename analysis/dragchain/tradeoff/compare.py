@@ -78,8 +78,6 @@ class PlanRun:
     Attributes
     ----------
     setting : Setting
-    bed : str or None
-        Id of the filling.
     measures : Measures
     stretches : sequence of mapping of str to float
         Quantity to the run's value over each stretch of its path that is as long as the common
@@ -87,7 +85,6 @@ class PlanRun:
     """
 
     setting: Setting
-    bed: str | None
     measures: Measures
     stretches: Sequence[Mapping[str, float]]
 
@@ -139,7 +136,7 @@ def read_plan_runs(
     if not complete:
         raise TableError("no run of the trade-off is complete, so there is nothing to compare")
     arc = min(complete)
-    runs = [_run(setting, bed, own, arc) for (setting, bed), own in longest.items()]
+    runs = [_run(setting, own, arc) for (setting, _), own in longest.items()]
     return runs, _setting(standard, standard), arc
 
 
@@ -168,10 +165,10 @@ def _shown(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _run(setting: Setting, bed: str | None, measures: Measures, arc_m: float) -> PlanRun:
+def _run(setting: Setting, measures: Measures, arc_m: float) -> PlanRun:
     count = max(1, int(measures.arc_m / arc_m + 1e-9))
     values = [values_within(measures, arc_m, stretch) for stretch in range(count)]
-    return PlanRun(setting, bed, measures, values)
+    return PlanRun(setting, measures, values)
 
 
 def values_within(measures: Measures, arc_m: float, stretch: int = 0) -> dict[str, float]:
@@ -213,11 +210,6 @@ class Error:
     ci95_high: float
     bound: float
     significant: bool
-
-    def columns(self) -> dict[str, float]:
-        """The numbers as columns of a table."""
-        names = {"value": "error"}
-        return {names.get(name, name): number for name, number in vars(self).items()}
 
 
 @dataclass(frozen=True)
@@ -301,7 +293,7 @@ def compare_quantity(
         scale = float(np.sign(values[0]))
         values = np.log(np.abs(values))
     levels = reference.factors()
-    model = _model(settings, values, [run.bed for run, _ in rows], levels)
+    model = _model(settings, values, [run.measures.bed for run, _ in rows], levels)
     level, uncertainty = model.fit.contrast(model.factors.row(levels))
     return QuantityComparison(
         quantity=quantity,

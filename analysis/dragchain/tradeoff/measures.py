@@ -85,27 +85,15 @@ QUANTITIES = (
     ),
     Measurand("contact_force_p99", "99th percentile of the contact forces on the workpiece", "N"),
     Measurand("normal_load", "sum of the normal forces on the workpiece", "N"),
-    Measurand(
-        "sliding_distance",
-        "sliding distance of all contacts over the path",
-    ),
-    Measurand(
-        "friction_work",
-        "friction work on the workpiece for a metre of path",
-        "J/m",
-    ),
+    Measurand("sliding_distance", "sliding distance of all contacts over the path"),
+    Measurand("friction_work", "friction work on the workpiece for a metre of path", "J/m"),
     Measurand("workpiece_overlap", "mean relative overlap on the workpiece"),
     Measurand(
-        "coordination_number",
-        "coordination number",
-        short="coordi\N{SOFT HYPHEN}nation number",
+        "coordination_number", "coordination number", short="coordi\N{SOFT HYPHEN}nation number"
     ),
     Measurand("mechanical_coordination_number", "coordination number without rattlers"),
     Measurand("network_force_mean", "mean normal force in the network", "N"),
-    Measurand(
-        "overlap_p99",
-        "99th percentile of the relative overlap between particles",
-    ),
+    Measurand("overlap_p99", "99th percentile of the relative overlap between particles"),
     Measurand("chain_count", "Peters chains per frame", short="Peters chains"),
     Measurand("chain_length", "particles per Peters chain", short="particles per chain"),
     Measurand("chain_alignment", "mean squared cosine of the angle between chains and motion"),

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from dragchain.report.campaign import write_report
-from dragchain.report.page import DASH, MINUS, number
+from dragchain.report.page import MINUS, number
 from dragchain.statistics.estimate import CONFIDENCE
 from dragchain.tradeoff.compare import Error, Setting, read_plan_runs
 from dragchain.tradeoff.figures import draw_pareto
@@ -72,21 +72,15 @@ def error_interval(error: Error) -> str:
     return f"{error_percent(error.ci95_low)} to {error_percent(error.ci95_high)} %"
 
 
-def times(ratio: float) -> str:
-    """A ratio of costs with two digits."""
-    return DASH if not math.isfinite(ratio) else number(float(f"{ratio:.2g}"), 2)
-
-
 def cheaper(ratio: float) -> str:
     """A ratio of costs in words."""
-    if ratio >= 1.0:
-        return f"{times(ratio)} times cheaper"
-    return f"{times(1.0 / ratio)} times more expensive"
+    size = number(float(f"{max(ratio, 1.0 / ratio):.2g}"), 2)
+    return f"{size} times {'cheaper' if ratio >= 1.0 else 'more expensive'}"
 
 
 FILTERS: Mapping[str, Callable[..., str]] = {
     function.__name__: function
-    for function in (error_percent, size_percent, error_size, error_interval, times, cheaper)
+    for function in (error_percent, size_percent, error_size, error_interval, cheaper)
 }
 """Filters of the page."""
 
@@ -100,7 +94,7 @@ def run_table(tradeoff: Tradeoff) -> pd.DataFrame:
         {
             "run": run.measures.run,
             **vars(run.setting),
-            "bed": run.bed,
+            "bed": run.measures.bed,
             "complete": run.complete,
             "failure": run.measures.why_failed,
             "counted_path_m": run.measures.arc_m or math.nan,
@@ -120,12 +114,12 @@ def errors_by_setting(tradeoff: Tradeoff) -> pd.DataFrame:
             **vars(setting),
             "runs": sum(run.complete for run in tradeoff.of(setting)),
             "relative_cost": tradeoff.cost(setting),
-            **error.columns(),
+            **vars(error),
         }
         for name, comparison in tradeoff.comparisons.items()
         for setting, error in comparison.errors.items()
     ]
-    return pd.DataFrame(rows)
+    return pd.DataFrame(rows).rename(columns={"value": "error"})
 
 
 # --- record --------------------------------------------------------------------------------------

@@ -63,17 +63,6 @@ def test_peters_chains_of_random_networks(frame: NetworkFrame, angle: float, fac
     assert chains == plain_peters(frame, alpha, factor)
 
 
-def test_the_networks_hold_what_is_compared() -> None:
-    """Ties, chains of many lengths, paths that lead nowhere and some that lead far."""
-    tables = [chain_table(random_frame(seed, levels=5)) for seed in range(20)]
-    table = pd.concat(tables, ignore_index=True)
-    paths = table[table["definition"] == "widest_path"]
-    assert set(table["n_particles"]) >= {1, 2, 3, 4, 5, 6, 7, 8}
-    assert set(paths["end_kind"]) == {"floor", "side", "none"}
-    forces = random_frame(0, levels=5).normal_force
-    assert np.unique(forces).size < forces.size / 50
-
-
 def test_the_table_of_a_real_frame() -> None:
     frame = real_frame()
     assert frame.normal_force.size == 3442

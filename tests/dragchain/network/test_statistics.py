@@ -26,7 +26,6 @@ from dragchain.network.statistics import (
     SPANS,
     cluster_rows,
     contact_counts,
-    coordination_number,
     find_clusters,
     frame_clusters,
     frame_statistics,
@@ -101,10 +100,6 @@ def test_a_frame_without_contacts_is_not_zero_but_unknown() -> None:
     assert math.isnan(found["mechanical_coordination_number"])
     assert math.isnan(found["normal_force_mean_n"])
     assert math.isnan(found["above_mean_fraction"])
-
-
-def test_no_particles_have_no_coordination() -> None:
-    assert math.isnan(coordination_number(np.array([], dtype=np.int64)))
 
 
 def test_a_contact_with_an_unknown_particle_is_refused() -> None:

@@ -21,7 +21,7 @@ from tradeoff_files import (
 
 from dragchain.cli import main as dragchain
 from dragchain.tradeoff.outcome import compare_drops
-from dragchain.tradeoff.report import error_percent, times
+from dragchain.tradeoff.report import cheaper, error_percent
 
 pytestmark = pytest.mark.slow  # its data take seconds to make
 
@@ -176,4 +176,4 @@ def test_numbers_in_words() -> None:
     assert [error_percent(x) for x in (0.1234, -0.0123, 0.00049, 0.0)] == [
         "+12", "\N{MINUS SIGN}1.2", "+0.05", "0"
     ]  # fmt: skip
-    assert times(41.7) == "42" and times(float("nan")) == "\N{EN DASH}"
+    assert cheaper(41.7) == "42 times cheaper" and cheaper(0.5) == "2 times more expensive"
