@@ -367,17 +367,14 @@ def write_measures(run_dir: Path, packing_table: Path) -> Measures:
     )
     if measures.complete:
         make_tables(run_dir)
-        measures = with_quantities(measures, run_dir, case, Packing.read(packing_table))
+        bed = Packing.read(packing_table)
+        single = {"bed_height": bed.bed_height_m, "solid_fraction": bed.solid_fraction}
+        along = dict(quantities_along(run_dir, case))
+        measures = measures.model_copy(update={**along, "single": single})
     else:
         measures = measures.model_copy(update={"failure": outcome.failed_checks})
     measures.write(run_dir / FILE)
     return measures
-
-
-def with_quantities(measures: Measures, run_dir: Path, case: CaseOfRun, bed: Packing) -> Measures:
-    """The measures of a complete run with its quantities, from its tables."""
-    single = {"bed_height": bed.bed_height_m, "solid_fraction": bed.solid_fraction}
-    return measures.model_copy(update={**dict(quantities_along(run_dir, case)), "single": single})
 
 
 def _cost(case: CaseOfRun, outcome: RunRecord) -> RunCost:
