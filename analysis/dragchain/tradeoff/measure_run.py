@@ -355,6 +355,12 @@ def write_measures(run_dir: Path, packing_table: Path) -> Measures:
         If the run has no outcome, or its raw outputs cannot be read.
     """
     outcome, case = read_outcome(run_dir), load_case(run_dir)
+    found: dict[str, object] = {"failure": outcome.failed_checks}
+    if outcome.complete:
+        make_tables(run_dir)
+        bed = Packing.read(packing_table)
+        single = {"bed_height": bed.bed_height_m, "solid_fraction": bed.solid_fraction}
+        found = {**dict(quantities_along(run_dir, case)), "single": single}
     measures = Measures.model_validate(
         {
             **dict(case),
@@ -363,16 +369,9 @@ def write_measures(run_dir: Path, packing_table: Path) -> Measures:
             "cost": _cost(case, outcome),
             "versions": {**case.versions, "engine": outcome.engine_version},
             "started": outcome.started,
+            **found,
         }
     )
-    if measures.complete:
-        make_tables(run_dir)
-        bed = Packing.read(packing_table)
-        single = {"bed_height": bed.bed_height_m, "solid_fraction": bed.solid_fraction}
-        along = dict(quantities_along(run_dir, case))
-        measures = measures.model_copy(update={**along, "single": single})
-    else:
-        measures = measures.model_copy(update={"failure": outcome.failed_checks})
     measures.write(run_dir / FILE)
     return measures
 
