@@ -31,8 +31,8 @@ def draw_impacts(record: Record, found: RecordFit, confirm: Drops) -> Figure:
     drops = confirm.select("reference")[0], confirm.select("confirm")[0]
     panels = parts[1].subplots(1, len(measured.impacts), sharey=True, squeeze=False)[0]
     for place, axes in enumerate(panels):
-        impact, sampling = measured.impacts[place], found.samplings[place]
-        centre = impact.centroid_s - sampling.time_bias_s
+        impact = measured.impacts[place]
+        centre = impact.centroid_s - found.sampling.time_bias_s[place]
         _one_impact(axes, time - centre, force, place, drops)
         axes.set_title(f"impact {impact.impact}: {impact.samples} samples")
     panels[0].set_ylabel("force (N)")

@@ -245,7 +245,7 @@ def bias_table(drops: Drops) -> pd.DataFrame:
 
 def impact_table(found: RecordFit) -> pd.DataFrame:
     """Measured and simulated impacts, one row each."""
-    observed, samplings, impacts = found.observed, found.samplings, found.measured.impacts
+    observed, sampling, impacts = found.observed, found.sampling, found.measured.impacts
     model, deck, count = found.drops.production, found.fit.restitution, len(impacts)
     ratio = observed.peaks_n / observed.peaks_n[0]
     ratio_std = ratio * np.hypot(observed.peaks_std[0], observed.peaks_std)
@@ -266,10 +266,10 @@ def impact_table(found: RecordFit) -> pd.DataFrame:
             "peak_over_first_std": [0.0, *ratio_std[1:]],
             "simulated_peak_over_first": [1.0, *np.exp(model.log_peaks(deck)[: count - 1])],
             "largest_sample_n": [impact.peak_n for impact in impacts],
-            "peak_correction": [1.0 / seen.peak_ratio for seen in samplings],
+            "peak_correction": 1.0 / sampling.peak_ratio,
             "samples": [impact.samples for impact in impacts],
             "width_s": [impact.width_s for impact in impacts],
-            "simulated_width_s": [seen.width_s for seen in samplings],
+            "simulated_width_s": sampling.width_s,
         }
     )
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from make_record import Sensor, record_of
 from paper_drops import BIAS, FALL_S, HEIGHT, G, paper_drop, paper_drops, rebound
 
-from dragchain.calibration.fit import WIDTH_LIMIT, calibrate, observe, sample_impact
+from dragchain.calibration.fit import WIDTH_LIMIT, calibrate, observe, sample_impacts
 from dragchain.calibration.measured_impacts import Measured, measure_impacts
 from dragchain.calibration.results import bias_table, read_off, result
 from dragchain.calibration.simulated_drops import Drops, emulate, waveform
@@ -92,8 +92,7 @@ def test_a_sweep_of_few_values_is_refused() -> None:
 
 def test_fine_sampling_changes_nothing() -> None:
     measured = record(0.7, rate=20e6, noise=1e-4)
-    shape = paper_drop(0.7).impacts[0]
-    seen = sample_impact(shape, measured, measured.impacts[0].peak_n)
+    seen = sample_impacts(paper_drop(0.7).impacts[:1], measured)
     assert seen.peak_ratio == pytest.approx(1.0, abs=1e-3)
     assert seen.time_bias_s == pytest.approx(0.0, abs=1e-9)
     assert seen.width_s == pytest.approx(
@@ -107,7 +106,7 @@ def test_coarse_sampling_misses_the_peak_by_a_known_share() -> None:
     measured = record(0.7, rate=rate, noise=1e-3)
     off = np.linspace(-0.5, 0.5, 20001) / rate / 25e-6
     wanted = np.cos(np.pi * off) ** 1.5
-    seen = sample_impact(paper_drop(0.7).impacts[0], measured, 23.0)
+    seen = sample_impacts(paper_drop(0.7).impacts[:1], measured)
     error = wanted.std() / math.sqrt(200)
     assert seen.peak_ratio == pytest.approx(wanted.mean(), abs=5 * error)
     assert seen.peak_std == pytest.approx(wanted.std(), rel=0.2)
@@ -116,21 +115,18 @@ def test_coarse_sampling_misses_the_peak_by_a_known_share() -> None:
 def test_a_rate_that_misses_contacts_is_refused() -> None:
     with pytest.raises(RecordError) as refused:
         measured = record(0.7, rate=30e3, noise=1e-3, seed=4)
-        sample_impact(paper_drop(0.7).impacts[0], measured, 23.0)
+        sample_impacts(paper_drop(0.7).impacts, measured)
     assert refused.value.reason in ("coarse", "impacts")
 
 
 def test_the_first_impact_is_in_every_uncertainty(sweep: Drops) -> None:
     measured = record(0.7)
-    samplings = [
-        sample_impact(shape, measured, 20.0) for shape in sweep.select("reference", True)[5].impacts
-    ]
-    got = observe(measured, samplings, with_peaks=True)
+    sampling = sample_impacts(sweep.select("reference", True)[5].impacts, measured)
+    got = observe(measured, sampling, with_peaks=True)
+    first, second = sampling.time_std_s[:2]
     assert got.covariance.shape == (4, 4)
-    assert got.covariance[0, 1] == pytest.approx(samplings[0].time_std_s ** 2)
-    assert got.covariance[0, 0] == pytest.approx(
-        samplings[0].time_std_s ** 2 + samplings[1].time_std_s ** 2
-    )
+    assert got.covariance[0, 1] == pytest.approx(first**2)
+    assert got.covariance[0, 0] == pytest.approx(first**2 + second**2)
     assert not got.covariance[:2, 2:].any()
 
 
