@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from dragchain.errors import SeriesError
 from dragchain.statistics.power_law import RunMeans, fit_power_law, fit_shifted, fit_two_terms
@@ -29,6 +30,17 @@ def sweep(
     law = exponent * np.log(x / 25.0) + bend * np.log(x / 25.0) ** 2
     noise = of_bed[beds] + own + random.normal(0.0, errors)
     return RunMeans(x, np.exp(law + noise), errors, beds)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("bed_fraction", [0.0, 0.6])
+def test_the_interval_holds_the_exponent_as_often_as_it_says(bed_fraction: float) -> None:
+    random = np.random.default_rng(5)
+    laws = [fit_power_law(sweep(random, bed_fraction=bed_fraction)) for _ in range(300)]
+    held = sum(law.exponent.contains(2.0) for law in laws)
+    falsely = sum(law.lack_of_fit is not None and law.lack_of_fit < 0.05 for law in laws)
+    assert stats.binomtest(held, 300, 0.95).pvalue > 0.001
+    assert stats.binomtest(falsely, 300, 0.05, alternative="greater").pvalue > 0.001
 
 
 def test_without_noise_the_law_is_found() -> None:
