@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import psutil
-from preloaded import PACKAGES, USER, environment
+from preloaded import USER, environment, plain_environment
 
 LARGEST_FILE = 64 * 2**20
 """No command that is attacked may write a file beyond this, bytes."""
@@ -83,9 +83,7 @@ class Call:
     def __init__(self, words: Sequence[str], folder: Path, log: Path) -> None:
         self.log = log
         self._begun = time.monotonic()
-        scripts = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
-        seen = {**os.environ, "PYTHONPATH": PACKAGES, "PATH": scripts, "PYTHONUNBUFFERED": "1"}
-        seen.pop("DISPLAY", None)
+        seen = plain_environment() | {"PYTHONUNBUFFERED": "1"}
         with log.open("wb") as sink:
             self.process = subprocess.Popen(
                 words,
