@@ -119,12 +119,13 @@ class Call:
 
     def wait(self, patience_s: float = PATIENCE_S) -> Said:
         """Wait for the end; beyond this processor time everything is killed."""
-        while (status := self.process.poll()) is None:
-            if self._is_beyond(patience_s):
-                kill(self.tree())
-                self.process.wait()
-                break
-            time.sleep(_POLL_S)
+        status = None
+        while status is None and not self._is_beyond(patience_s):
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                status = self.process.wait(1.0)
+        if status is None:
+            kill(self.tree())
+            self.process.wait()
         return Said(status, self.log.read_text(encoding="utf-8", errors="replace"))
 
 
