@@ -11,7 +11,6 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-import pandas as pd
 import pytest
 from attack.arena import ENDS_WITHIN_S, Arena, assert_no_engine
 from attack.calls import Call, Said, call, kill, main_of, refused
@@ -136,33 +135,6 @@ def _two_at_once(arena: Arena) -> None:
     assert said.status == 0, said.tail
 
 
-_FAILS = """\
-{% extends "base/process.in.j2" %}
-{% block extra %}
-{% if "0.006" in deck.run %}
-quit
-{% endif %}
-{% endblock %}
-"""
-
-
-def _one_fails(arena: Arena) -> None:
-    """A sweep of which one case fails: the report shows the other, and names this one."""
-    project = entry(arena.folder / "project")
-    data = tiny_study()
-    data["sweep"] = {"motion.immersion_depth_m": [0.006, 0.007]}
-    file = write_study(project, data).parent / "templates/process.in.j2"
-    file.parent.mkdir()
-    file.write_text(_FAILS)
-    said = whole(project, arena.folder / "first.log")
-    assert said.status not in (0, None), f"the failed case was not told: {said.tail}"
-    report = project / "results" / STUDY / "report"
-    assert len(pd.read_parquet(report / "summary.parquet")), said.tail
-    page = (report / "report.html").read_text(encoding="utf-8")
-    assert "0.006" in page
-    assert re.search("LIGGGHTS ended normally|failed|rejected", page)
-
-
 def _read_only(arena: Arena) -> None:
     """A repository on a disk that is mounted read-only."""
     with arena.disk() as disk:
@@ -238,7 +210,6 @@ def _emptied_state(arena: Arena) -> None:
 
 _PLACES = {
     "two calls at once": _two_at_once,
-    "one case of a sweep fails": _one_fails,
     "a read-only repository": _read_only,
     "a repository on a full disk": _full,
     "results of another user": _of_another_user,
@@ -256,16 +227,12 @@ def test_the_workflow_goes_on_or_says_why(attack: Callable[[Arena], None], arena
 
 
 _WRONG_CALLS = {
-    "an unknown key of --config": ((f"study={STUDY}", "fidelty=quick"), ("fidelty", "fidelity")),
-    "an unknown fidelity": ((f"study={STUDY}", "fidelity=quik"), ("quik", "quick")),
-    "an unknown study": (("study=tny",), ("tny", STUDY)),
     "a study out of the folder": (("study=../studies/tiny",), (r"\.\./studies/tiny",)),
     "a study that is a command": (("study=tiny; touch pwned",), ("tiny; touch pwned",)),
     "a study with a newline": (("study=tiny\ntouch pwned",), ("study",)),
     "a study of 5000 letters": (("study=" + "a" * 5000,), ("study",)),
     "a study that is a number": (("study=17",), ("17", STUDY)),
     "a study that is nothing": (("study=",), ("study",)),
-    "an unknown plan": ((f"study={STUDY}", "plan=nothing"), ("nothing",)),
     "a record out of the project": ((f"study={STUDY}", "record"), ("passwd|record",)),
     "a plan that is no plan": ((f"study={STUDY}", "plan=/etc/passwd"), ("passwd|plan",)),
 }

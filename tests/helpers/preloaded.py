@@ -79,13 +79,19 @@ def programs() -> tuple[Path, str]:
     return folder, str(folder / "socket")
 
 
+def plain_environment() -> dict[str, str]:
+    """An environment in which the programs are those of the interpreter."""
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    found = {**os.environ, "PYTHONPATH": PACKAGES, "PATH": path}
+    found.pop("DISPLAY", None)
+    return found
+
+
 def environment() -> dict[str, str]:
     """An environment in which the programs are those of this module."""
     folder, place = programs()
-    path = os.pathsep.join([str(folder), str(Path(sys.executable).parent), os.environ["PATH"]])
-    found = {**os.environ, "PYTHONPATH": PACKAGES, "PATH": path, PLACE: place}
-    found.pop("DISPLAY", None)
-    return found
+    found = plain_environment()
+    return found | {"PATH": os.pathsep.join([str(folder), found["PATH"]]), PLACE: place}
 
 
 # --- the process that forks ----------------------------------------------------------------------

@@ -1,12 +1,13 @@
 """Snakemake started on a copy of the project."""
 
 import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
 import yaml
 from paths import DATA, PROJECT, ROOT
-from preloaded import environment
+from preloaded import environment, plain_environment
 
 
 def copy_of_project(folder: Path, study: dict[str, Any] | None = None, name: str = "small") -> Path:
@@ -21,8 +22,12 @@ def copy_of_project(folder: Path, study: dict[str, Any] | None = None, name: str
 
 
 def snakemake(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    words = ["snakemake", "--cores", "2", *arguments]
-    return subprocess.run(words, cwd=folder, env=environment(), capture_output=True, text=True)
+    """Call Snakemake, preloaded with its commands unless a queue is to start them."""
+    queued = "profiles/slurm" in arguments
+    words = [sys.executable, "-m", "snakemake"] if queued else ["snakemake"]
+    words += ["--cores", "2", *arguments]
+    seen = plain_environment() if queued else environment()
+    return subprocess.run(words, cwd=folder, env=seen, capture_output=True, text=True)
 
 
 def jobs(folder: Path, *arguments: str) -> set[str]:

@@ -11,7 +11,6 @@ from made_run import run_json, save, write_documents
 from report_files import case_json
 
 from dragchain.tradeoff.compare import read_plan_runs
-from dragchain.tradeoff.measure_run import FORCE_BINS
 from dragchain.tradeoff.measures import QUANTITIES
 from dragchain.tradeoff.outcome import Tradeoff, compare_settings
 from dragdeck.documents import SCHEMA
@@ -74,15 +73,12 @@ def measures(
         quantity.name: _blocks(quantity, known, rng.normal(bed, noise, blocks))
         for quantity in QUANTITIES[:-2]
     }
-    middle = np.log(np.sqrt(FORCE_BINS[:-1] * FORCE_BINS[1:]))
-    expected = 5000.0 * np.exp(-0.5 * ((middle - np.log(0.1)) / 1.2) ** 2)
     return {
         **content,
         "arc_m": blocks * BLOCK_M,
         "block_m": BLOCK_M,
         "blocks": of_blocks,
         "single": {name: known.get(name, 1.0) for name in ("bed_height", "solid_fraction")},
-        "force_histogram": rng.poisson(expected).tolist(),
         "numbers": {"inertial_number": 0.004, "particles": 1422},
     }
 

@@ -16,7 +16,6 @@ from paths import ROOT, SMALL_STUDY
 from plate import PLATE
 
 from dragchain import load_case, write_tables
-from dragchain.loading.contact_events import Thresholds
 from dragchain.loading.write import compute_loading
 from dragchain.run.kinematics import (
     axis_speed,
@@ -290,7 +289,7 @@ def test_a_reversal_reverses_the_torque(runs: Runs) -> None:
     turn = force["turn_rad"].to_numpy()
     np.testing.assert_allclose(rotated(body.to_numpy(), turn), world, atol=1e-12)
 
-    found = compute_loading(folder, Thresholds())
+    found = compute_loading(folder)
     contacts = pd.read_parquet(folder / "tables/workpiece_contacts.parquet", columns=["step"])
     sampled = force[force["step"].isin(contacts["step"])]
     interval = found.sampled.interval_s
@@ -313,7 +312,7 @@ def test_contacts_lie_on_an_inclined_workpiece_that_spins(runs: Runs) -> None:
     folder = runs.rendered(300, path=path, tilt_deg=tilt, spin={"rpm": rpm, "ramp_s": 0.02}, **deep)
     engine(folder)
     write_tables(folder)
-    case, found = load_case(folder), compute_loading(folder, Thresholds())
+    case, found = load_case(folder), compute_loading(folder)
     assert found.summary.closure.point_off_facet_max_m < 1e-6
     force = pd.read_parquet(folder / "tables/workpiece_force.parquet").query("in_statistics")
     world, body = (force[[f"{name}_{axis}_n" for axis in "xyz"]] for name in ("force", "body"))

@@ -105,10 +105,7 @@ rule write_calibration_report:
             category="Calibration",
             labels={"run": "drop test", "figure": "report"},
         ),
-        figures=[
-            WORK.of_study("calibration", f"figures/{name}.png")
-            for name in ("impacts", "fit", "bias")
-        ],
+        figure=WORK.of_study("calibration", "figures/impacts.png"),
     log:
         WORK.of_study("calibration", "logs/report.log"),
     benchmark:

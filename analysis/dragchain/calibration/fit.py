@@ -13,7 +13,6 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from numpy.polynomial import Polynomial
 from scipy.linalg import block_diag
 from scipy.optimize import brentq, minimize_scalar
 from scipy.stats import chi2
@@ -21,7 +20,7 @@ from scipy.stats import chi2
 from dragchain.arrays import Floats
 from dragchain.calibration.force_record import read_record
 from dragchain.calibration.measured_impacts import Impact, Measured, measure_impacts, pulse
-from dragchain.calibration.simulated_drops import DropRun, Drops, Emulator, Sweep, Waveform, prepare
+from dragchain.calibration.simulated_drops import DropRun, Drops, Emulator, Waveform
 from dragchain.errors import RecordError
 from dragchain.statistics.estimate import CONFIDENCE
 from dragdeck.records.calibration import IMPACTS, Fit
@@ -37,42 +36,46 @@ _SAMPLING_SEED = 20150
 
 @dataclass(frozen=True)
 class Sampling:
-    """What a record's rate and noise do to one impact.
+    """What a record's rate and noise do to K impacts.
 
     Attributes
     ----------
-    peak_ratio, peak_std : float
+    peak_ratio, peak_std : (K,) ndarray
         Largest sample over the true peak: mean and standard deviation.
-    time_bias_s, time_std_s : float
+    time_bias_s, time_std_s : (K,) ndarray
         Centroid of the samples less the true one.
-    width_s : float
+    width_s : (K,) ndarray
         Mean width at half height as the samples show it.
     """
 
-    peak_ratio: float
-    peak_std: float
-    time_bias_s: float
-    time_std_s: float
-    width_s: float
+    peak_ratio: Floats
+    peak_std: Floats
+    time_bias_s: Floats
+    time_std_s: Floats
+    width_s: Floats
 
 
-def sample_impact(shape: Waveform, measured: Measured, peak_n: float) -> Sampling:
-    """Sample a simulated impact many times at the record's rate, with its noise.
+def sample_impacts(shapes: Sequence[Waveform], measured: Measured) -> Sampling:
+    """Sample a simulated impact for each measured one many times at its rate, with its noise.
 
     Parameters
     ----------
-    shape : Waveform
-        At the full modulus: as long as the real impact.
+    shapes : sequence of Waveform
+        At the full modulus: as long as the real impacts.
     measured : Measured
-        Rate, noise and threshold.
-    peak_n : float
-        The measured peak, to which the force is scaled.
+        Rate, noise and threshold, and the peaks to which the forces are scaled.
 
     Raises
     ------
     RecordError
-        ``coarse``: less than half of the samplings would see the impact.
+        ``coarse``: less than half of the samplings would see an impact.
     """
+    pairs = zip(shapes, measured.impacts, strict=False)
+    return Sampling(*np.array([_sampled(one, measured, impact.peak_n) for one, impact in pairs]).T)
+
+
+def _sampled(shape: Waveform, measured: Measured, peak_n: float) -> list[float]:
+    """The numbers of a `Sampling` of one impact."""
     random = np.random.default_rng(_SAMPLING_SEED)
     step, (start, end) = measured.interval_s, (shape.time_s[0], shape.time_s[-1])
     count = int((end - start) / step) + 6
@@ -95,8 +98,8 @@ def sample_impact(shape: Waveform, measured: Measured, peak_n: float) -> Samplin
             remedy="record at a higher rate",
         )
     table = np.array(found)
-    mean, std = table.mean(axis=0), table.std(axis=0, ddof=1)
-    return Sampling(*map(float, (mean[0], std[0], mean[1], std[1], mean[2])))
+    (ratio, bias, width), (ratio_std, bias_std, _) = table.mean(axis=0), table.std(axis=0, ddof=1)
+    return [ratio, ratio_std, bias, bias_std, width]
 
 
 @dataclass(frozen=True)
@@ -124,23 +127,12 @@ class Observed:
     peaks_std: Floats
 
 
-def observe(measured: Measured, samplings: Sequence[Sampling], *, with_peaks: bool) -> Observed:
-    """Times and peaks of a record with their uncertainties.
-
-    Parameters
-    ----------
-    measured : Measured
-    samplings : sequence of Sampling
-        One an impact.
-    with_peaks : bool
-        Whether to compare the peaks too.
-    """
-    pairs = list(zip(measured.impacts, samplings, strict=True))
-    time = np.array([impact.centroid_s - seen.time_bias_s for impact, seen in pairs])
-    peak = np.array([impact.peak_n / seen.peak_ratio for impact, seen in pairs])
-    peak_std = np.array([seen.peak_std / seen.peak_ratio for seen in samplings])
-    blocks = [_since_first(np.array([seen.time_std_s for seen in samplings]))]
-    logs = np.empty(0)
+def observe(measured: Measured, sampling: Sampling, *, with_peaks: bool) -> Observed:
+    """Times and peaks of a record with their uncertainties, and whether to compare the peaks."""
+    time = np.array([impact.centroid_s for impact in measured.impacts]) - sampling.time_bias_s
+    peak = np.array([impact.peak_n for impact in measured.impacts]) / sampling.peak_ratio
+    peak_std = sampling.peak_std / sampling.peak_ratio
+    blocks, logs = [_since_first(sampling.time_std_s)], np.empty(0)
     if with_peaks:
         logs = np.log(peak[1:] / peak[0])
         blocks.append(_since_first(peak_std))
@@ -176,14 +168,14 @@ class Misfit:
     observed : Observed
     emulator : Emulator
         The sweep at production.
-    contact : sequence of Polynomial
-        Contact part of the times, at the full modulus: the real particle is hard.
+    contact_s : callable
+        Contact part of the times by deck value, at the full modulus: the real particle is hard.
     height_m, height_std_m : float
     """
 
     observed: Observed
     emulator: Emulator
-    contact: Sequence[Polynomial]
+    contact_s: Callable[[float], Floats]
     height_m: float
     height_std_m: float
 
@@ -202,12 +194,12 @@ class Misfit:
 
     def _parts(self, restitution: float) -> tuple[Floats, Floats]:
         """Whitened: measured less what does not depend on the height, and what does."""
-        e, flights = self.emulator, len(self.observed.times_s)
-        flight = np.cumsum([f(restitution) for f in e.flights_s[:flights]])
-        touch = np.cumsum([c(restitution) for c in self.contact[:flights]])
-        logs = [p(math.log(restitution)) for p in e.log_peaks[: len(self.observed.log_peaks)]]
-        rest = np.concatenate([self.observed.times_s - touch, self.observed.log_peaks - logs])
-        with_height = np.concatenate([flight, np.zeros(len(logs))])
+        e, flights, peaks = self.emulator, len(self.observed.times_s), len(self.observed.log_peaks)
+        touch = np.cumsum(self.contact_s(restitution)[:flights])
+        logs = self.observed.log_peaks - e.log_peaks(restitution)[:peaks]
+        rest = np.concatenate([self.observed.times_s - touch, logs])
+        flight = np.cumsum(e.flights_s(restitution)[:flights])
+        with_height = np.concatenate([flight, np.zeros(peaks)])
         return np.linalg.solve(self._root, rest), np.linalg.solve(self._root, with_height)
 
     def best(self, restitution: float) -> tuple[float, Floats]:
@@ -236,9 +228,7 @@ def fit(misfit: Misfit) -> Fit:
         ``range``: the best value or its interval leaves the sweep.
     """
     e = misfit.emulator
-    grid = np.linspace(e.low, e.high, 241)
-    near = int(np.argmin([misfit(value) for value in grid]))
-    bounds = (float(grid[max(near - 1, 0)]), float(grid[min(near + 1, len(grid) - 1)]))
+    bounds = (e.low, e.high)
     found = minimize_scalar(misfit, bounds=bounds, method="bounded", options={"xatol": 1e-9})
     best, least = float(found.x), float(found.fun)
     degrees = len(misfit.observed.times_s) + len(misfit.observed.log_peaks) - 1
@@ -279,49 +269,41 @@ def _edge(above: Callable[[float], float], best: float, end: float) -> float:
 
 @dataclass(frozen=True)
 class RecordFit:
-    """A record, the sweep, and what follows.
+    """A record, the drops that it is compared with, and what follows.
 
     Attributes
     ----------
     measured : Measured
-    samplings : tuple of Sampling
+    sampling : Sampling
     observed : Observed
     width_ratio : float
         Width of the first impact over that of the simulated one, sampled alike.
-    sweep : Sweep
+    drops : Drops
     fit, fit_reference : Fit
-        Deck value at production, and at the full modulus with the fine step.
-    misfit : Misfit
-        At production.
+        At production and at the full modulus.
     """
 
     measured: Measured
-    samplings: tuple[Sampling, ...]
+    sampling: Sampling
     observed: Observed
     width_ratio: float
-    sweep: Sweep
+    drops: Drops
     fit: Fit
     fit_reference: Fit
-    misfit: Misfit
 
     @property
     def with_peaks(self) -> bool:
         """Whether the peaks are compared."""
         return len(self.observed.log_peaks) > 0
 
-    @property
-    def rise(self) -> float:
-        """How far the misfit has risen where the interval of `fit` ends."""
-        return _RISE * self.fit.inflation**2
-
 
 def calibrate_file(record: Path, drops: Drops) -> RecordFit:
     """Fit the restitution to the CSV of a record."""
     measured = measure_impacts(read_record(record), fall_time_s=drops.known.fall_time_s)
-    return calibrate(measured, prepare(drops))
+    return calibrate(measured, drops)
 
 
-def calibrate(measured: Measured, sweep: Sweep) -> RecordFit:
+def calibrate(measured: Measured, drops: Drops) -> RecordFit:
     """Fit the restitution to a record.
 
     Raises
@@ -329,31 +311,20 @@ def calibrate(measured: Measured, sweep: Sweep) -> RecordFit:
     RecordError
         ``coarse`` or ``range``.
     """
-    known = sweep.known
-    shapes = _nearest_shapes(measured.impacts, sweep.reference_runs)
-    samplings = tuple(
-        sample_impact(shape, measured, impact.peak_n)
-        for shape, impact in zip(shapes, measured.impacts, strict=False)
-    )
-    ratio = measured.impacts[0].width_s / samplings[0].width_s
+    known = drops.known
+    shapes = _nearest_shapes(measured.impacts, drops.select("reference", known.limit_force))
+    sampling = sample_impacts(shapes, measured)
+    ratio = measured.impacts[0].width_s / float(sampling.width_s[0])
     with_peaks = ratio <= WIDTH_LIMIT if known.peaks == "auto" else known.peaks == "yes"
     if ratio > WIDTH_LIMIT:
-        samplings = _as_the_sensor_shows(measured, samplings)
-    observed = observe(measured, samplings, with_peaks=with_peaks)
-    misfit, reference = (
-        Misfit(observed, e, sweep.reference.contact_s, known.height_m, known.height_std_m)
-        for e in (sweep.production, sweep.reference)
+        sampling = _as_the_sensor_shows(measured, sampling)
+    observed = observe(measured, sampling, with_peaks=with_peaks)
+    contact_s = drops.reference.contact_s
+    production, reference = (
+        fit(Misfit(observed, emulator, contact_s, known.height_m, known.height_std_m))
+        for emulator in (drops.production, drops.reference)
     )
-    return RecordFit(
-        measured=measured,
-        samplings=samplings,
-        observed=observed,
-        width_ratio=ratio,
-        sweep=sweep,
-        fit=fit(misfit),
-        fit_reference=fit(reference),
-        misfit=misfit,
-    )
+    return RecordFit(measured, sampling, observed, ratio, drops, production, reference)
 
 
 def _nearest_shapes(impacts: Sequence[Impact], runs: Sequence[DropRun]) -> tuple[Waveform, ...]:
@@ -363,7 +334,7 @@ def _nearest_shapes(impacts: Sequence[Impact], runs: Sequence[DropRun]) -> tuple
     return runs[int(np.argmin(np.abs(np.array(times) - flight)))].impacts
 
 
-def _as_the_sensor_shows(measured: Measured, samplings: Sequence[Sampling]) -> tuple[Sampling, ...]:
+def _as_the_sensor_shows(measured: Measured, sampling: Sampling) -> Sampling:
     """What rate and noise do to impacts that a slow sensor widens.
 
     Each is taken to look like the first, whose samples are drawn again. Only
@@ -373,7 +344,5 @@ def _as_the_sensor_shows(measured: Measured, samplings: Sequence[Sampling]) -> t
     weight = np.maximum(force, 0.0)
     centroid = float(np.sum(weight * time) / np.sum(weight))
     shape = Waveform(time, force, time[0], time[-1], centroid, float(force.max()))
-    return tuple(
-        replace(sample_impact(shape, measured, impact.peak_n), width_s=sampling.width_s)
-        for impact, sampling in zip(measured.impacts, samplings, strict=True)
-    )
+    again = sample_impacts([shape] * len(measured.impacts), measured)
+    return replace(again, width_s=sampling.width_s)

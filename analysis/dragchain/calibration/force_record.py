@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 import pandas as pd
+from scipy.stats import theilslopes
 
 from dragchain.arrays import Floats
 from dragchain.errors import RecordError
@@ -174,6 +175,5 @@ def quiet_line(time_s: Floats, force_n: Floats) -> Floats:
     """
     time = np.array([np.mean(block) for block in np.array_split(time_s, _BLOCKS)])
     force = np.array([np.median(block) for block in np.array_split(force_n, _BLOCKS)])
-    one, other = np.triu_indices(_BLOCKS, 1)
-    slope = float(np.median((force[other] - force[one]) / (time[other] - time[one])))
+    slope = float(theilslopes(force, time).slope)
     return np.array([slope, float(np.median(force_n - slope * time_s))])

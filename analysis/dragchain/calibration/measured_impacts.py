@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict, Field
 from pydantic.json_schema import SkipJsonSchema
+from scipy.signal import find_peaks, peak_widths
 
 from dragchain.arrays import Floats
 from dragchain.calibration.force_record import Note, Record, quiet_line
@@ -48,8 +49,6 @@ class Impact(Part):
     ----------
     impact : int
         Its number, from 1.
-    start_s : float
-        Time of the first sample above the threshold, s.
     peak_time_s : float
         Time of the largest sample, s.
     centroid_s : float
@@ -59,19 +58,15 @@ class Impact(Part):
         Largest sample above the baseline, N.
     width_s : float
         Width at half of the largest sample, interpolated between samples, s.
-    impulse_n_s : float
-        Sum of force over time, N s.
     samples : int
         Samples above the threshold.
     """
 
     impact: int
-    start_s: float
     peak_time_s: float
     centroid_s: float
     peak_n: float
     width_s: float
-    impulse_n_s: float
     samples: int
 
 
@@ -169,19 +164,15 @@ def _baseline(time: Floats, force: Floats, dead: int) -> tuple[float, float, flo
     deviation of what is left.
     """
     coarse = _quantum(force) / 2.0
-    line = quiet_line(time, force)
-    spread = _MAD_TO_STD * float(np.median(np.abs(force - np.polyval(line, time))))
-    out = np.zeros(len(force), dtype=bool)
+    line, quiet = quiet_line(time, force), np.ones(len(force), dtype=bool)
     for _ in range(20):
-        before = out
-        rest = force - np.polyval(line, time)
-        out = _widened(np.abs(rest) > _THRESHOLD_STDS * max(spread, coarse), dead)
-        if len(out) - out.sum() < _QUIET_SAMPLES or np.array_equal(out, before):
+        rest, before = force - np.polyval(line, time), quiet
+        spread = max(_MAD_TO_STD * float(np.median(np.abs(rest[quiet]))), coarse)
+        quiet = ~_widened(np.abs(rest) > _THRESHOLD_STDS * spread, dead)
+        if quiet.sum() < _QUIET_SAMPLES or np.array_equal(quiet, before):
             break
-        line = np.polyfit(time[~out], force[~out], 1)
-        spread = _MAD_TO_STD * float(np.median(np.abs((force - np.polyval(line, time))[~out])))
-    quiet = (force - np.polyval(line, time))[~out]
-    noise = float(quiet.std()) if len(quiet) >= _QUIET_SAMPLES else spread
+        line = np.polyfit(time[quiet], force[quiet], 1)
+    noise = float(rest[quiet].std()) if quiet.sum() >= _QUIET_SAMPLES else spread
     return float(line[1]), float(line[0]), max(noise, coarse / math.sqrt(3.0))
 
 
@@ -203,24 +194,14 @@ def _quantum(force: Floats) -> float:
 def _pulses(force: Floats, threshold: float, dead: int) -> list[tuple[int, int]]:
     """First and last sample of each pulse above the threshold.
 
-    What follows its first sample within `dead` samples belongs to a pulse: its
-    unbroken run about the largest of these counts, so that neither noise at its
-    foot nor the sensor's ringing makes another one.
+    Of tops within `dead` samples only the highest makes a pulse, which is the unbroken run about
+    it: neither noise at its foot nor the sensor's ringing makes another one.
     """
-    above = force > threshold
-    below = np.flatnonzero(~above)
-    found: list[tuple[int, int]] = []
-    place = 0
-    for begin in np.flatnonzero(above & ~np.roll(above, 1)).tolist():
-        if begin < place:
-            continue
-        place = begin + dead + 1
-        top = begin + int(np.argmax(force[begin:place]))
-        at = int(np.searchsorted(below, top))
-        first = int(below[at - 1]) + 1 if at > 0 else 0
-        last = int(below[at]) - 1 if at < len(below) else len(force) - 1
-        found.append((first, last))
-    return found
+    tops = find_peaks(np.pad(force, 1), height=threshold, distance=dead + 1)[0] - 1
+    below = np.flatnonzero(force <= threshold)
+    at = np.searchsorted(below, tops)
+    first, last = np.append(-1, below)[at] + 1, np.append(below, len(force))[at] - 1
+    return list(zip(first.tolist(), last.tolist(), strict=True))
 
 
 def _too_few(count: int) -> RecordError:
@@ -286,36 +267,19 @@ def pulse(
             remedy="record at a higher rate",
         )
     top = first + int(np.argmax(force[first : last + 1]))
-    near = slice(max(first - 1, 0), last + 2)
+    foot, end = max(first - 1, 0), min(last + 1, len(force) - 1)
+    near = slice(foot, end + 1)
     weight = np.maximum(force[near] - _CENTROID_FRACTION * force[top], 0.0)
+    from_zero = (force[[top]], np.array([foot]), np.array([end]))
+    width = float(peak_widths(force, [top], 0.5, prominence_data=from_zero)[0][0])
     return Impact(
         impact=number,
-        start_s=float(time[first]),
         peak_time_s=float(time[top]),
         centroid_s=float(np.sum(weight * time[near]) / np.sum(weight)),
         peak_n=float(force[top]),
-        width_s=_width(force, top, first, last) * interval,
-        impulse_n_s=float(np.sum(force[near])) * interval,
+        width_s=max(1.0, width) * interval,
         samples=last - first + 1,
     )
-
-
-def _width(force: Floats, top: int, first: int, last: int) -> float:
-    """Width at half height in samples, interpolated linearly; never below one."""
-    half = 0.5 * force[top]
-    left, right = top, top
-    while left > max(first - 1, 0) and force[left - 1] >= half:
-        left -= 1
-    while right < min(last + 1, len(force) - 1) and force[right + 1] >= half:
-        right += 1
-    before = _crossing(force[left - 1], force[left], half) if left > 0 else 0.0
-    after = _crossing(force[right + 1], force[right], half) if right + 1 < len(force) else 0.0
-    return max(1.0, right - left + before + after)
-
-
-def _crossing(outside: float, inside: float, half: float) -> float:
-    """How far outside the sample above it a level is crossed, in samples."""
-    return float(np.clip((inside - half) / (inside - outside), 0.0, 1.0))
 
 
 def _check_tops(

@@ -12,7 +12,7 @@ import pandas as pd
 from dragchain.calibration.fit import RecordFit, calibrate_file
 from dragchain.calibration.force_record import read_record
 from dragchain.calibration.measured_impacts import Measured, measure_impacts
-from dragchain.calibration.simulated_drops import Drops, Emulator, emulator_of, read_drops
+from dragchain.calibration.simulated_drops import Drops, Emulator, read_drops
 from dragchain.errors import TableError
 from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate
 from dragdeck.documents import Part
@@ -93,8 +93,6 @@ class CalibrationFile(FitFile):
         Ratio of the widths of the first impact, measured / simulated with the same sampling.
     correction : float
         Fitted input value minus measured restitution.
-    scatter_of_one_drop : float
-        Standard deviation of the restitution of a single production drop.
     known : DropTest
         The study and its drop test.
     put : Put
@@ -120,7 +118,6 @@ class CalibrationFile(FitFile):
     direct: Direct
     correction: float
     put_for: tuple[PutFor, ...]
-    scatter_of_one_drop: float
     settings: Mapping[SweepPurpose, Settings]
     record: Measured
 
@@ -153,31 +150,26 @@ def write_calibration(record: Path, drops_file: Path, out: Path) -> CalibrationF
     DragdeckError
         The record or the sweep cannot be used.
     """
-    drops = read_drops(drops_file)
-    found = calibrate_file(record, drops)
-    content = result(found, drops)
-    write_csv(out / "bias.csv", bias_table(drops))
-    write_csv(out / "impacts.csv", _impact_table(found))
+    found = calibrate_file(record, read_drops(drops_file))
+    content = result(found)
+    for name, table in (("bias", bias_table(found.drops)), ("impacts", impact_table(found))):
+        text = table.to_csv(index=False, float_format="%.9g", lineterminator="\n")
+        write_text(out / f"{name}.csv", text)
     content.write(out / "result.json")
     return content
 
 
-def write_csv(file: Path, table: pd.DataFrame) -> None:
-    """Write a table as CSV with nine digits."""
-    write_text(file, table.to_csv(index=False, float_format="%.9g", lineterminator="\n"))
-
-
-def result(found: RecordFit, drops: Drops) -> CalibrationFile:
+def result(found: RecordFit) -> CalibrationFile:
     """Content of ``result.json``."""
     full = found.fit_reference
     put_at_full = Estimate(full.restitution, full.ci95_low, full.ci95_high)
-    measured = put_at_full.mapped(found.sweep.reference.rebound)
-    deck, known = found.fit.restitution, drops.known
+    drops, deck = found.drops, found.fit.restitution
+    measured, known = put_at_full.mapped(drops.reference.rebound), drops.known
     return CalibrationFile(
         known=known,
         put=Put(field=f"pairs.{known.pair}.restitution", value=_rounded(found.fit)),
         measured=measured,
-        effective=float(found.sweep.production.rebound(deck)),
+        effective=drops.production.rebound(deck),
         fit=found.fit,
         fit_full=found.fit_reference,
         peaks_compared=found.with_peaks,
@@ -189,7 +181,6 @@ def result(found: RecordFit, drops: Drops) -> CalibrationFile:
             for purpose in PURPOSES
             for option in (True, False)
         ),
-        scatter_of_one_drop=found.sweep.production.scatter,
         settings={purpose: drops.select(purpose)[0].drop for purpose in PURPOSES},
         record=found.measured,
     )
@@ -202,13 +193,11 @@ def _rounded(fit: Fit) -> float:
 
 
 def _direct(found: RecordFit) -> Direct:
-    deck, contact = found.fit_reference.restitution, found.sweep.reference.contact_s
-    since = [0.0, *found.observed.times_s.tolist()]
-    flights = [
-        b - a - float(part(deck)) for a, b, part in zip(since, since[1:], contact, strict=False)
-    ]
+    since = np.append(0.0, found.observed.times_s)
+    contact = found.drops.reference.contact_s(found.fit_reference.restitution)
+    flights = (np.diff(since) - contact[: len(since) - 1]).tolist()
     return Direct(
-        first_impact=flights[0] / (2.0 * found.sweep.known.fall_time_s),
+        first_impact=flights[0] / (2.0 * found.drops.known.fall_time_s),
         second_impact=flights[1] / flights[0] if len(flights) > 1 else None,
     )
 
@@ -231,7 +220,7 @@ def _put_for(
 ) -> PutFor:
     """The fit for the setting of the study, a reading off the curve for another."""
     used = purpose == "production" and limit_force == drops.known.limit_force
-    model = emulator_of(drops, purpose, limit_force)
+    model = drops.emulator(purpose, limit_force)
     ends = (fit.restitution, fit.ci95_low, fit.ci95_high) if used else read_off(model, measured)
     known = dict(zip(("value", "ci95_low", "ci95_high"), ends, strict=True))
     return PutFor(purpose=purpose, limit_force=limit_force, used=used, **known)
@@ -254,25 +243,20 @@ def bias_table(drops: Drops) -> pd.DataFrame:
     return table.reset_index().sort_values(setting, ascending=[True, False, True])
 
 
-def _impact_table(found: RecordFit) -> pd.DataFrame:
+def impact_table(found: RecordFit) -> pd.DataFrame:
     """Measured and simulated impacts, one row each."""
-    observed, samplings = found.observed, found.samplings
-    model, reference = found.sweep.production, found.sweep.reference
-    deck, impacts = found.fit.restitution, found.measured.impacts
-    scale, _ = found.misfit.best(deck)
-    count = len(impacts)
+    observed, sampling, impacts = found.observed, found.sampling, found.measured.impacts
+    model, deck, count = found.drops.production, found.fit.restitution, len(impacts)
     ratio = observed.peaks_n / observed.peaks_n[0]
     ratio_std = ratio * np.hypot(observed.peaks_std[0], observed.peaks_std)
-    times_std = np.sqrt(np.diag(observed.covariance)[: count - 1])
-    logs = [p(math.log(deck)) for p in model.log_peaks[: count - 1]]
-    flights = [sum(float(f(deck)) for f in model.flights_s[:k]) * scale for k in range(count)]
-    contacts = [sum(float(c(deck)) for c in reference.contact_s[:k]) for k in range(count)]
+    scale = math.sqrt(found.fit.height_m / found.drops.known.height_m)
+    parts = scale * model.flights_s(deck) + found.drops.reference.contact_s(deck)
     return pd.DataFrame(
         {
             "impact": range(1, count + 1),
             "time_since_first_s": [0.0, *observed.times_s],
-            "time_since_first_std_s": [0.0, *times_std],
-            "simulated_time_since_first_s": np.add(flights, contacts),
+            "time_since_first_std_s": [0.0, *np.sqrt(np.diag(observed.covariance)[: count - 1])],
+            "simulated_time_since_first_s": [0.0, *np.cumsum(parts)[: count - 1]],
             "simulated_time_since_first_std_s": [
                 float(np.linalg.norm(model.errors[:k])) for k in range(count)
             ],
@@ -280,12 +264,12 @@ def _impact_table(found: RecordFit) -> pd.DataFrame:
             "peak_force_std_n": observed.peaks_n * observed.peaks_std,
             "peak_over_first": ratio,
             "peak_over_first_std": [0.0, *ratio_std[1:]],
-            "simulated_peak_over_first": [1.0, *map(math.exp, logs)],
+            "simulated_peak_over_first": [1.0, *np.exp(model.log_peaks(deck)[: count - 1])],
             "largest_sample_n": [impact.peak_n for impact in impacts],
-            "peak_correction": [1.0 / seen.peak_ratio for seen in samplings],
+            "peak_correction": 1.0 / sampling.peak_ratio,
             "samples": [impact.samples for impact in impacts],
             "width_s": [impact.width_s for impact in impacts],
-            "simulated_width_s": [seen.width_s for seen in samplings],
+            "simulated_width_s": sampling.width_s,
         }
     )
 

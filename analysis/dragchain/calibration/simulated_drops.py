@@ -3,11 +3,13 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from numpy.polynomial import Polynomial
+from numpy.polynomial.polynomial import polyfit, polyval
 from scipy.optimize import brentq
 
 from dragchain.arrays import Floats
@@ -89,6 +91,21 @@ class Drops:
             for run in self.runs
             if run.drop.purpose == purpose and limit_force in (None, run.drop.limit_force)
         ]
+
+    def emulator(self, purpose: Purpose, limit_force: bool) -> "Emulator":
+        """The model of the drops of a purpose and a contact option."""
+        known, runs = self.known, self.select(purpose, limit_force)
+        return emulate(runs, known.height_m, known.gravity_m_s2, single=purpose == "reference")
+
+    @cached_property
+    def production(self) -> "Emulator":
+        """The model of the drops at the settings of the process runs."""
+        return self.emulator("production", self.known.limit_force)
+
+    @cached_property
+    def reference(self) -> "Emulator":
+        """The model of the drops at the full modulus with a fine step."""
+        return self.emulator("reference", self.known.limit_force)
 
 
 def read_drops(file: Path) -> Drops:
@@ -191,31 +208,40 @@ class Emulator:
     ----------
     low, high : float
         Range of the sweep.
-    flights_s : tuple of Polynomial
-        Time of the flight after impact 1 and 2, s, at the study's height.
-    log_peaks : tuple of Polynomial
-        Natural logarithm of the peak of impact 2 and 3 over that of impact 1,
-        as a function of the restitution's logarithm: nearly a straight line.
-    rebound : Polynomial
-        Speed after over before, mean of the impacts.
-    scatter, rebound_error : float
-        Standard deviation of one drop's rebound about `rebound`, and standard
-        uncertainty of `rebound`.
+    by_value : (5, 5) ndarray
+        Polynomials in the restitution: flight time after impact 1 and 2, s, at the study's height;
+        contact time between the centroids of impacts 1 and 2 and of 2 and 3, s; rebound.
+    by_log : (5, 2) ndarray
+        Polynomials in its logarithm, nearly straight lines: logarithm of the peak of impact 2 and
+        3 over that of impact 1.
     errors : (4,) ndarray
         Standard uncertainty of flights (s) and logarithms.
-    contact_s : tuple of Polynomial
-        Time in contact between the centroids of impacts k and k + 1, s.
+    rebound_error : float
+        Standard uncertainty of the rebound.
     """
 
     low: float
     high: float
-    flights_s: tuple[Polynomial, ...]
-    log_peaks: tuple[Polynomial, ...]
-    rebound: Polynomial
-    scatter: float
-    rebound_error: float
+    by_value: Floats
+    by_log: Floats
     errors: Floats
-    contact_s: tuple[Polynomial, ...]
+    rebound_error: float
+
+    def flights_s(self, restitution: float) -> Floats:
+        """Time of the flight after each impact but the last, s."""
+        return np.asarray(polyval(restitution, self.by_value[:, : IMPACTS - 1]))
+
+    def contact_s(self, restitution: float) -> Floats:
+        """Time in contact between the centroids of impacts that follow one another, s."""
+        return np.asarray(polyval(restitution, self.by_value[:, IMPACTS - 1 : -1]))
+
+    def log_peaks(self, restitution: float) -> Floats:
+        """Logarithm of the peak of each impact but the first over that of the first."""
+        return np.asarray(polyval(math.log(restitution), self.by_log))
+
+    def rebound(self, restitution: float) -> float:
+        """Speed after over speed before, mean of the impacts."""
+        return float(polyval(restitution, self.by_value[:, -1]))
 
     def inverse(self, rebound: float) -> float | None:
         """The deck value that rebounds so, or None outside the sweep."""
@@ -240,7 +266,7 @@ def emulate(
     height_m, gravity_m_s2 : float
         Of the study's drop test.
     single : bool
-        `errors` are the scatter of a single drop, not the smaller standard
+        Errors are the scatter of a single drop, not the smaller standard
         error of the polynomial: for drops at so fine a step that what is left
         of the step's error is of that size.
 
@@ -253,24 +279,21 @@ def emulate(
     if len(np.unique(value)) <= _DEGREE + 1:
         raise TableError(f"a sweep requires more than {_DEGREE + 1} values of the restitution")
     scale = np.sqrt(height_m / np.array([run.drop.height_m for run in runs]))
-    speeds = np.array([run.speeds_m_s[: IMPACTS + 1] for run in runs])
+    speeds = np.array([run.speeds_m_s[1:IMPACTS] for run in runs])
     peaks = np.log([[impact.peak_n for impact in run.impacts[:IMPACTS]] for run in runs])
-    flights = 2.0 * speeds[:, 1:IMPACTS] / gravity_m_s2 * scale[:, None]
-    contact = np.array([_contact_parts(run) for run in runs])
-    ratios = peaks[:, 1:] - peaks[:, :1]
-    rebound, scatter, mean_error = _polynomial(value, np.array([run.effective for run in runs]))
-    fitted = [_polynomial(value, column) for column in flights.T]
-    fitted += [_polynomial(np.log(value), column) for column in ratios.T]
+    flights = 2.0 * speeds / gravity_m_s2 * scale[:, None]
+    contacts, rebounds = [_contact_parts(run) for run in runs], [run.effective for run in runs]
+    by_value, errors = _polynomials(
+        value, np.column_stack([flights, contacts, rebounds]), single=single
+    )
+    by_log, of_peaks = _polynomials(np.log(value), peaks[:, 1:] - peaks[:, :1], single=single)
     return Emulator(
         low=float(value.min()),
         high=float(value.max()),
-        flights_s=tuple(f[0] for f in fitted[: IMPACTS - 1]),
-        log_peaks=tuple(f[0] for f in fitted[IMPACTS - 1 :]),
-        rebound=rebound,
-        scatter=scatter,
-        rebound_error=scatter if single else mean_error,
-        errors=np.array([f[1 if single else 2] for f in fitted]),
-        contact_s=tuple(_polynomial(value, column)[0] for column in contact.T),
+        by_value=by_value,
+        by_log=by_log,
+        errors=np.append(errors[: IMPACTS - 1], of_peaks),
+        rebound_error=float(errors[-1]),
     )
 
 
@@ -278,50 +301,13 @@ def _contact_parts(run: DropRun) -> list[float]:
     """Time between two centroids that is no flight, s, for each pair of impacts."""
     return [
         (first.up_s - first.centroid_s) + (second.centroid_s - second.down_s)
-        for first, second in zip(run.impacts[: IMPACTS - 1], run.impacts[1:IMPACTS], strict=True)
+        for first, second in pairwise(run.impacts[:IMPACTS])
     ]
 
 
-def _polynomial(value: Floats, column: Floats) -> tuple[Polynomial, float, float]:
-    """Least-squares polynomial, scatter of one point about it, standard error of its mean."""
-    fitted = Polynomial.fit(value, column, _DEGREE)
-    rest = column - fitted(value)
-    scatter = math.sqrt(float(rest @ rest) / (len(value) - _DEGREE - 1))
-    return fitted, scatter, scatter * math.sqrt((_DEGREE + 1) / len(value))
-
-
-@dataclass(frozen=True)
-class Sweep:
-    """A sweep of drops, ready to be compared with records.
-
-    Attributes
-    ----------
-    known : DropTest
-        What ``drops.json`` says of the study.
-    reference_runs : list of DropRun
-        Full modulus, fine step, the study's contact option.
-    production, reference : Emulator
-        With the study's contact option.
-    """
-
-    known: DropTest
-    reference_runs: Sequence[DropRun]
-    production: Emulator
-    reference: Emulator
-
-
-def prepare(drops: Drops) -> Sweep:
-    """Make the models of a sweep."""
-    option = drops.known.limit_force
-    return Sweep(
-        drops.known,
-        drops.select("reference", option),
-        emulator_of(drops, "production", option),
-        emulator_of(drops, "reference", option),
-    )
-
-
-def emulator_of(drops: Drops, purpose: Purpose, limit_force: bool) -> Emulator:
-    """The model of the drops of a purpose and a contact option."""
-    known, runs = drops.known, drops.select(purpose, limit_force)
-    return emulate(runs, known.height_m, known.gravity_m_s2, single=purpose == "reference")
+def _polynomials(value: Floats, columns: Floats, *, single: bool) -> tuple[Floats, Floats]:
+    """Least-squares polynomials through (N, C) columns; scatter of one point, or of the mean."""
+    found = np.asarray(polyfit(value, columns, _DEGREE), dtype=np.float64)
+    rest = columns - polyval(value, found).T
+    scatter: Floats = np.sqrt(np.sum(rest**2, axis=0) / (len(value) - _DEGREE - 1))
+    return found, scatter if single else scatter * math.sqrt((_DEGREE + 1) / len(value))

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from dragchain.arrays import Floats, Ints
 from dragchain.errors import TableError
 from dragchain.run.kinematics import drag_surface_speed
+from dragchain.tables.columns import vector
 from dragdeck.physics.contact_mechanics import hertz_contact_time
 from dragdeck.records.case import CaseOfRun
 
@@ -27,8 +28,7 @@ AMOUNTS = (
 )
 """What is summed over contacts and time; see docs/explanation/loading.md."""
 
-POINT = ["workpiece_x_m", "workpiece_y_m", "workpiece_z_m"]
-SLIP = ["workpiece_slip_x_m_s", "workpiece_slip_y_m_s", "workpiece_slip_z_m_s"]
+POINT, SLIP = list(vector("workpiece", "m")), list(vector("workpiece_slip", "m_s"))
 
 
 @dataclass(frozen=True)
@@ -57,6 +57,10 @@ class Thresholds:
     impact_times: float = 5.0
     rest: float = 0.1
     slide_to_roll: float = 1.0
+
+
+LIMITS = Thresholds()
+"""The limits of every run."""
 
 
 @dataclass(frozen=True)
@@ -204,7 +208,7 @@ def _paths(rows: pd.DataFrame, event: Ints, interval_s: float) -> dict[str, tupl
 
 
 def event_types(
-    events: pd.DataFrame, case: CaseOfRun, interval_s: float, limits: Thresholds
+    events: pd.DataFrame, case: CaseOfRun, interval_s: float, limits: Thresholds = LIMITS
 ) -> NDArray[np.str_]:
     """Name the type of each event, (E,).
 

@@ -85,38 +85,19 @@ class Profile(Part):
     force_slide: EstimateColumns
 
 
-class Impulse(Part):
-    """Impulse on the workpiece in the frame of its motion, N s.
-
-    Attributes
-    ----------
-    drag, lateral, vertical : float
-        Along the direction of motion, to its left, and upwards.
-    """
-
-    drag: float
-    lateral: float
-    vertical: float
-
-
 class LoadClosure(Part):
     """Agreement of the sums over facets and events with the total force on the workpiece.
 
     Attributes
     ----------
-    workpiece_impulse_n_s, facets_impulse_n_s : Impulse
-        From the total force, and summed over the facets.
-    unplaced_impulse_n_s : Impulse
-        Of contacts that belong to no facet.
-    workpiece_relative_error, facets_relative_error, events_relative_error : float
-        Relative differences between these sums.
+    workpiece_relative_error : float
+        Of the impulse on the workpiece, summed over the facets and from the total force.
+    facets_relative_error, events_relative_error : float
+        The largest of an amount, summed over facets or events and over contacts.
     point_off_facet_max_m : float
         Largest distance of a contact point from its facet, m.
     """
 
-    workpiece_impulse_n_s: Impulse
-    facets_impulse_n_s: Impulse
-    unplaced_impulse_n_s: Impulse
     workpiece_relative_error: float
     facets_relative_error: float
     events_relative_error: float

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from dragchain.arrays import Floats, Ints
 from dragchain.errors import TableError
-from dragchain.loading.contact_events import AMOUNTS, POINT, SLIP, Thresholds
+from dragchain.loading.contact_events import AMOUNTS, LIMITS, POINT, SLIP
 from dragchain.run.case import attracts, friction_with
 from dragchain.run.kinematics import (
     axis_speed,
@@ -26,7 +26,9 @@ from dragchain.run.kinematics import (
 from dragchain.run.workpiece import Surface, off_facet
 from dragchain.statistics.correlated import slow_waves
 from dragchain.tables.by_step import read_groups
-from dragchain.tables.columns import ATTRACTION
+from dragchain.tables.columns import ATTRACTION, FORCES, REFERENCE, WORKPIECE_CONTACTS
+from dragchain.tables.columns import POINT as PLACE
+from dragchain.tables.columns import SLIP as RELATIVE
 from dragdeck.decks.outputs import load_outputs
 from dragdeck.records.case import CaseOfRun
 
@@ -34,21 +36,8 @@ WORKPIECE = ("drag_impulse_n_s", "lateral_impulse_n_s", "vertical_impulse_n_s")
 BODY = ("body_x_impulse_n_s", "body_y_impulse_n_s", "body_z_impulse_n_s")
 """Impulse on a workpiece that spins, in its own frame."""
 
-_FORCE = ["force_x_n", "force_y_n", "force_z_n"]
-_PLACE = ["point_x_m", "point_y_m", "point_z_m"]
-_VELOCITY = ["slip_x_m_s", "slip_y_m_s", "slip_z_m_s"]
-_REFERENCE = ["ref_x_m", "ref_y_m", "ref_z_m"]
-_CONTACT = [
-    *("step", "time_s", "particle_id", "facet_id", *_PLACE, *_FORCE, "normal_force_n"),
-    *(
-        "tangential_force_n",
-        *_VELOCITY,
-        "normal_velocity_m_s",
-        "azimuth_rad",
-        "depth_m",
-        "in_statistics",
-    ),
-]
+_CONTACT = [name for name in WORKPIECE_CONTACTS if name not in ("phase", "overlap_m")]
+_FORCE, _PLACE, _VELOCITY, _REFERENCE = map(list, (FORCES, PLACE, RELATIVE, REFERENCE))
 
 _KEPT = [
     *("frame", "time_s", "particle_id", "facet_id", "normal_force_n", "azimuth_rad", "depth_m"),
@@ -97,7 +86,7 @@ class Sampled:
 # --- reading ---------------------------------------------------------------------------------
 
 
-def sample(run_dir: Path, case: CaseOfRun, limits: Thresholds) -> Sampled:
+def sample(run_dir: Path, case: CaseOfRun) -> Sampled:
     """Read the counted contacts of a run, a row group at a time; see `Sampled`."""
     tables = run_dir / "tables"
     steps, interval_s = _counted_steps(run_dir, case)
@@ -106,7 +95,7 @@ def sample(run_dir: Path, case: CaseOfRun, limits: Thresholds) -> Sampled:
     for contacts in _read_contacts(tables / "workpiece_contacts.parquet", run_dir, case):
         contacts["frame"] = np.searchsorted(steps, contacts["step"])
         at = workpiece.reindex(contacts["step"])
-        parts.append(_with_amounts(contacts, at, case, interval_s, limits))
+        parts.append(_with_amounts(contacts, at, case, interval_s))
     if not parts:
         raise TableError(
             f"{run_dir}: no particle touches the workpiece in the part of "
@@ -163,11 +152,7 @@ def _counted_steps(run_dir: Path, case: CaseOfRun) -> tuple[Ints, float]:
 
 
 def _with_amounts(
-    rows: pd.DataFrame,
-    workpiece: pd.DataFrame,
-    case: CaseOfRun,
-    interval_s: float,
-    limits: Thresholds,
+    rows: pd.DataFrame, workpiece: pd.DataFrame, case: CaseOfRun, interval_s: float
 ) -> pd.DataFrame:
     """Add to each contact its contributions, and its point and slip in the body frame."""
     force, slip, point = (rows[names].to_numpy() for names in (_FORCE, _VELOCITY, _PLACE))
@@ -181,7 +166,7 @@ def _with_amounts(
     limit = friction_with(case, "workpiece").at(ids, ids)
     most = limit.friction * (normal + rows.get(ATTRACTION, 0.0))
     mobilisation = np.divide(tangential, most, out=np.full_like(most, np.inf), where=most > 0.0)
-    mobilised = mobilisation >= limits.mobilised
+    mobilised = mobilisation >= LIMITS.mobilised
     velocity = workpiece_velocity(steps, point, reference, case)
     velocity -= bowl_velocity(point, case)
     drag = workpiece_frame(force, heading) * interval_s

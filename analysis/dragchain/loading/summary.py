@@ -11,15 +11,9 @@ import pandas as pd
 
 from dragchain.arrays import Floats, Ints
 from dragchain.drag import circumference, parts, within_angle
-from dragchain.loading.contact_events import (
-    AMOUNTS,
-    TYPES,
-    Thresholds,
-    surfaces,
-)
+from dragchain.loading.contact_events import AMOUNTS, LIMITS, TYPES, surfaces
 from dragchain.loading.document import (
     ContactType,
-    Impulse,
     LoadClosure,
     Loading,
     Profile,
@@ -52,7 +46,6 @@ def summarise_loading(
     events: pd.DataFrame,
     event: Ints,
     case: CaseOfRun,
-    limits: Thresholds,
     off_facet_m: float,
 ) -> Loading:
     """The content of ``loading.json``.
@@ -66,7 +59,6 @@ def summarise_loading(
     event : (N,) ndarray
         The event of each contact.
     case : CaseOfRun
-    limits : Thresholds
     off_facet_m : float
         Largest distance of a contact point from its facet.
     """
@@ -82,7 +74,7 @@ def summarise_loading(
         friction_coefficient=contact.friction,
         contact_time_s=contact.contact_time_s,
         impact_seen_fraction=min(1.0, contact.contact_time_s / interval_s),
-        limits=limits,
+        limits=LIMITS,
         **dict(_totals(sampled, events)),
         types=_types(sampled, events, event),
         profiles=_profiles(sampled),
@@ -200,9 +192,6 @@ def _closure(
     placed = facets[list(WORKPIECE)].to_numpy().sum(axis=0)
     missing = sampled.workpiece_impulse_n_s - placed
     return LoadClosure(
-        workpiece_impulse_n_s=_impulse(sampled.workpiece_impulse_n_s),
-        facets_impulse_n_s=_impulse(placed),
-        unplaced_impulse_n_s=_impulse(missing),
         workpiece_relative_error=float(
             np.linalg.norm(missing) / np.linalg.norm(sampled.workpiece_impulse_n_s)
         ),
@@ -210,11 +199,6 @@ def _closure(
         events_relative_error=_largest_error(events, whole),
         point_off_facet_max_m=off_facet_m,
     )
-
-
-def _impulse(vector: Floats) -> Impulse:
-    drag, lateral, vertical = vector.tolist()
-    return Impulse(drag=drag, lateral=lateral, vertical=vertical)
 
 
 def _largest_error(table: pd.DataFrame, whole: Mapping[str, float]) -> float:

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from dragchain.errors import TableError
 from dragchain.figures.style import drawing, save
-from dragchain.loading.contact_events import Thresholds, event_types, find_events
+from dragchain.loading.contact_events import event_types, find_events
 from dragchain.loading.document import Loading
 from dragchain.loading.figure import workpiece_figure
 from dragchain.loading.samples import DRAWN, Sampled, as_polydata, check_facets, facet_table, sample
@@ -44,7 +44,7 @@ class WorkpieceLoading:
     summary: Loading
 
 
-def write_loading(run_dir: Path, limits: Thresholds | None = None) -> list[Path]:
+def write_loading(run_dir: Path) -> list[Path]:
     """Write load, sliding and friction work of a process run's workpiece, and their picture.
 
     Parameters
@@ -52,8 +52,6 @@ def write_loading(run_dir: Path, limits: Thresholds | None = None) -> list[Path]
     run_dir : Path
         The folder of a process run, with ``workpiece_force.parquet`` and
         ``workpiece_contacts.parquet`` made.
-    limits : Thresholds, optional
-        Limits between the types of contact.
 
     Returns
     -------
@@ -68,7 +66,7 @@ def write_loading(run_dir: Path, limits: Thresholds | None = None) -> list[Path]
     SeriesError
         If the run is too short for its statistics.
     """
-    found = compute_loading(run_dir, limits or Thresholds())
+    found = compute_loading(run_dir)
     tables = run_dir / "tables"
     names = ("facets.parquet", "contact_events.parquet", "loading.json", "workpiece.vtp")
     facets, events, summary, vtp = files = [tables / name for name in names]
@@ -88,19 +86,19 @@ def figure_of(found: WorkpieceLoading) -> Figure:
     return workpiece_figure(found.case, found.sampled, found.surface, found.facets, found.summary)
 
 
-def compute_loading(run_dir: Path, limits: Thresholds) -> WorkpieceLoading:
+def compute_loading(run_dir: Path) -> WorkpieceLoading:
     """Compute what `write_loading` writes; it raises the same errors."""
     case = load_case(run_dir)
     if case.scene != "process":
         raise TableError(
             f"{run_dir}: its scene is {case.scene}; only a process run has a workpiece"
         )
-    sampled = sample(run_dir, case, limits)
+    sampled = sample(run_dir, case)
     surface = read_surface(run_dir, case)
     off_m = check_facets(sampled, surface, case)
     events, event = find_events(sampled.rows, sampled.frames, sampled.interval_s)
-    events["type"] = event_types(events, case, sampled.interval_s, limits)
+    events["type"] = event_types(events, case, sampled.interval_s)
     facets = facet_table(sampled, surface, events)
-    summary = summarise_loading(sampled, facets, events, event, case, limits, off_m)
+    summary = summarise_loading(sampled, facets, events, event, case, off_m)
     drawn = replace(sampled, rows=sampled.rows[DRAWN].copy())
     return WorkpieceLoading(case, surface, drawn, facets, events.drop(columns="frame"), summary)

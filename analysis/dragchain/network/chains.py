@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from dragchain.arrays import Floats, Ints
 from dragchain.network import graph_kernels as kernels
 from dragchain.network.frame import WORKPIECE, NetworkFrame
+from dragchain.tables.workpiece_contacts import sums
 
 ALPHA_RAD = np.pi / 4
 """Largest angle between a particle's principal direction and the line to the next particle of a
@@ -98,8 +99,13 @@ def particle_stress(frame: NetworkFrame) -> Floats:
     the particle, over the particle's volume, made symmetric (Weber 1966; Peters et al. 2005, eq.
     1). Contacts with workpiece and bowl count too.
     """
-    other = np.where(frame.between_particles(), frame.b, -1)
-    total: Floats = kernels.particle_moments(frame.a, other, frame.centre, frame.point, frame.force)
+    inner = np.flatnonzero(frame.between_particles())
+    particle = np.concatenate([frame.a, frame.b[inner]])
+    contact = np.concatenate([np.arange(len(frame.a)), inner])
+    force = np.concatenate([-frame.force, frame.force[inner]])
+    branch = frame.point[contact] - frame.centre[particle]
+    moments = (branch[:, :, None] * force[:, None, :]).reshape(-1, 9)
+    total = sums(particle, moments, len(frame.centre)).reshape(-1, 3, 3)
     volume = 4.0 / 3.0 * np.pi * frame.radius**3
     return (total + total.transpose(0, 2, 1)) / (2.0 * volume[:, None, None])
 
@@ -206,7 +212,7 @@ def path_rows(
     strength, start = force[links], frame.a[workpieces]
     width = kernels.widths(*ends, strength, np.argsort(-strength), bowl + 1, bowl)[start]
     least = np.minimum(width, force[workpieces]) if with_workpiece else width
-    net, space = kernels.adjacency(*ends, bowl + 1), kernels.search_space(bowl + 1)
+    net, space = adjacency(*ends, bowl + 1), kernels.search_space(bowl + 1)
     particles, contacts = [], []
     for number in range(len(workpieces)):
         particle, link = start[number : number + 1], links[:0]
@@ -217,6 +223,29 @@ def path_rows(
         particles.append(particle)
         contacts.append(np.append(workpieces[number], links[link]))
     return ChainRows(_joined(particles), _joined(contacts), _starts(particles), _starts(contacts))
+
+
+def adjacency(a: Ints, b: Ints, nodes: int) -> tuple[Ints, NDArray[np.int32], NDArray[np.int32]]:
+    """List the edges of every node in their order.
+
+    Parameters
+    ----------
+    a, b : (M,) ndarray
+        The nodes that each edge joins.
+    nodes : int
+        Number of nodes.
+
+    Returns
+    -------
+    starts : (nodes + 1,) ndarray
+        Where each node's edges begin in the other two, and where the last one's end.
+    near, edge : (2 M,) ndarray
+        The node on the other side, and the edge.
+    """
+    ends, others = np.column_stack([a, b]).ravel(), np.column_stack([b, a]).ravel()
+    order = np.argsort(ends, kind="stable")
+    starts = np.append(0, np.cumsum(np.bincount(ends, minlength=nodes)))
+    return starts, others[order].astype(np.int32), (order // 2).astype(np.int32)
 
 
 def _joined(parts: list[Ints]) -> Ints:

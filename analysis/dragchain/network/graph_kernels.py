@@ -14,40 +14,6 @@ from numba import njit
 
 
 @njit(nogil=True, cache=True)
-def particle_moments(a, b, centre, point, force):
-    """Sum over each particle's contacts of branch vector times force, compression positive.
-
-    Parameters
-    ----------
-    a, b : (M,) ndarray of int64
-        The particles of each contact; ``b`` is negative where the other body is no particle.
-    centre : (N, 3) ndarray
-    point, force : (M, 3) ndarray
-        Contact point, and the force on particle ``a``.
-
-    Returns
-    -------
-    (N, 3, 3) ndarray
-        The contacts are added in their order, first to all particles ``a``, then to all ``b``.
-    """
-    total = np.zeros((len(centre), 3, 3))
-    for contact in range(len(a)):
-        particle = a[contact]
-        for i in range(3):
-            for j in range(3):
-                branch = point[contact, i] - centre[particle, i]
-                total[particle, i, j] -= branch * force[contact, j]
-    for contact in range(len(a)):
-        particle = b[contact]
-        if particle >= 0:
-            for i in range(3):
-                for j in range(3):
-                    branch = point[contact, i] - centre[particle, i]
-                    total[particle, i, j] += branch * force[contact, j]
-    return total
-
-
-@njit(nogil=True, cache=True)
 def _root(leader, particle):
     """Find the root of a particle's tree, and shorten the way there."""
     above = leader[particle]
@@ -197,35 +163,6 @@ def widths(a, b, force, order, nodes, target):
 
 
 @njit(nogil=True, cache=True)
-def adjacency(a, b, nodes):
-    """List the edges of every node in their order.
-
-    Returns
-    -------
-    starts : (nodes + 1,) ndarray of int64
-        Where each node's edges begin in the other two, and where the last one's end.
-    near, edge : (2 M,) ndarray of int32
-        The node on the other side, and the edge.
-    """
-    starts = np.zeros(nodes + 1, dtype=np.int64)
-    for k in range(len(a)):
-        starts[a[k] + 1] += 1
-        starts[b[k] + 1] += 1
-    for node in range(nodes):
-        starts[node + 1] += starts[node]
-    place = starts[:-1].copy()
-    near = np.empty(2 * len(a), dtype=np.int32)
-    edge = np.empty(2 * len(a), dtype=np.int32)
-    for k in range(len(a)):
-        i, j = a[k], b[k]
-        near[place[i]], edge[place[i]] = j, k
-        place[i] += 1
-        near[place[j]], edge[place[j]] = i, k
-        place[j] += 1
-    return starts, near, edge
-
-
-@njit(nogil=True, cache=True)
 def search_space(nodes):
     """What `shortest_path` notes of every node, to be used for many searches."""
     mark = np.full(nodes, -1, dtype=np.int32)
@@ -245,7 +182,7 @@ def shortest_path(net, force, start, target, least, search, space):
     Parameters
     ----------
     net : tuple
-        As `adjacency` returns it.
+        As `dragchain.network.chains.adjacency` returns it.
     force : (M,) ndarray
         Of the edges.
     start, target : int

@@ -98,30 +98,27 @@ def find_clusters(frame: NetworkFrame, force_n: Floats) -> Clusters:
     ----------
     frame : NetworkFrame
     force_n : (T,) ndarray
-        Thresholds in N, not below 0.
+        Rising thresholds in N, not below 0.
     """
     thresholds = np.asarray(force_n, dtype=np.float64)
     pressed = np.flatnonzero(frame.normal_force > 0.0)
     order = pressed[np.argsort(-frame.normal_force[pressed])]
     force = frame.normal_force[order]
     stops = np.searchsorted(-force, -thresholds)
-    by_stop = np.argsort(stops, kind="stable")
     pairs = [pair for ways in SPANS.values() for pair in ways]
     counts, joined = kernels.grow_clusters(
         frame.a.astype(np.int32)[order],
         np.where(frame.between_particles(), frame.b, -1).astype(np.int32)[order],
         _touched(frame)[order],
         np.array(pairs, dtype=np.uint8),
-        stops[by_stop],
+        stops[::-1],
         frame.particle_id.size,
     )
-    in_order = np.empty_like(counts)
-    in_order[by_stop] = counts
     reached = iter(
         np.where(joined >= 0, force[joined], 0.0) if force.size else np.zeros(joined.shape)
     )
     percolation = {name: float(max(next(reached) for _ in ways)) for name, ways in SPANS.items()}
-    clusters, members, largest, squares = in_order.T
+    clusters, members, largest, squares = counts[::-1].T
     size = frame.particle_id.size
     return Clusters(thresholds, stops, clusters, members, largest, squares, size, percolation)
 
@@ -174,15 +171,6 @@ def contact_counts(frame: NetworkFrame) -> Ints:
     )
 
 
-def coordination_number(counts: NDArray[np.integer[Any]]) -> float:
-    """The mean number of contacts per particle.
-
-    Without walls that is 2 M / N for M contacts (Thornton 2000, Geotechnique 50, 43-53); a contact
-    with workpiece or bowl counts once, for the particle.
-    """
-    return _mean(counts)
-
-
 def mechanical_coordination_number(
     counts: NDArray[np.integer[Any]], least: int = _LEAST_CONTACTS
 ) -> float:
@@ -192,11 +180,15 @@ def mechanical_coordination_number(
     ``least=2``: particles with fewer than `least` contacts are left out as carriers, while their
     contacts still count for the carriers that they touch. NaN where no particle is left.
     """
-    return coordination_number(counts[counts >= least])
+    return _mean(counts[counts >= least])
 
 
 def frame_statistics(frame: NetworkFrame, clusters: Clusters | None = None) -> dict[str, float]:
     """Return one row of ``network.parquet``; forces in N, NaN where a frame has no contact.
+
+    The coordination number is the mean number of contacts per particle. Without walls that is
+    2 M / N for M contacts (Thornton 2000, Geotechnique 50, 43-53); a contact with workpiece or
+    bowl counts once, for the particle.
 
     `clusters` is what `frame_clusters` returns for the frame, if it is known already.
     """
@@ -214,7 +206,7 @@ def frame_statistics(frame: NetworkFrame, clusters: Clusters | None = None) -> d
         "n_particles": frame.particle_id.size,
         "n_contacts": normal.size,
         **of_kind,
-        "coordination_number": coordination_number(counts),
+        "coordination_number": _mean(counts),
         "mechanical_coordination_number": mechanical_coordination_number(counts),
         "rattler_fraction": _mean(counts < _LEAST_CONTACTS),
         "normal_force_mean_n": mean,

@@ -11,9 +11,6 @@ from numpy.typing import NDArray
 from dragchain.arrays import Floats, Ints
 from dragchain.errors import TableError
 from dragchain.network.chains import (
-    ALPHA_RAD,
-    STRESS_FACTOR,
-    THRESHOLD,
     ChainRows,
     major_stress,
     particle_stress,
@@ -27,13 +24,7 @@ from dragchain.tables.parquet import table_writer, write_parquet
 from dragdeck.study.drive import wrap_angle
 
 
-def chain_table(
-    frame: NetworkFrame,
-    *,
-    alpha_rad: float = ALPHA_RAD,
-    stress_factor: float = STRESS_FACTOR,
-    threshold: float = THRESHOLD,
-) -> pd.DataFrame:
+def chain_table(frame: NetworkFrame) -> pd.DataFrame:
     """The chains of a frame by both definitions, one row per chain.
 
     Returns
@@ -53,7 +44,7 @@ def chain_table(
         chain by Peters et al. has no direction: it is listed from its higher end, and reaches the
         bowl if one of its particles touches it; ``end_kind`` is then `none` all the same.
     """
-    peters, paths = _peters(frame, alpha_rad, stress_factor), _paths(frame, threshold)
+    peters, paths = _peters(frame), _paths(frame)
     return pd.DataFrame({name: _joined(name, peters[name], paths[name]) for name in peters})
 
 
@@ -66,9 +57,9 @@ def _joined(name: str, one: Any, other: Any) -> Any:
     return np.concatenate([one, other])
 
 
-def _peters(frame: NetworkFrame, alpha_rad: float, stress_factor: float) -> dict[str, Any]:
+def _peters(frame: NetworkFrame) -> dict[str, Any]:
     major = major_stress(particle_stress(frame))
-    rows = peters_rows(frame, alpha_rad, stress_factor, major)
+    rows = peters_rows(frame, major=major)
     on_bowl = np.zeros(frame.particle_id.size, dtype=bool)
     on_bowl[frame.a[(frame.other == FLOOR) | (frame.other == SIDE)]] = True
     return _columns(
@@ -82,8 +73,8 @@ def _peters(frame: NetworkFrame, alpha_rad: float, stress_factor: float) -> dict
     )
 
 
-def _paths(frame: NetworkFrame, threshold: float) -> dict[str, Any]:
-    rows = path_rows(frame, threshold)
+def _paths(frame: NetworkFrame) -> dict[str, Any]:
+    rows = path_rows(frame)
     whole = np.diff(rows.contact_starts) > 1
     first = rows.contacts[rows.contact_starts[:-1]]
     last = rows.contacts[rows.contact_starts[1:] - 1]

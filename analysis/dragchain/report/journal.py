@@ -11,7 +11,6 @@ from matplotlib.image import AxesImage
 from matplotlib.typing import RcKeyType
 
 from dragchain.figures.style import PAPER_COLOURS, drawing, true_minus
-from dragchain.loading.contact_events import Thresholds
 from dragchain.loading.write import compute_loading, figure_of
 from dragchain.report.findings import FILE, ProcessFindings
 from dragchain.report.run_data import RunData
@@ -71,7 +70,7 @@ def write_journal_figures(run_dir: Path, paper_colours: bool = False) -> list[Pa
             matplotlib.colormaps.register(PAPER_COLOURS, force=True)
             matplotlib.rcParams["image.cmap"] = PAPER_COLOURS.name
         figures = {draw.__name__: draw(run, findings) for draw in DRAW_PROCESS}
-        figures["workpiece"] = figure_of(compute_loading(run_dir, Thresholds()))
+        figures["workpiece"] = figure_of(compute_loading(run_dir))
         for name, figure in figures.items():
             width = COLUMN_MM if name in _ONE_COLUMN else PAGE_MM
             as_printed(figure, width)

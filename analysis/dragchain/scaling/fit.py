@@ -17,6 +17,7 @@ from dragchain.errors import TableError
 from dragchain.figures.panels import legend_below, log_ticks, new_panels
 from dragchain.figures.style import BLUE, GREEN, INK, ORANGE, WIDTH_IN, drawing, png
 from dragchain.report.page import page_environment
+from dragchain.run.case import changed_inputs
 from dragchain.run.kinematics import motion_of, needed
 from dragchain.scaling.document import (
     BandPoint,
@@ -116,16 +117,15 @@ def _read_run(folder: Path, field: str) -> RunOfScaling:
 
 
 def _check_alike(cases: Sequence[CaseOfRun], field: str) -> None:
-    first, *others = cases
-    wanted = {**first.inputs, "fidelity": first.fidelity}
-    for case in others:
-        same = {**case.inputs, "fidelity": case.fidelity}
-        for name, value in wanted.items():
-            if name not in (field, *_UNLIKE) and same.get(name) != value:
-                raise TableError(
-                    f"{case.run}: {name} is {same.get(name)!r}, in {first.run} it is {value!r}; "
-                    f"the runs of a scaling differ in {field} and seed only"
-                )
+    first, *others = ({**case.inputs, "fidelity": case.fidelity.model_dump()} for case in cases)
+    for case, own in zip(cases[1:], others, strict=True):
+        changed = changed_inputs(own, first)
+        name = next((name for name in changed if name not in (field, *_UNLIKE)), None)
+        if name is not None:
+            raise TableError(
+                f"{case.run}: {name} is {own.get(name)!r}, in {cases[0].run} it is "
+                f"{first.get(name)!r}; the runs of a scaling differ in {field} and seed only"
+            )
 
 
 # --- the law ---------------------------------------------------------------------------------

@@ -168,29 +168,14 @@ def slow_waves(count: int) -> Floats:
     return np.asarray(np.sqrt(2.0 / count) * np.cos(number[:, None] * phase))
 
 
-def autocorrelation_time(series: ArrayLike) -> float:
-    """Integrated autocorrelation time of a series.
+def _time_and_window(samples: Floats) -> tuple[float, int]:
+    """Integrated autocorrelation time of a series in samples, and the lag W at which its sum ends.
 
     ``tau = 1/2 + sum of rho(t) for t = 1 ... W`` with rho the normalised
     autocovariance and W the smallest lag that is at least 5 tau (Sokal 1997,
     section 3), times ``(1 + (2 W + 1) / N) / (1 + 1 / N)`` against the bias from
-    the mean being estimated too (Wolff 2004, equation 49).
-
-    Parameters
-    ----------
-    series : (N,) array_like
-        Samples at equal intervals, at least 8.
-
-    Returns
-    -------
-    float
-        tau in samples, never below the 1/2 of independent samples, which is
-        also returned for a constant series.
-
-    Raises
-    ------
-    SeriesError
-        If there are too few samples or one is not finite.
+    the mean being estimated too (Wolff 2004, equation 49). It is never below the 1/2 of
+    independent samples, which is also that of a constant series.
 
     References
     ----------
@@ -198,11 +183,6 @@ def autocorrelation_time(series: ArrayLike) -> float:
     Integration, NATO ASI B 361, Springer. Wolff (2004), Monte Carlo errors with
     less errors, Comput. Phys. Commun. 156, 143-153.
     """
-    return _time_and_window(_checked(series))[0]
-
-
-def _time_and_window(samples: Floats) -> tuple[float, int]:
-    """The autocorrelation time and the lag W at which its sum ends."""
     if np.ptp(samples) == 0.0:
         return 0.5, 0
     covariance = autocovariance(samples)

@@ -159,7 +159,8 @@ def estimate_scatter(runs: RunMeans, design: Floats) -> Scatter:
 
     def loss(parameters: Floats) -> float:
         scatter = Scatter(float(np.exp(parameters[0])), float(parameters[1]))
-        return _minus_likelihood(design, runs.logarithms, runs.covariance(scatter))
+        model = Whitened.of(design, runs.logarithms, runs.covariance(scatter))
+        return 2.0 * model.log_determinants + model.square
 
     least, most = (float(limit) for limit in np.log(_SPREADS))
     fraction = _LARGEST_FRACTION if shares_beds(runs.beds) else 0.0
@@ -167,16 +168,6 @@ def estimate_scatter(runs: RunMeans, design: Floats) -> Scatter:
     start = min((np.array(trial) for trial in trials), key=loss)
     found = minimize(loss, start, bounds=[(least, most), (0.0, fraction)], method="L-BFGS-B")
     return Scatter(float(np.exp(found.x[0])), float(found.x[1]))
-
-
-def _minus_likelihood(design: Floats, values: Floats, covariance: Floats) -> float:
-    """Twice the restricted log likelihood, negative, without constants."""
-    root = np.linalg.cholesky(covariance)
-    white = np.linalg.solve(root, np.column_stack([design, values]))
-    _, triangle = np.linalg.qr(white)
-    sizes = np.abs(np.diag(triangle))
-    determinants = 2.0 * np.log(np.diag(root)).sum() + 2.0 * np.log(sizes[:-1]).sum()
-    return float(determinants + sizes[-1] ** 2)
 
 
 def solve(design: Floats, values: Floats, covariance: Floats, degrees: int) -> Linear:
@@ -323,8 +314,6 @@ class TwoTerms:
     ----------
     power : float
         n.
-    leading, lower : Estimate
-        a and b.
     lower_fraction : Estimate
         Part of the value at the highest level that the lower term makes.
     lack_of_fit : float or None
@@ -332,8 +321,6 @@ class TwoTerms:
     """
 
     power: float
-    leading: Estimate
-    lower: Estimate
     lower_fraction: Estimate
     lack_of_fit: float | None
 
@@ -384,8 +371,6 @@ def fit_two_terms(law: PowerLaw, power: float) -> TwoTerms:
     top = runs.levels[-1]
     return TwoTerms(
         power=power,
-        leading=fit.estimate([1.0, 0.0]),
-        lower=fit.estimate([0.0, 1.0]),
         lower_fraction=_fraction(fit, np.array([top**power, top ** (power - 1.0)])),
         lack_of_fit=lack,
     )

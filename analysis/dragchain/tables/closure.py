@@ -1,10 +1,10 @@
 """Whether the contacts on the workpiece add up to the force on the workpiece."""
 
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from dragchain.arrays import Floats
@@ -20,6 +20,12 @@ particle that touches both has one force, which is shared out by estimate."""
 
 _FLOOR_N = 1e-3
 """Smaller forces on the workpiece do not serve as the scale of the error."""
+
+
+_COLUMNS = [
+    *("step", "gap_n", "relative", "evaluated_n", "evaluated_relative", "counted", "opening")
+]
+"""How far the forces of a step miss the force on the workpiece, and what kind of step it is."""
 
 
 class ClosureRecord(Document):
@@ -63,18 +69,6 @@ class ClosureRecord(Document):
     evaluated_counted_mean_relative: float | None
 
 
-@dataclass(frozen=True)
-class _Error:
-    """How far the forces of one step miss the force on the workpiece."""
-
-    step: int
-    gap_n: float
-    relative: float
-    evaluated_n: float
-    evaluated_relative: float
-    counted: bool
-
-
 @dataclass
 class Closure:
     """Collects how far the contacts on the workpiece add up to its total force.
@@ -96,13 +90,12 @@ class Closure:
     silent_max_n: float = 0.0
     unplaced: int = 0
     unplaced_max_n: float = 0.0
-    _errors: list[_Error] = field(default_factory=list)
-    _opening: list[_Error] = field(default_factory=list)
+    _parts: list[Floats] = field(default_factory=list)
 
     def add(
         self,
         frames: WorkpieceFrames,
-        workpiece_force_n: Sequence[Floats | None],
+        workpiece_force_n: Floats,
         counted: NDArray[np.bool_],
     ) -> NDArray[np.bool_]:
         """Take in the contacts of F steps.
@@ -111,8 +104,8 @@ class Closure:
         ----------
         frames : WorkpieceFrames
             The contacts.
-        workpiece_force_n : sequence of (3,) ndarray or None
-            Force on the workpiece at each step; None if it was not written.
+        workpiece_force_n : (F, 3) ndarray
+            Force on the workpiece at each step; NaN if it was not written.
         counted : (F,) ndarray of bool
             Whether statistics use a step.
 
@@ -129,26 +122,30 @@ class Closure:
         self.silent_max_n = max(self.silent_max_n, _largest(silent_n))
         self.unplaced += len(frames.unplaced_n)
         self.unplaced_max_n = max(self.unplaced_max_n, _largest(frames.unplaced_n))
-        as_applied = np.ones(len(frames.step), dtype=np.bool_)
-        errors = _errors(frames, workpiece_force_n, counted.tolist())
-        for place, (error, opening) in enumerate(zip(errors, frames.opening, strict=True)):
-            if error is not None:
-                (self._opening if opening else self._errors).append(error)
-                as_applied[place] = not opening or error.relative <= self.limit
-        return as_applied
+        errors = _errors(frames, workpiece_force_n, counted)
+        self._parts.append(errors[~np.isnan(workpiece_force_n).any(axis=1)])
+        return ~(frames.opening & (errors[:, _COLUMNS.index("relative")] > self.limit))
+
+    def _steps(self, *, opening: bool) -> pd.DataFrame:
+        """Errors of the steps that open a file, or of all others."""
+        rows = np.concatenate([np.empty((0, len(_COLUMNS))), *self._parts])
+        errors = pd.DataFrame(rows, columns=_COLUMNS)
+        return errors[errors["opening"] == opening]
 
     def problem(self) -> str | None:
         """What is wrong, or None if the acceptance check passes."""
-        if not self._errors:
+        errors = self._steps(opening=False)
+        if errors.empty:
             return (
                 "no step has both workpiece_force and workpiece_particles, so closure "
                 "cannot be tested"
             )
-        worst = _worst(self._errors)
-        if worst.relative > self.limit:
+        worst = errors.iloc[int(errors["relative"].argmax())]
+        if worst["relative"] > self.limit:
             return (
-                f"at step {worst.step} the forces on the particles miss the force on the workpiece"
-                f" by {worst.gap_n:.3g} N, {worst.relative:.3g} of it (limit {self.limit:g})"
+                f"at step {worst['step']:.0f} the forces on the particles miss the force on the "
+                f"workpiece by {worst['gap_n']:.3g} N, {worst['relative']:.3g} of it (limit "
+                f"{self.limit:g})"
             )
         if self.unplaced_max_n > _FLOOR_N:
             return (
@@ -159,51 +156,49 @@ class Closure:
 
     def record(self) -> ClosureRecord:
         """The content of ``closure.json``."""
-        problem, worst = self.problem(), _worst(self._errors) if self._errors else None
-        evaluated = np.array([one.evaluated_relative for one in self._errors if one.counted])
+        problem, errors = self.problem(), self._steps(opening=False)
+        opening = self._steps(opening=True)["relative"]
+        worst = errors.iloc[int(errors["relative"].argmax())] if len(errors) else None
+        evaluated = errors["evaluated_relative"][errors["counted"] == 1.0].to_numpy()
         return ClosureRecord(
             verdict="pass" if problem is None else "fail",
             problem=problem,
             limit=self.limit,
             force_floor_n=_FLOOR_N,
-            frames=len(self._errors),
-            worst_step=worst.step if worst else None,
-            max_relative=worst.relative if worst else 0.0,
-            max_n=worst.gap_n if worst else 0.0,
-            opening_frames=len(self._opening),
-            opening_max_relative=max((one.relative for one in self._opening), default=0.0),
+            frames=len(errors),
+            worst_step=None if worst is None else int(worst["step"]),
+            max_relative=0.0 if worst is None else worst["relative"],
+            max_n=0.0 if worst is None else worst["gap_n"],
+            opening_frames=len(opening),
+            opening_max_relative=opening.max() if len(opening) else 0.0,
             contacts=self.contacts,
             unplaced_forces=self.unplaced,
             unplaced_max_n=self.unplaced_max_n,
             silent_contacts=self.silent,
             silent_evaluated_max_n=self.silent_max_n,
-            evaluated_max_n=max((one.evaluated_n for one in self._errors), default=0.0),
-            evaluated_counted_max_relative=float(evaluated.max()) if evaluated.size else None,
-            evaluated_counted_mean_relative=float(evaluated.mean()) if evaluated.size else None,
+            evaluated_max_n=errors["evaluated_n"].max() if len(errors) else 0.0,
+            evaluated_counted_max_relative=evaluated.max() if len(evaluated) else None,
+            evaluated_counted_mean_relative=evaluated.mean() if len(evaluated) else None,
         )
 
 
 def _errors(
-    frames: WorkpieceFrames, workpiece_force_n: Sequence[Floats | None], counted: list[bool]
-) -> Iterator[_Error | None]:
-    """The error of each frame; None where the force on the workpiece was not written."""
+    frames: WorkpieceFrames, workpiece_force_n: Floats, counted: NDArray[np.bool_]
+) -> Floats:
+    """The `_COLUMNS` of F frames, (F, 7); NaN where the force on the workpiece was not written."""
     count, at = len(frames.step), frames.workpiece_at
     placed = sums(at, frames.workpiece.force_n, count)
     applied = placed + sums(frames.unplaced_at, frames.unplaced_n, count)
     evaluated = sums(at, frames.workpiece.evaluated_n, count)
-    for step, force, *totals, used in zip(
-        frames.step.tolist(), workpiece_force_n, applied, evaluated, counted, strict=True
-    ):
-        if force is None:
-            yield None
-            continue
-        scale = max(float(np.linalg.norm(force)), _FLOOR_N)
-        gap, evaluated_gap = (float(np.linalg.norm(total + force)) for total in totals)
-        yield _Error(step, gap, gap / scale, evaluated_gap, evaluated_gap / scale, used)
+    scale = np.maximum(_lengths(workpiece_force_n), _FLOOR_N)
+    gap, evaluated_gap = (_lengths(total + workpiece_force_n) for total in (applied, evaluated))
+    relative, evaluated_relative = gap / scale, evaluated_gap / scale
+    of_forces = (gap, relative, evaluated_gap, evaluated_relative)
+    return np.column_stack([frames.step, *of_forces, counted, frames.opening])
 
 
-def _worst(errors: list[_Error]) -> _Error:
-    return max(errors, key=lambda error: error.relative)
+def _lengths(vectors: Floats) -> Floats:
+    return np.array([np.linalg.norm(vector) for vector in vectors], dtype=np.float64)
 
 
 def _largest(vectors: Floats) -> float:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dragchain.arrays import Floats, Ints
+from dragchain.arrays import Floats, Ints, places
 from dragchain.errors import TableError
 from dragchain.tables.columns import ATTRACTION, CENTRE, FORCES, POINT, SPIN, VELOCITY
 from dragdeck.dumps.frame import Columns, Frame
@@ -221,10 +221,8 @@ def _on(contacts: Frame) -> Ints:
 
 def _rows_of(contacts: Frame, particles: Frame) -> tuple[NDArray[np.bool_], Ints]:
     """Which contacts (N,) are of particles that received a force, and the rows of those."""
-    known, ids = particles.ids("particle_id"), contacts.ids("particle_id")
-    at = np.searchsorted(known, ids)
-    loud = np.append(known, 0)[at] == ids
-    return loud, at[loud]
+    at = places(contacts.ids("particle_id"), particles.ids("particle_id"))
+    return at >= 0, at[at >= 0]
 
 
 def _within_friction(

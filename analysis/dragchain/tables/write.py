@@ -2,7 +2,7 @@
 
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, TypeVar
 
@@ -148,62 +148,38 @@ def _phases(steps: Ints, case: CaseOfRun) -> pa.Array:
     return category(phase_codes(steps, case.phases), tuple(phase.name for phase in case.phases))
 
 
-@dataclass(frozen=True)
-class WorkpieceSample:
-    """The workpiece at a step.
-
-    Attributes
-    ----------
-    force_n : (3,) ndarray or None
-        The force on it; None if it was not written.
-    ref_m : (3,) ndarray
-        Place of its reference point.
-    """
-
-    force_n: Floats | None
-    ref_m: Floats
-
-
 class WorkpieceSamples:
-    """The force on the workpiece and its place at rising steps.
+    """The force on the workpiece and its place at some steps.
 
     Parameters
     ----------
     blocks : iterable of columns
-        The blocks of ``workpiece_force``; only one is held at a time.
+        The blocks of ``workpiece_force``.
     """
 
     def __init__(self, blocks: Iterable[Columns]) -> None:
-        self._blocks = iter(blocks)
-        self._block = next(self._blocks, None)
-        if self._block is None:
+        names = ("step", *FORCES, *REFERENCE)
+        parts = [np.column_stack([block[name] for name in names]) for block in blocks]
+        if not parts:
             raise TableError("workpiece_force contains no samples")
-        self.first_step = int(self._block["step"][0])
+        steps, self._values = np.split(np.concatenate(parts).astype(np.float64), [1], axis=1)
+        self._steps = steps[:, 0].astype(np.int64)
 
-    def at(self, step: int) -> WorkpieceSample | None:
-        """Sample at a step not below the last one asked for; None if there is none."""
-        while self._block is not None and self._block["step"][-1] < step:
-            self._block = next(self._blocks, None)
-        if self._block is None:
-            return None
-        row = int(np.searchsorted(self._block["step"], step))
-        if self._block["step"][row] != step:
-            return None
-        force, place = (
-            np.array([self._block[name][row] for name in names], dtype=np.float64)
-            for names in (FORCES, REFERENCE)
-        )
-        return WorkpieceSample(force, place)
+    def at(self, steps: Ints) -> tuple[Floats, Floats]:
+        """Force and place at N steps, (N, 3) each; before the first sample its place alone.
 
-    def from_start(self, step: int) -> WorkpieceSample:
-        """Sample at a step; before the first one its place, and a force that nobody wrote."""
-        sample = self.at(max(step, self.first_step))
-        if sample is None:
+        The force is NaN there, because nobody wrote it.
+        """
+        wanted = np.maximum(steps, self._steps[0])
+        rows = np.minimum(np.searchsorted(self._steps, wanted), len(self._steps) - 1)
+        lost = steps[self._steps[rows] != wanted]
+        if lost.size:
             raise TableError(
-                f"workpiece_particles has step {step} but workpiece_force does not: the period of"
-                " workpiece_force must divide that of workpiece_particles"
+                f"workpiece_particles has step {lost[0]} but workpiece_force does not: the period "
+                "of workpiece_force must divide that of workpiece_particles"
             )
-        return sample if step >= self.first_step else replace(sample, force_n=None)
+        force, place = np.split(self._values[rows], 2, axis=1)
+        return np.where((steps < self._steps[0])[:, None], np.nan, force), place
 
 
 # --- contacts on the workpiece ---------------------------------------------------------------
@@ -216,11 +192,9 @@ def _write_workpiece_contacts(run: Run, file: Path) -> None:
     own = WORKPIECE_CONTACTS + ((ATTRACTION,) if attracts(run.case) else ())
     with table_writer(file, _with_classes(own, "workpiece_contacts", run.case)) as table:
         for frames in run.workpiece_frames():
-            of_step = [samples.from_start(step) for step in frames.step.tolist()]
-            places, at = np.array([one.ref_m for one in of_step]), frames.workpiece_at
-            rows = workpiece_contact_rows(frames.step[at], frames.workpiece, places[at], run.case)
-            forces = [one.force_n for one in of_step]
-            used = closure.add(frames, forces, counted_mask(frames.step, run.case))
+            (force, place), at = samples.at(frames.step), frames.workpiece_at
+            rows = workpiece_contact_rows(frames.step[at], frames.workpiece, place[at], run.case)
+            used = closure.add(frames, force, counted_mask(frames.step, run.case))
             table.write({**rows, "in_statistics": rows["in_statistics"] & used[at]})
         closure.record().write(run.table("closure.json"))
         if (problem := closure.problem()) is not None:

@@ -78,8 +78,6 @@ class PlanRun:
     Attributes
     ----------
     setting : Setting
-    bed : str or None
-        Id of the filling.
     measures : Measures
     stretches : sequence of mapping of str to float
         Quantity to the run's value over each stretch of its path that is as long as the common
@@ -87,7 +85,6 @@ class PlanRun:
     """
 
     setting: Setting
-    bed: str | None
     measures: Measures
     stretches: Sequence[Mapping[str, float]]
 
@@ -139,7 +136,7 @@ def read_plan_runs(
     if not complete:
         raise TableError("no run of the trade-off is complete, so there is nothing to compare")
     arc = min(complete)
-    runs = [_run(setting, bed, own, arc) for (setting, bed), own in longest.items()]
+    runs = [_run(setting, own, arc) for (setting, _), own in longest.items()]
     return runs, _setting(standard, standard), arc
 
 
@@ -168,10 +165,10 @@ def _shown(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _run(setting: Setting, bed: str | None, measures: Measures, arc_m: float) -> PlanRun:
+def _run(setting: Setting, measures: Measures, arc_m: float) -> PlanRun:
     count = max(1, int(measures.arc_m / arc_m + 1e-9))
     values = [values_within(measures, arc_m, stretch) for stretch in range(count)]
-    return PlanRun(setting, bed, measures, values)
+    return PlanRun(setting, measures, values)
 
 
 def values_within(measures: Measures, arc_m: float, stretch: int = 0) -> dict[str, float]:
@@ -214,11 +211,6 @@ class Error:
     bound: float
     significant: bool
 
-    def columns(self) -> dict[str, float]:
-        """The numbers as columns of a table."""
-        names = {"value": "error"}
-        return {names.get(name, name): number for name, number in vars(self).items()}
-
 
 @dataclass(frozen=True)
 class EffectsModel:
@@ -251,8 +243,6 @@ class QuantityComparison:
     errors : dict of Setting to Error
     model : EffectsModel
         What `errors` and `between` draw on.
-    added : EffectsModel
-        Of single parameters, whose effects add up: what `alone` draws on.
     """
 
     quantity: Measurand
@@ -262,26 +252,11 @@ class QuantityComparison:
     bed_fraction: float
     errors: Mapping[Setting, Error]
     model: EffectsModel = field(repr=False)
-    added: EffectsModel = field(repr=False)
 
     @property
     def reference_halfwidth(self) -> float:
         """Relative half-width of the reference's interval."""
         return self.model.fit.quantile * self.se
-
-    def alone(self, setting: Setting, reference: Setting) -> float:
-        """The largest error that one of a setting's parameters makes when it is turned alone.
-
-        A setting may be right because the errors of two parameters cancel. That need
-        not hold in another scene. 0 where the runs do not tell.
-        """
-        own, levels = setting.factors(), reference.factors()
-        errors = [
-            self.added.error(one, levels, self.quantity.signed)
-            for one in ({**levels, name: own[name]} for name in levels)
-            if self.added.factors.tells(one)
-        ]
-        return max(abs(error.value) for error in errors)
 
     def between(self, setting: Setting, base: Setting) -> Error | None:
         """Difference of one setting to another; None if the runs cannot tell it."""
@@ -318,7 +293,7 @@ def compare_quantity(
         scale = float(np.sign(values[0]))
         values = np.log(np.abs(values))
     levels = reference.factors()
-    model, added = _models(settings, values, [run.bed for run, _ in rows], levels)
+    model = _model(settings, values, [run.measures.bed for run, _ in rows], levels)
     level, uncertainty = model.fit.contrast(model.factors.row(levels))
     return QuantityComparison(
         quantity=quantity,
@@ -331,28 +306,23 @@ def compare_quantity(
             for setting in dict.fromkeys(settings)
         },
         model=model,
-        added=added,
     )
 
 
-def _models(
+def _model(
     settings: Sequence[Setting], values: Floats, beds: Sequence[str | None], reference: Levels
-) -> tuple[EffectsModel, EffectsModel]:
-    """A model with an effect of every combination, and one whose effects add up.
+) -> EffectsModel:
+    """A model with an effect of every combination.
 
-    One stands for both if the runs do not allow the other: without repetitions effects are
-    added up on trust, and what does not fit is scatter.
+    If the runs do not allow it, one whose effects add up: without repetitions effects are added
+    up on trust, and what does not fit is scatter.
     """
     levels = [setting.factors() for setting in settings]
-    found: list[EffectsModel] = []
-    for additive in (False, True):
-        factors = Factors(levels, reference, additive)
-        try:
-            found.append(EffectsModel(factors, fit_effects(factors.design(), values, beds)))
-        except SeriesError:
-            if additive and not found:
-                raise
-    return found[0], found[-1]
+    separate, added = (Factors(levels, reference, additive) for additive in (False, True))
+    try:
+        return EffectsModel(separate, fit_effects(separate.design(), values, beds))
+    except SeriesError:
+        return EffectsModel(added, fit_effects(added.design(), values, beds))
 
 
 def relative_error(

@@ -11,7 +11,6 @@ import pandas as pd
 from dragchain.arrays import Floats, Ints
 from dragchain.drag import parts, read_counted
 from dragchain.errors import TableError
-from dragchain.loading.contact_events import Thresholds
 from dragchain.loading.samples import Sampled, sample
 from dragchain.network.write import write_chains
 from dragchain.run.kinematics import drag_phase, needed
@@ -53,7 +52,7 @@ def loading_along(run_dir: Path, case: CaseOfRun, blocks: int) -> tuple[dict[str
     TableError
         If the slip of the contacts is not known, or no particle touches the workpiece.
     """
-    counted = sample(run_dir, case, Thresholds())
+    counted = sample(run_dir, case)
     block = np.arange(counted.frames) * blocks // counted.frames
     frames = np.bincount(block, minlength=blocks)
 
@@ -87,10 +86,6 @@ LONG_WAVE, SHORT_WAVE = 2.0, 0.25
 
 
 # --- blocks of the path --------------------------------------------------------------------------
-
-
-FORCE_BINS = np.logspace(-5.0, 2.0, 71)
-"""Edges of the histogram of normal forces on the workpiece, N."""
 
 
 Rows = tuple[Ints, Floats]
@@ -160,14 +155,13 @@ def quantities_along(run_dir: Path, case: CaseOfRun) -> PathQuantities:
     """The quantities of a complete run with tables and chains."""
     force = read_counted(run_dir, ("step", "drag_n", "lateral_n", "vertical_n"))
     path = CountedPath.of(case, force["step"].to_numpy(np.int64))
-    on_workpiece, counts = _of_workpiece_contacts(run_dir, path)
     loading, load_map = loading_along(run_dir, case, path.blocks)
-    blocks = {**_of_force(force, path), **on_workpiece, **loading, **_of_network(run_dir, path)}
+    on_workpiece, network = _of_workpiece_contacts(run_dir, path), _of_network(run_dir, path)
+    blocks = {**_of_force(force, path), **on_workpiece, **loading, **network}
     return PathQuantities(
         arc_m=path.length_m,
         block_m=path.length_m / path.blocks,
         blocks={name: tuple(map(finite, values)) for name, values in blocks.items()},
-        force_histogram=tuple(counts.tolist()),
         load_map=tuple(load_map.ravel().tolist()),
     )
 
@@ -238,11 +232,9 @@ def _pushing_contacts(run_dir: Path) -> Iterator[Rows]:
             )
 
 
-def _of_workpiece_contacts(run_dir: Path, path: CountedPath) -> tuple[dict[str, Floats], Ints]:
-    """Quantities of the contacts on the workpiece, and their number between `FORCE_BINS`."""
+def _of_workpiece_contacts(run_dir: Path, path: CountedPath) -> dict[str, Floats]:
     frames = np.bincount(path.block(_frames(run_dir, path)), minlength=path.blocks)
     contacts = np.zeros(path.blocks)
-    histogram = np.zeros(len(FORCE_BINS) - 1, dtype=np.int64)
     names = ("mean", "p50", "p90", "p99")
     found = {f"contact_force_{name}": np.full(path.blocks, math.nan) for name in names}
     overlap = np.full(path.blocks, math.nan)
@@ -254,12 +246,7 @@ def _of_workpiece_contacts(run_dir: Path, path: CountedPath) -> tuple[dict[str, 
         found["contact_force_mean"][number] = _mean(normal)
         for fraction in (50, 90, 99):
             found[f"contact_force_p{fraction}"][number] = np.percentile(normal, fraction)
-        histogram += np.histogram(normal, FORCE_BINS)[0]
-    return {
-        "workpiece_contacts": contacts / frames,
-        **found,
-        "workpiece_overlap": overlap,
-    }, histogram
+    return {"workpiece_contacts": contacts / frames, **found, "workpiece_overlap": overlap}
 
 
 def _mean(values: Floats) -> float:
@@ -329,6 +316,26 @@ def _of_chains(chains: pd.DataFrame, frames: Ints, path: CountedPath) -> dict[st
 # --- measures ------------------------------------------------------------------------------------
 
 
+def read_outcome(run_dir: Path) -> RunRecord:
+    """The ``outcome.json`` of a run.
+
+    Raises
+    ------
+    TableError
+        If the run has none.
+    """
+    file = run_dir / "outcome.json"
+    if not file.is_file():
+        raise TableError(f"{file} is missing: `dragdeck run --outcome` writes it")
+    return RunRecord.read(file)
+
+
+def make_tables(run_dir: Path) -> None:
+    """Make the tables and chains that the quantities of a complete run come from."""
+    write_tables(run_dir)
+    write_chains(run_dir)
+
+
 def write_measures(run_dir: Path, packing_table: Path) -> Measures:
     """Measure a run of a trade-off and write ``measures.json``.
 
@@ -347,10 +354,13 @@ def write_measures(run_dir: Path, packing_table: Path) -> Measures:
     TableError
         If the run has no outcome, or its raw outputs cannot be read.
     """
-    file = run_dir / "outcome.json"
-    if not file.is_file():
-        raise TableError(f"{file} is missing: `dragdeck run --outcome` writes it")
-    outcome, case = RunRecord.read(file), load_case(run_dir)
+    outcome, case = read_outcome(run_dir), load_case(run_dir)
+    found: dict[str, object] = {"failure": outcome.failed_checks}
+    if outcome.complete:
+        make_tables(run_dir)
+        bed = Packing.read(packing_table)
+        single = {"bed_height": bed.bed_height_m, "solid_fraction": bed.solid_fraction}
+        found = {**dict(quantities_along(run_dir, case)), "single": single}
     measures = Measures.model_validate(
         {
             **dict(case),
@@ -359,25 +369,11 @@ def write_measures(run_dir: Path, packing_table: Path) -> Measures:
             "cost": _cost(case, outcome),
             "versions": {**case.versions, "engine": outcome.engine_version},
             "started": outcome.started,
-            "stability_number": next(
-                (one.number for one in outcome.checks if one.code == "stable_timestep"), None
-            ),
+            **found,
         }
     )
-    if measures.complete:
-        write_tables(run_dir)
-        write_chains(run_dir)
-        measures = with_quantities(measures, run_dir, case, Packing.read(packing_table))
-    else:
-        measures = measures.model_copy(update={"failure": outcome.failed_checks})
     measures.write(run_dir / FILE)
     return measures
-
-
-def with_quantities(measures: Measures, run_dir: Path, case: CaseOfRun, bed: Packing) -> Measures:
-    """The measures of a complete run with its quantities, from its tables."""
-    single = {"bed_height": bed.bed_height_m, "solid_fraction": bed.solid_fraction}
-    return measures.model_copy(update={**dict(quantities_along(run_dir, case)), "single": single})
 
 
 def _cost(case: CaseOfRun, outcome: RunRecord) -> RunCost:

@@ -5,7 +5,7 @@ quantity has one value a block. A run's value is the mean over its blocks.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -85,27 +85,15 @@ QUANTITIES = (
     ),
     Measurand("contact_force_p99", "99th percentile of the contact forces on the workpiece", "N"),
     Measurand("normal_load", "sum of the normal forces on the workpiece", "N"),
-    Measurand(
-        "sliding_distance",
-        "sliding distance of all contacts over the path",
-    ),
-    Measurand(
-        "friction_work",
-        "friction work on the workpiece for a metre of path",
-        "J/m",
-    ),
+    Measurand("sliding_distance", "sliding distance of all contacts over the path"),
+    Measurand("friction_work", "friction work on the workpiece for a metre of path", "J/m"),
     Measurand("workpiece_overlap", "mean relative overlap on the workpiece"),
     Measurand(
-        "coordination_number",
-        "coordination number",
-        short="coordi\N{SOFT HYPHEN}nation number",
+        "coordination_number", "coordination number", short="coordi\N{SOFT HYPHEN}nation number"
     ),
     Measurand("mechanical_coordination_number", "coordination number without rattlers"),
     Measurand("network_force_mean", "mean normal force in the network", "N"),
-    Measurand(
-        "overlap_p99",
-        "99th percentile of the relative overlap between particles",
-    ),
+    Measurand("overlap_p99", "99th percentile of the relative overlap between particles"),
     Measurand("chain_count", "Peters chains per frame", short="Peters chains"),
     Measurand("chain_length", "particles per Peters chain", short="particles per chain"),
     Measurand("chain_alignment", "mean squared cosine of the angle between chains and motion"),
@@ -129,8 +117,10 @@ MAIN = tuple(quantity.name for quantity in QUANTITIES if quantity.short)
 
 FILE = "measures.json"
 
-_TELLING_CHECKS = ("within_limits", "no_engine_error")
-"""Acceptance checks that say more than others why a run failed, the most telling first."""
+
+def checks_in_words(checks: Iterable[AcceptanceCheck]) -> str:
+    """Acceptance checks and what was seen."""
+    return "; ".join(f"{check.name}: {check.seen}" for check in checks)
 
 
 class RunCost(Part):
@@ -177,8 +167,6 @@ class PathQuantities(Part):
         Length of a block, m.
     blocks : mapping
         Quantity to a sequence of B values, None where a block has none.
-    force_histogram : sequence of int
-        Counts of contacts on the workpiece between `FORCE_BINS`.
     load_map : sequence of float
         Mean normal load by depth and azimuth, N, a depth after the other.
     """
@@ -186,7 +174,6 @@ class PathQuantities(Part):
     arc_m: float = 0.0
     block_m: float = 0.0
     blocks: Mapping[str, tuple[float | None, ...]] = {}
-    force_histogram: tuple[int, ...] = ()
     load_map: tuple[float, ...] = ()
 
     def of_blocks(self, name: str) -> Floats:
@@ -212,8 +199,6 @@ class Measures(PathQuantities, Document):
         Checks that did not pass; a failed run has no quantities.
     single : mapping
         The quantities of the bed.
-    stability_number : float or None
-        Stability number of the time step from the acceptance check.
     """
 
     remedy = "make it with: dragchain step measure"
@@ -230,7 +215,6 @@ class Measures(PathQuantities, Document):
     started: str
     failure: tuple[AcceptanceCheck, ...] = ()
     single: Mapping[str, float] = {}
-    stability_number: float | None = None
 
     @property
     def seed(self) -> int:
@@ -240,8 +224,6 @@ class Measures(PathQuantities, Document):
         return seed
 
     @property
-    def telling_failure(self) -> AcceptanceCheck | None:
-        """The acceptance check that says most about why the run failed, None if it did not."""
-        by_code = {check.code: check for check in self.failure}
-        first = self.failure[0] if self.failure else None
-        return next((by_code[code] for code in _TELLING_CHECKS if code in by_code), first)
+    def why_failed(self) -> str:
+        """The checks that did not pass, and what was seen."""
+        return checks_in_words(self.failure)

@@ -2,42 +2,59 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
+from pydantic import JsonValue
 
-from dragchain.errors import SeriesError
-from dragchain.tradeoff.compare import Error, PlanRun, QuantityComparison, Setting, compare_quantity
+from dragchain.arrays import Floats
+from dragchain.errors import SeriesError, TableError
+from dragchain.run.case import changed_inputs
+from dragchain.tables.by_step import read_table
+from dragchain.tradeoff.compare import PlanRun, QuantityComparison, Setting, compare_quantity
 from dragchain.tradeoff.measures import QUANTITIES
+from dragdeck.records.case import load_case
+from dragdeck.records.run import RunRecord
+from dragdeck.records.tradeoff import CostsFile
 
 BROKEN = 0.1
 """A step is broken if it changes the mean drag by more than this, beyond doubt."""
 
 TOLERANCES = (0.02, 0.05, 0.1, 0.2)
 
+# --- costs ---------------------------------------------------------------------------------------
 
-@dataclass(frozen=True)
-class StepCosts:
-    """Processor time of a step, as it was timed side by side, parameter by parameter.
+StepCosts = Mapping[str, Mapping[float, float]]
+"""Fidelity parameter, level and the time of a step over that at the base, timed side by side."""
 
-    Attributes
-    ----------
-    levels : mapping of str to mapping of float to float
-        Parameter, level and the time of a step over that at the base. Between
-        levels the logarithm is interpolated over that of the level, beyond
-        them the nearest counts; parameters multiply.
+
+def step_costs(costs: CostsFile | None) -> StepCosts:
+    """What a step costs at other moduli, steps and speeds; empty if that was not timed."""
+    levels: dict[str, dict[float, float]] = {}
+    fidelity = costs.fidelity if costs else None
+    for entry in costs.costs if costs and fidelity else ():
+        if entry.parameter and entry.level is not None and entry.per_step is not None:
+            base = {float(getattr(fidelity, entry.parameter)): 1.0}
+            levels.setdefault(entry.parameter, base)[entry.level] = entry.per_step
+    return levels
+
+
+def step_time(costs: StepCosts, setting: Setting) -> float:
+    """Time of a step at a setting over that at the base.
+
+    Between levels the logarithm is interpolated over that of the level, beyond them the nearest
+    counts; parameters multiply.
     """
+    logs = []
+    for parameter, known in costs.items():
+        points = sorted(known.items())
+        at, ratios = np.log([level for level, _ in points]), np.log([r for _, r in points])
+        logs.append(np.interp(math.log(getattr(setting, parameter)), at, ratios))
+    return math.exp(sum(logs))
 
-    levels: Mapping[str, Mapping[float, float]]
 
-    def of(self, setting: Setting) -> float:
-        """Time of a step over that at the base."""
-        logs = []
-        for parameter, known in self.levels.items():
-            points = sorted(known.items())
-            at, ratios = np.log([level for level, _ in points]), np.log([r for _, r in points])
-            logs.append(np.interp(math.log(getattr(setting, parameter)), at, ratios))
-        return math.exp(sum(logs))
+# --- settings ------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -55,8 +72,8 @@ class Tradeoff:
         Quantity to what the settings do to it.
     skipped : dict of str to str
         Quantities that could not be compared, and why.
-    step_costs : StepCosts or None
-        If steps were timed side by side; else costs are those of the runs.
+    step_costs : StepCosts
+        Empty unless steps were timed side by side; then costs are those of the runs.
     largest_step : float
         Over the Rayleigh time: no setting with a larger one is recommended.
     """
@@ -65,9 +82,9 @@ class Tradeoff:
     reference: Setting
     arc_m: float
     comparisons: Mapping[str, QuantityComparison]
-    skipped: Mapping[str, str] = field(default_factory=dict)
-    step_costs: StepCosts | None = None
-    largest_step: float = math.inf
+    skipped: Mapping[str, str]
+    step_costs: StepCosts
+    largest_step: float
 
     def settings(self) -> list[Setting]:
         """Every setting once, that with the most steps first."""
@@ -85,10 +102,11 @@ class Tradeoff:
         side, where it was and the setting changes nothing but the fidelity;
         else in the median of the runs, a failed one until it failed.
         """
-        if self.step_costs is None or setting.other:
+        if not self.step_costs or setting.other:
             return self.median(setting, "cpu_per_m") / self.median(self.reference, "cpu_per_m")
         steps = self.median(setting, "steps_per_m") / self.median(self.reference, "steps_per_m")
-        return steps * self.step_costs.of(setting) / self.step_costs.of(self.reference)
+        at_reference = step_time(self.step_costs, self.reference)
+        return steps * step_time(self.step_costs, setting) / at_reference
 
     def median(self, setting: Setting, name: str) -> float:
         """The median of a cost over the runs of a setting that have it, NaN if none has."""
@@ -116,7 +134,7 @@ def compare_settings(
             found[quantity.name] = compare_quantity(quantity, runs, reference)
         except SeriesError as error:
             skipped[quantity.name] = str(error)
-    return Tradeoff(list(runs), reference, arc_m, found, skipped, step_costs, largest_step)
+    return Tradeoff(list(runs), reference, arc_m, found, skipped, step_costs or {}, largest_step)
 
 
 def breaks(tradeoff: Tradeoff, setting: Setting) -> bool:
@@ -141,14 +159,27 @@ def breaks(tradeoff: Tradeoff, setting: Setting) -> bool:
     return change is not None and change.significant and abs(change.value) > BROKEN
 
 
-def _candidates(tradeoff: Tradeoff, quantities: Sequence[str]) -> list[Setting]:
+def by_modulus(tradeoff: Tradeoff) -> list[Setting]:
+    """For each modulus the setting that is most like the reference else, the stiffest first."""
+    reference, nearest = tradeoff.reference.factors(), dict[float, Setting]()
+
+    def unlike(setting: Setting) -> tuple[int, int]:
+        own = setting.factors()
+        return sum(own[name] != reference[name] for name in own), -len(tradeoff.of(setting))
+
+    for setting in sorted(tradeoff.settings(), key=unlike):
+        if not setting.other and any(run.complete for run in tradeoff.of(setting)):
+            nearest.setdefault(setting.youngs_modulus_scale, setting)
+    nearest.pop(tradeoff.reference.youngs_modulus_scale, None)
+    return [nearest[level] for level in sorted(nearest, reverse=True)]
+
+
+def _candidates(tradeoff: Tradeoff, comparison: QuantityComparison) -> list[Setting]:
     """The settings that could be recommended instead of the reference.
 
     They change nothing but the fidelity, are cheaper, have a step that is known
-    to be safe and does not break, more than one run, and an error in each of the
-    quantities.
+    to be safe and does not break, more than one run, and an error of the quantity.
     """
-    comparisons = [tradeoff.comparisons.get(name) for name in quantities]
     return [
         setting
         for setting in tradeoff.settings()
@@ -158,22 +189,13 @@ def _candidates(tradeoff: Tradeoff, quantities: Sequence[str]) -> list[Setting]:
         and len(tradeoff.of(setting)) > 1
         and setting.timestep_fraction <= tradeoff.largest_step * (1 + 1e-9)
         and not breaks(tradeoff, setting)
-        and all(own is not None and setting in own.errors for own in comparisons)
+        and setting in comparison.errors
     ]
-
-
-def largest_bound(tradeoff: Tradeoff, quantities: Sequence[str], setting: Setting) -> float:
-    """The largest bound of a setting's errors, or error of one of its parameters."""
-    comparisons = [tradeoff.comparisons[name] for name in quantities]
-    return max(
-        max(own.errors[setting].bound, own.alone(setting, tradeoff.reference))
-        for own in comparisons
-    )
 
 
 @dataclass(frozen=True)
 class Choice:
-    """What to run for some quantities and a tolerance.
+    """What to run for a quantity and a tolerance.
 
     Attributes
     ----------
@@ -184,33 +206,97 @@ class Choice:
         That of the smallest bound; None if there is no candidate at all.
     bound : float
         Of `setting`, or else of `nearest`.
-    errors : list of Error
-        Of the same one, a quantity each.
     """
 
     tolerance: float
     setting: Setting | None
     nearest: Setting | None
     bound: float
-    errors: list[Error]
-
-    @property
-    def within(self) -> bool:
-        """Whether the errors, if not their bounds, are within the tolerance."""
-        return all(abs(error.value) <= self.tolerance for error in self.errors)
 
 
-def choose(tradeoff: Tradeoff, names: Sequence[str], tolerance: float) -> Choice:
-    """The cheapest setting at which each of some quantities is within a tolerance.
-
-    It is one of the `_candidates`, and its error is below the tolerance with confidence.
-    """
-    bounds = {one: largest_bound(tradeoff, names, one) for one in _candidates(tradeoff, names)}
+def choose(tradeoff: Tradeoff, quantity: str, tolerance: float) -> Choice:
+    """The cheapest setting at which a quantity is within a tolerance, with confidence."""
+    comparison = tradeoff.comparisons[quantity]
+    bounds = {one: comparison.errors[one].bound for one in _candidates(tradeoff, comparison)}
     able = [one for one, bound in bounds.items() if bound <= tolerance]
     setting = min(able, key=tradeoff.cost, default=None)
     nearest = min(bounds, key=bounds.__getitem__, default=None)
     shown = setting or nearest
-    if shown is None:
-        return Choice(tolerance, None, None, math.nan, [])
-    errors = [tradeoff.comparisons[name].errors[shown] for name in names]
-    return Choice(tolerance, setting, nearest, bounds[shown], errors)
+    return Choice(tolerance, setting, nearest, bounds[shown] if shown else math.nan)
+
+
+# --- drop tests ----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class ComparedDrop:
+    """A drop test against the one with the finest step.
+
+    Attributes
+    ----------
+    timestep_fraction : float
+    other : str
+        What else it changes; "" if nothing.
+    restitution : float
+        Mean of its impacts.
+    error : float
+        Relative, of the mean.
+    bound : float
+        The largest of any impact, relative; each impact against the same one of the reference.
+    relative_cost : float
+        Its processor time over the reference's.
+    """
+
+    timestep_fraction: float
+    other: str
+    restitution: float
+    error: float
+    bound: float
+    relative_cost: float
+
+
+def compare_drops(folders: Sequence[Path]) -> list[ComparedDrop]:
+    """Drop tests, the finest step first.
+
+    Parameters
+    ----------
+    folders : sequence of Path
+        Complete runs of the drop test with their tables.
+
+    Raises
+    ------
+    TableError
+        If a folder holds another scene, or a run is not complete or has no table.
+    """
+    runs = sorted(map(_read_drop, folders), key=lambda run: run[0])
+    found = []
+    for fraction, inputs, ratios, cost_s in runs:
+        _, standard, finest, finest_s = runs[0]
+        changed = changed_inputs(inputs, standard).items()
+        common = min(len(ratios), len(finest))
+        found.append(
+            ComparedDrop(
+                timestep_fraction=fraction,
+                other=", ".join(f"{name} {value}" for name, value in changed),
+                restitution=float(ratios.mean()),
+                error=float(ratios.mean() / finest.mean() - 1.0),
+                bound=float(np.abs(ratios[:common] / finest[:common] - 1.0).max()),
+                relative_cost=cost_s / finest_s,
+            )
+        )
+    return found
+
+
+def _read_drop(folder: Path) -> tuple[float, Mapping[str, JsonValue], Floats, float]:
+    """Step over the Rayleigh time, inputs, ratios of the impacts and cost of a drop test."""
+    case = load_case(folder)
+    if case.scene != "drop_test":
+        raise TableError(f"{folder}: the scene is {case.scene}, not drop_test")
+    ratios = read_table(folder / "tables" / "impacts.parquet", ["restitution"])["restitution"]
+    record = RunRecord.read(folder / "run.json")
+    if not record.complete:
+        raise TableError(f"{folder}: its state is {record.state!r}, not 'complete'")
+    own_step = ("seed", "drop_test.timestep_fraction")
+    inputs = {name: value for name, value in case.inputs.items() if name not in own_step}
+    fraction = float(f"{case.timestep_s / case.rayleigh_time_s:.4g}")
+    return fraction, inputs, ratios.to_numpy(), record.processor_time_s

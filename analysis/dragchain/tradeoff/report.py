@@ -9,24 +9,25 @@ import numpy as np
 import pandas as pd
 
 from dragchain.report.campaign import write_report
-from dragchain.report.page import DASH, MINUS, number
-from dragchain.statistics.estimate import CONFIDENCE, Estimate
-from dragchain.tradeoff.changes import (
-    RUINED,
-    Costs,
-    gains,
-    read_costs,
-    softness_by_level,
-    step_costs,
-)
+from dragchain.report.page import MINUS, number
+from dragchain.statistics.estimate import CONFIDENCE
 from dragchain.tradeoff.compare import Error, Setting, read_plan_runs
-from dragchain.tradeoff.drops import ComparedDrop, choose_drop, compare_drops
-from dragchain.tradeoff.figures import draw_tradeoff
+from dragchain.tradeoff.figures import draw_pareto
 from dragchain.tradeoff.measure_run import LONG_WAVE, SHORT_WAVE
 from dragchain.tradeoff.measures import MAIN, QUANTITIES
-from dragchain.tradeoff.outcome import TOLERANCES, Tradeoff, breaks, choose, compare_settings
-from dragchain.tradeoff.path_length import along, chance, reaches
+from dragchain.tradeoff.outcome import (
+    TOLERANCES,
+    ComparedDrop,
+    Tradeoff,
+    breaks,
+    by_modulus,
+    choose,
+    compare_drops,
+    compare_settings,
+    step_costs,
+)
 from dragdeck.records.tradeoff import (
+    CostsFile,
     DropEntry,
     ErrorEntry,
     FidelityParameters,
@@ -71,28 +72,15 @@ def error_interval(error: Error) -> str:
     return f"{error_percent(error.ci95_low)} to {error_percent(error.ci95_high)} %"
 
 
-def times(ratio: float) -> str:
-    """A ratio of costs with two digits."""
-    return DASH if not math.isfinite(ratio) else number(float(f"{ratio:.2g}"), 2)
-
-
 def cheaper(ratio: float) -> str:
     """A ratio of costs in words."""
-    if ratio >= 1.0:
-        return f"{times(ratio)} times cheaper"
-    return f"{times(1.0 / ratio)} times more expensive"
-
-
-def span(gain: Estimate) -> str:
-    """The interval of a ratio of costs; "one run" where there is none."""
-    if math.isnan(gain.ci95_low):
-        return "one run"
-    return f"{times(gain.ci95_low)} to {times(gain.ci95_high)}"
+    size = number(float(f"{max(ratio, 1.0 / ratio):.2g}"), 2)
+    return f"{size} times {'cheaper' if ratio >= 1.0 else 'more expensive'}"
 
 
 FILTERS: Mapping[str, Callable[..., str]] = {
     function.__name__: function
-    for function in (error_percent, size_percent, error_size, error_interval, times, cheaper, span)
+    for function in (error_percent, size_percent, error_size, error_interval, cheaper)
 }
 """Filters of the page."""
 
@@ -106,9 +94,9 @@ def run_table(tradeoff: Tradeoff) -> pd.DataFrame:
         {
             "run": run.measures.run,
             **vars(run.setting),
-            "bed": run.bed,
+            "bed": run.measures.bed,
             "complete": run.complete,
-            "failure": "; ".join(f"{one.name}: {one.seen}" for one in run.measures.failure),
+            "failure": run.measures.why_failed,
             "counted_path_m": run.measures.arc_m or math.nan,
             **run.measures.cost.model_dump(),
             **{one.name: run.stretches[0].get(one.name, math.nan) for one in QUANTITIES},
@@ -126,12 +114,12 @@ def errors_by_setting(tradeoff: Tradeoff) -> pd.DataFrame:
             **vars(setting),
             "runs": sum(run.complete for run in tradeoff.of(setting)),
             "relative_cost": tradeoff.cost(setting),
-            **error.columns(),
+            **vars(error),
         }
         for name, comparison in tradeoff.comparisons.items()
         for setting, error in comparison.errors.items()
     ]
-    return pd.DataFrame(rows)
+    return pd.DataFrame(rows).rename(columns={"value": "error"})
 
 
 # --- record --------------------------------------------------------------------------------------
@@ -140,7 +128,7 @@ def errors_by_setting(tradeoff: Tradeoff) -> pd.DataFrame:
 def tradeoff_record(
     tradeoff: Tradeoff,
     drops: Iterable[ComparedDrop],
-    costs: Costs,
+    costs: CostsFile | None,
     plan: str,
     commands: Sequence[str],
 ) -> TradeoffRecord:
@@ -178,7 +166,7 @@ def tradeoff_record(
             for drop in drops
             if not drop.other
         ),
-        costs=tuple(costs.entries),
+        costs=costs.costs if costs else (),
     )
 
 
@@ -204,10 +192,7 @@ def _setting_entry(tradeoff: Tradeoff, setting: Setting) -> SettingEntry:
         breaks=breaks(tradeoff, setting),
         relative_cost=tradeoff.cost(setting),
         errors={
-            name: ErrorEntry(
-                **vars(own.errors[setting]),
-                single_parameter_error=own.alone(setting, tradeoff.reference),
-            )
+            name: ErrorEntry(**vars(own.errors[setting]))
             for name, own in tradeoff.comparisons.items()
             if setting in own.errors
         },
@@ -217,15 +202,8 @@ def _setting_entry(tradeoff: Tradeoff, setting: Setting) -> SettingEntry:
 # --- report --------------------------------------------------------------------------------------
 
 
-_TOGETHER = ("contact_force_mean", "contact_force_p90")
-"""What the distribution of contact forces is judged by."""
-
-_CHOSEN = (
-    *((name,) for name in ("drag_mean", "drag_std", "workpiece_contacts", *_TOGETHER)),
-    _TOGETHER,
-    *((name,) for name in ("coordination_number", "chain_count", "chain_length")),
-)
-"""The quantities, or the two together, that the page names settings for."""
+_LARGE = 0.1
+"""Errors above this are marked as large, those above half of it as middling."""
 
 
 def write_tradeoff(
@@ -244,7 +222,7 @@ def write_tradeoff(
     ----------
     out_dir : Path
         Gets ``runs.csv``, ``runs.parquet``, ``errors.csv``, ``errors.parquet``,
-        ``tradeoff.json``, ``figures/*.png`` and ``report.html``.
+        ``tradeoff.json``, ``figures/pareto.png`` and ``report.html``.
     measures : sequence of Path
         ``measures.json`` of every run, that of the reference among them.
     reference_run : Path
@@ -267,37 +245,28 @@ def write_tradeoff(
     TableError
         No run is complete, or a drop cannot be used.
     """
-    priced, dropped = read_costs(costs), compare_drops(drops)
+    priced, dropped = CostsFile.read(costs) if costs else None, compare_drops(drops)
     tradeoff = compare_settings(
         *read_plan_runs(measures, reference_run), step_costs(priced), largest_step
     )
-    commands = [command] if command else []
-    record = tradeoff_record(tradeoff, dropped, priced, plan, commands)
-    known, comparisons = reaches(tradeoff), tradeoff.comparisons
-    soft = softness_by_level(tradeoff)
-    every = [one for found in soft.values() for one in found.values() if one]
-    named = [names for names in _CHOSEN if all(name in comparisons for name in names)]
+    main = [name for name in MAIN if name in tradeoff.comparisons]
+    record = tradeoff_record(tradeoff, dropped, priced, plan, [command] if command else [])
     write_report(
         out_dir,
         "tradeoff/tradeoff.html.j2",
-        draw=lambda: draw_tradeoff(tradeoff, known, dropped),
+        draw=lambda: {"pareto": draw_pareto(tradeoff)} if main else {},
         tables={"runs": run_table(tradeoff), "errors": errors_by_setting(tradeoff)},
         documents={"tradeoff": record},
         filters=FILTERS,
         tradeoff=tradeoff,
         record=record,
         costs=priced,
-        main=[comparisons[name] for name in MAIN if name in comparisons],
-        choices=[(names, [choose(tradeoff, names, one) for one in TOLERANCES]) for names in named],
-        softness=soft,
-        mixed=sorted({one.mixed for one in every if one.mixed}),
-        gains=gains(tradeoff),
-        chance=chance(tradeoff),
+        main=[tradeoff.comparisons[name] for name in main],
+        choices={name: [choose(tradeoff, name, one) for one in TOLERANCES] for name in main},
+        soft=by_modulus(tradeoff),
         drops=dropped,
-        drop_choices=[choose_drop(dropped, one) for one in TOLERANCES],
-        paths=[(reach, along(tradeoff, reach.quantity)) for reach in known],
         tolerances=TOLERANCES,
         confidence=CONFIDENCE,
-        ruined=RUINED,
+        large=_LARGE,
         waves=(SHORT_WAVE, LONG_WAVE),
     )

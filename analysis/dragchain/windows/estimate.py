@@ -93,7 +93,6 @@ class WindowOfRun(Part):
     load_map : tuple of float
         As in `PathQuantities`.
     cpu_time_s : float
-    stability_number : float or None
     """
 
     run: str
@@ -102,7 +101,6 @@ class WindowOfRun(Part):
     values: Mapping[str, float] = {}
     load_map: tuple[float, ...] = ()
     cpu_time_s: float
-    stability_number: float | None = None
 
 
 class WindowedQuantity(Part):

@@ -7,14 +7,15 @@ from pathlib import Path
 import numpy as np
 
 from dragchain.arrays import Floats
-from dragchain.errors import TableError
-from dragchain.network.write import write_chains
 from dragchain.report.values import LoadMap, Need
 from dragchain.statistics.estimate import Estimate
 from dragchain.tables.by_step import read_table
-from dragchain.tables.write import write_tables
-from dragchain.tradeoff.measure_run import quantities_along
-from dragchain.tradeoff.measures import QUANTITIES, Measurand, PathQuantities
+from dragchain.tradeoff.measure_run import (
+    make_tables,
+    quantities_along,
+    read_outcome,
+)
+from dragchain.tradeoff.measures import QUANTITIES, Measurand, PathQuantities, checks_in_words
 from dragchain.windows.estimate import (
     UNKNOWN,
     Joined,
@@ -27,7 +28,6 @@ from dragchain.windows.estimate import (
     windows_needed,
 )
 from dragdeck.records.case import load_case
-from dragdeck.records.run import RunRecord
 
 _FEWEST = 2
 """Windows of which one alone says nothing of its scatter."""
@@ -167,22 +167,12 @@ def _stretches(soft: PathQuantities, quantity: Measurand, arc_m: float) -> Float
 
 def _measured(folder: Path) -> WindowOfRun:
     """A window with its quantities; refused if it failed or its bed has not come to rest."""
-    file = folder / "outcome.json"
-    if not file.is_file():
-        raise TableError(f"{file} is missing: `dragdeck run --outcome` writes it")
-    outcome, case = RunRecord.read(file), load_case(folder)
-    window = WindowOfRun(
-        run=folder.name,
-        cpu_time_s=outcome.processor_time_s,
-        stability_number=next(
-            (one.number for one in outcome.checks if one.code == "stable_timestep"), None
-        ),
-    )
+    outcome, case = read_outcome(folder), load_case(folder)
+    window = WindowOfRun(run=folder.name, cpu_time_s=outcome.processor_time_s)
     if not outcome.complete:
-        why = "; ".join(f"{one.name}: {one.seen}" for one in outcome.failed_checks)
-        return window.model_copy(update={"refused": why or "not complete"})
-    write_tables(folder)
-    write_chains(folder)
+        why = checks_in_words(outcome.failed_checks) or "not complete"
+        return window.model_copy(update={"refused": why})
+    make_tables(folder)
     along = quantities_along(folder, case)
     found = {"arc_m": along.arc_m, "values": along.values(), "refused": unsettled(folder)}
     return window.model_copy(update={**found, "load_map": along.load_map})

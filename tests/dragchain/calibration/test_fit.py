@@ -9,18 +9,18 @@ from hypothesis import strategies as st
 from make_record import Sensor, record_of
 from paper_drops import BIAS, FALL_S, HEIGHT, G, paper_drop, paper_drops, rebound
 
-from dragchain.calibration.fit import WIDTH_LIMIT, calibrate, observe, sample_impact
+from dragchain.calibration.fit import WIDTH_LIMIT, calibrate, observe, sample_impacts
 from dragchain.calibration.measured_impacts import Measured, measure_impacts
 from dragchain.calibration.results import bias_table, read_off, result
-from dragchain.calibration.simulated_drops import Sweep, emulate, emulator_of, prepare, waveform
+from dragchain.calibration.simulated_drops import Drops, emulate, waveform
 from dragchain.errors import RecordError, TableError
 from dragchain.statistics.estimate import Estimate
 from dragdeck.records.calibration import Purpose
 
 
 @pytest.fixture(scope="module")
-def sweep() -> Sweep:
-    return prepare(paper_drops())
+def sweep() -> Drops:
+    return paper_drops()
 
 
 def record(
@@ -69,8 +69,8 @@ def test_the_sweep_is_smooth_and_knows_its_inverse() -> None:
     for deck in (0.42, 0.68, 0.93):
         out = rebound(deck, BIAS)
         assert model.rebound(deck) == pytest.approx(out, abs=1e-10)
-        assert model.flights_s[0](deck) == pytest.approx(2 * FALL_S * out, rel=1e-9)
-        assert model.flights_s[1](deck) == pytest.approx(2 * FALL_S * out**2, rel=1e-9)
+        assert model.flights_s(deck)[0] == pytest.approx(2 * FALL_S * out, rel=1e-9)
+        assert model.flights_s(deck)[1] == pytest.approx(2 * FALL_S * out**2, rel=1e-9)
         assert model.inverse(out) == pytest.approx(deck, abs=1e-9)
     assert model.inverse(0.2) is None
 
@@ -78,7 +78,7 @@ def test_the_sweep_is_smooth_and_knows_its_inverse() -> None:
 def test_the_height_of_a_drop_does_not_matter_to_the_sweep() -> None:
     runs = [paper_drop(e, height=h) for e in np.linspace(0.4, 1, 8) for h in (0.0098, 0.0101)]
     model = emulate(runs, HEIGHT, G)
-    assert model.flights_s[0](0.7) == pytest.approx(2 * FALL_S * 0.7, rel=1e-9)
+    assert model.flights_s(0.7)[0] == pytest.approx(2 * FALL_S * 0.7, rel=1e-9)
     assert model.errors.max() < 1e-10
 
 
@@ -92,8 +92,7 @@ def test_a_sweep_of_few_values_is_refused() -> None:
 
 def test_fine_sampling_changes_nothing() -> None:
     measured = record(0.7, rate=20e6, noise=1e-4)
-    shape = paper_drop(0.7).impacts[0]
-    seen = sample_impact(shape, measured, measured.impacts[0].peak_n)
+    seen = sample_impacts(paper_drop(0.7).impacts[:1], measured)
     assert seen.peak_ratio == pytest.approx(1.0, abs=1e-3)
     assert seen.time_bias_s == pytest.approx(0.0, abs=1e-9)
     assert seen.width_s == pytest.approx(
@@ -107,7 +106,7 @@ def test_coarse_sampling_misses_the_peak_by_a_known_share() -> None:
     measured = record(0.7, rate=rate, noise=1e-3)
     off = np.linspace(-0.5, 0.5, 20001) / rate / 25e-6
     wanted = np.cos(np.pi * off) ** 1.5
-    seen = sample_impact(paper_drop(0.7).impacts[0], measured, 23.0)
+    seen = sample_impacts(paper_drop(0.7).impacts[:1], measured)
     error = wanted.std() / math.sqrt(200)
     assert seen.peak_ratio == pytest.approx(wanted.mean(), abs=5 * error)
     assert seen.peak_std == pytest.approx(wanted.std(), rel=0.2)
@@ -116,19 +115,18 @@ def test_coarse_sampling_misses_the_peak_by_a_known_share() -> None:
 def test_a_rate_that_misses_contacts_is_refused() -> None:
     with pytest.raises(RecordError) as refused:
         measured = record(0.7, rate=30e3, noise=1e-3, seed=4)
-        sample_impact(paper_drop(0.7).impacts[0], measured, 23.0)
+        sample_impacts(paper_drop(0.7).impacts, measured)
     assert refused.value.reason in ("coarse", "impacts")
 
 
-def test_the_first_impact_is_in_every_uncertainty(sweep: Sweep) -> None:
+def test_the_first_impact_is_in_every_uncertainty(sweep: Drops) -> None:
     measured = record(0.7)
-    samplings = [sample_impact(shape, measured, 20.0) for shape in sweep.reference_runs[5].impacts]
-    got = observe(measured, samplings, with_peaks=True)
+    sampling = sample_impacts(sweep.select("reference", True)[5].impacts, measured)
+    got = observe(measured, sampling, with_peaks=True)
+    first, second = sampling.time_std_s[:2]
     assert got.covariance.shape == (4, 4)
-    assert got.covariance[0, 1] == pytest.approx(samplings[0].time_std_s ** 2)
-    assert got.covariance[0, 0] == pytest.approx(
-        samplings[0].time_std_s ** 2 + samplings[1].time_std_s ** 2
-    )
+    assert got.covariance[0, 1] == pytest.approx(first**2)
+    assert got.covariance[0, 0] == pytest.approx(first**2 + second**2)
     assert not got.covariance[:2, 2:].any()
 
 
@@ -136,7 +134,7 @@ def test_the_first_impact_is_in_every_uncertainty(sweep: Sweep) -> None:
 
 
 @pytest.mark.parametrize("e", [0.5, 0.68, 0.9])
-def test_the_bias_of_production_is_corrected(sweep: Sweep, e: float) -> None:
+def test_the_bias_of_production_is_corrected(sweep: Drops, e: float) -> None:
     """The particle rebounds with e; production must be given (e - b) / (1 - b)."""
     got = calibrate(record(e), sweep)
     put = (e - BIAS) / (1 - BIAS)
@@ -146,14 +144,14 @@ def test_the_bias_of_production_is_corrected(sweep: Sweep, e: float) -> None:
     assert abs(put - e) > got.fit.ci95_high - got.fit.ci95_low  # what would be wrong without it
 
 
-def test_a_wrong_height_is_found_out(sweep: Sweep) -> None:
+def test_a_wrong_height_is_found_out(sweep: Drops) -> None:
     """0.2 mm off, twice its stated uncertainty: the ratio of the flights does not know it."""
     got = calibrate(record(0.68, height=0.0102), sweep)
     assert got.fit.height_m == pytest.approx(0.0102, abs=5e-6)
     assert got.fit.ci95_low < (0.68 - BIAS) / (1 - BIAS) < got.fit.ci95_high
 
 
-def test_a_particle_that_rebounds_unevenly_widens_the_interval(sweep: Sweep) -> None:
+def test_a_particle_that_rebounds_unevenly_widens_the_interval(sweep: Drops) -> None:
     """As a spinning or uneven particle does: chi square tells, and the interval grows."""
     measured = record(0.68)
     third = measured.impacts[2]
@@ -166,7 +164,7 @@ def test_a_particle_that_rebounds_unevenly_widens_the_interval(sweep: Sweep) -> 
     assert bad.ci95_high - bad.ci95_low > 3 * (good.ci95_high - good.ci95_low)
 
 
-def test_a_slow_sensor_gives_its_times_only(sweep: Sweep) -> None:
+def test_a_slow_sensor_gives_its_times_only(sweep: Drops) -> None:
     """A low pass of 60 us spreads each impact: peaks then go with the impulse, not the force."""
     made = record_of(paper_drop(0.68), Sensor(1e6, 0.0), np.random.default_rng(1))
     kernel = np.exp(-np.arange(600) / 60.0)
@@ -177,15 +175,15 @@ def test_a_slow_sensor_gives_its_times_only(sweep: Sweep) -> None:
     assert not got.with_peaks
     assert got.width_ratio > WIDTH_LIMIT
     assert got.fit.ci95_low < (0.68 - BIAS) / (1 - BIAS) < got.fit.ci95_high
-    forced = calibrate(measured, prepare(paper_drops(peaks="yes")))
+    forced = calibrate(measured, paper_drops(peaks="yes"))
     assert forced.with_peaks
     assert forced.fit.chi2 > 20 * got.fit.chi2  # what comparing them would have done
 
 
-def test_two_impacts_cannot_be_tested(sweep: Sweep) -> None:
+def test_two_impacts_cannot_be_tested(sweep: Drops) -> None:
     measured = record(0.68)
     two = measured.model_copy(update={"impacts": measured.impacts[:2]})
-    times_only = prepare(paper_drops(peaks="no"))
+    times_only = paper_drops(peaks="no")
     got = calibrate(two, times_only)
     assert (got.fit.degrees, got.fit.p_value, got.fit.inflation) == (0, None, 1.0)
     assert got.fit.ci95_low < (0.68 - BIAS) / (1 - BIAS) < got.fit.ci95_high
@@ -195,7 +193,7 @@ def test_two_impacts_cannot_be_tested(sweep: Sweep) -> None:
 
 
 @pytest.mark.parametrize("e", [0.3, 0.39])
-def test_a_restitution_outside_the_sweep_is_refused(sweep: Sweep, e: float) -> None:
+def test_a_restitution_outside_the_sweep_is_refused(sweep: Drops, e: float) -> None:
     with pytest.raises(RecordError) as refused:
         calibrate(record(e, noise=0.01), sweep)
     assert refused.value.reason == "range"
@@ -209,7 +207,7 @@ def test_a_restitution_outside_the_sweep_is_refused(sweep: Sweep, e: float) -> N
     seed=st.integers(0, 10**6),
 )
 def test_any_rate_and_noise_recovers_the_rebound(
-    sweep: Sweep, e: float, rate: float, noise: float, seed: int
+    sweep: Drops, e: float, rate: float, noise: float, seed: int
 ) -> None:
     """Twice the interval's half width: far outside, something is biased, not unlucky."""
     got = calibrate(record(e, rate=rate, noise=noise, seed=seed), sweep).fit_reference
@@ -233,13 +231,13 @@ def test_the_bias_table_is_the_rebound_of_the_drops() -> None:
 @pytest.mark.parametrize("limit_force", [True, False])
 def test_what_to_put_is_read_off_each_curve(purpose: Purpose, limit_force: bool) -> None:
     bias = BIAS if purpose == "production" and limit_force else 0.0
-    model = emulator_of(paper_drops(), purpose, limit_force)
+    model = paper_drops().emulator(purpose, limit_force)
     got = read_off(model, Estimate(0.7, 0.69, 0.71))
     assert got == pytest.approx([(e - bias) / (1 - bias) for e in (0.7, 0.69, 0.71)], abs=1e-9)
 
 
-def test_the_result_names_the_field_and_the_value(sweep: Sweep) -> None:
-    got = result(calibrate(record(0.68), sweep), paper_drops())
+def test_the_result_names_the_field_and_the_value(sweep: Drops) -> None:
+    got = result(calibrate(record(0.68), sweep))
     assert got.put.field == "pairs.a-b.restitution"
     assert got.put.value == pytest.approx((0.68 - BIAS) / (1 - BIAS), abs=1e-3)
     assert got.direct.first_impact == pytest.approx(0.68, abs=1e-3)

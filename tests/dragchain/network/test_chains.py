@@ -253,31 +253,3 @@ def test_numbering_and_order_change_nothing(seed: int) -> None:
     pd.testing.assert_frame_equal(
         plain.sort_values(keys, ignore_index=True), mixed.sort_values(keys, ignore_index=True)
     )
-
-
-@given(seed=st.integers(0, 2**32 - 1))
-@settings(deadline=None)
-def test_no_path_is_wider_than_the_one_found(seed: int) -> None:
-    centres, contacts = packing(seed)
-    frame = make_frame(centres, contacts)
-    least = frame.mean_force_n()
-    for path in widest_paths(frame):
-        forces = frame.normal_force[list(path.contacts)]
-        workpiece_particle = frame.particle_id[path.particles[0]]
-        bottleneck = float(forces.min()) if path.end is not None else least
-        assert reaches(contacts, workpiece_particle, max(bottleneck, least)) is (
-            path.end is not None
-        )
-        if path.end is not None and bottleneck < forces[0]:
-            assert not reaches(contacts, workpiece_particle, np.nextafter(bottleneck, np.inf))
-
-
-def reaches(contacts: list[tuple[int, int, float]], start: int, least: float) -> bool:
-    """Tell by flooding whether contacts of at least `least` join a particle to the side."""
-    strong = [(a, b) for a, b, force in contacts if force >= least and b != WORKPIECE]
-    wet = {int(start)}
-    while True:
-        more = {b for a, b in strong if a in wet} | {a for a, b in strong if b in wet and b > 0}
-        if more <= wet:
-            return SIDE in wet
-        wet |= more

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pandas as pd
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from networks import random_frame, real_frame
@@ -64,30 +63,11 @@ def test_peters_chains_of_random_networks(frame: NetworkFrame, angle: float, fac
     assert chains == plain_peters(frame, alpha, factor)
 
 
-def test_the_networks_hold_what_is_compared() -> None:
-    """Ties, chains of many lengths, paths that lead nowhere and some that lead far."""
-    tables = [chain_table(random_frame(seed, levels=5)) for seed in range(20)]
-    table = pd.concat(tables, ignore_index=True)
-    paths = table[table["definition"] == "widest_path"]
-    assert set(table["n_particles"]) >= {1, 2, 3, 4, 5, 6, 7, 8}
-    assert set(paths["end_kind"]) == {"floor", "side", "none"}
-    forces = random_frame(0, levels=5).normal_force
-    assert np.unique(forces).size < forces.size / 50
-
-
 def test_the_table_of_a_real_frame() -> None:
     frame = real_frame()
     assert frame.normal_force.size == 3442
     assert len(chain_table(frame)) > 50
     assert_same_table(frame)
-
-
-@pytest.mark.parametrize("with_workpiece", [True, False])
-def test_paths_of_a_real_frame_at_every_threshold(with_workpiece: bool) -> None:
-    frame = real_frame()
-    for threshold in (0.0, 0.5, 1.0, 2.0, 10.0):
-        found = widest_paths(frame, threshold, with_workpiece=with_workpiece)
-        assert found == plain_paths(frame, threshold, with_workpiece=with_workpiece)
 
 
 def test_a_real_frame_with_rounded_forces_has_ties() -> None:

@@ -103,14 +103,6 @@ def test_reads_frames_whose_number_of_rows_changes(tmp_path: Path, raw, output, 
     assert frames[0].columns[first].dtype == np.int64
 
 
-def test_reads_a_text_dump_of_kind_custom(tmp_path: Path, raw) -> None:
-    output = changed(PARTICLES, binary=False, engine_columns=("id", "x"), pattern="b.{part}.dump")
-    content = raw.text(0, [[4, 1e-300]], ("id", "x"), "custom")
-    (tmp_path / "b.1.dump").write_bytes(content)
-    (frame,) = read_frames([tmp_path / "b.1.dump"], output)
-    np.testing.assert_array_equal(frame.columns["x_m"], [1e-300])
-
-
 def test_reads_a_frame_in_a_tilted_box(tmp_path: Path, raw) -> None:
     frame = raw.binary(0, [[1, 2.0]], 2, ranks=1)
     tilted = frame[:16] + struct.pack("<i", 1) + frame[20:92] + bytes(24) + frame[92:]
@@ -144,68 +136,6 @@ def test_a_cut_number_is_not_read_as_another_number(tmp_path: Path, raw) -> None
     with pytest.raises(TruncatedDumpError, match="rows before it are intact") as caught:
         list(read_prints(file, FORCE))
     assert (caught.value.frame, caught.value.offset) == (2, 28)
-
-
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        (b"\x89PNG\r\n\x1a\n" + bytes(200), "not the header of a binary dump|columns"),
-        (b"ITEM: TIMESTEP\n0\nITEM: NUMBER OF ATOMS\n" + b"1 2 3\n" * 40, "binary dump"),
-    ],
-)
-def test_refuses_a_foreign_binary(tmp_path: Path, content, message) -> None:
-    (tmp_path / "a.bin").write_bytes(content)
-    with pytest.raises(DumpError, match=message) as caught:
-        list(read_frames([tmp_path / "a.bin"], PARTICLES))
-    assert not isinstance(caught.value, TruncatedDumpError)
-
-
-def test_refuses_a_binary_of_another_width(tmp_path: Path, raw) -> None:
-    (tmp_path / "a.bin").write_bytes(raw.binary(0, [[1, 2, 3]], 3))
-    with pytest.raises(DumpError, match="the rows have 3 columns"):
-        list(read_frames([tmp_path / "a.bin"], PARTICLES))
-
-
-def test_refuses_ranks_that_do_not_add_up(tmp_path: Path, raw) -> None:
-    frame = bytearray(raw.binary(0, [[1, 2.0], [3, 4.0]], 2, ranks=1))
-    frame[8] = 1
-    (tmp_path / "a.bin").write_bytes(frame)
-    with pytest.raises(DumpError, match="the ranks wrote 2 rows"):
-        list(read_frames([tmp_path / "a.bin"], PARTICLES))
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        (b"c_p[7]", b"c_p[4]", r"names the columns c_p\[1\] c_p\[4\]"),
-        (b"ENTRIES c_p", b"ATOMS c_p", "found 'ITEM: ATOMS"),
-        (b"ITEM: TIMESTEP", b"TIMESTEP", "found 'TIMESTEP'"),
-        (b"2 0.25", b"2 0.25 3", r"row 1: found b'2 0.25 3 \\n'"),
-        (b"2 0.25", b"2", r"row 1: found b'2 \\n'"),
-        (b"2 0.25", b"2 0.2x", r"row 1: found b'2 0.2x"),
-        (b"2 0.25", b"2 nan", "row 1: overlap_m is nan"),
-        (b"2 0.25", b"2 inf", "row 1: overlap_m is inf"),
-        (b"2 0.25", b"2.5 0.25", "row 1: particle1_id is 2.5"),
-        (b"\n2 0.25 ", b"", r"row 0: found b'1 0.5 \\n'|row 1: found b'ITEM"),
-        (b"ITEM: BOX", b"\xff\xfe\xfd", "bytes that are not text"),
-        (b"ENTRIES\n2\n", b"ENTRIES\n-2\n", "found '-2'"),
-    ],
-)
-def test_refuses_a_spoilt_text_dump(tmp_path: Path, raw, old, new, message) -> None:
-    whole = text_file(raw, [0]), text_file(raw, [10]), text_file(raw, [20])
-    assert old in whole[1]
-    (tmp_path / "contacts.1.dump").write_bytes(whole[0] + whole[1].replace(old, new) + whole[2])
-    frames = iter_frames(tmp_path, CONTACTS)
-    assert next(frames).step == 0
-    with pytest.raises(DumpError, match=message) as caught:
-        next(frames)
-    assert (caught.value.frame, caught.value.offset) == (1, len(whole[0]))
-
-
-def test_refuses_nan_in_a_binary(tmp_path: Path, raw) -> None:
-    (tmp_path / "a.bin").write_bytes(raw.binary(0, [[1, 2.0], [2, float("nan")]], 2))
-    with pytest.raises(DumpError, match="row 1: x_m is nan"):
-        list(read_frames([tmp_path / "a.bin"], PARTICLES))
 
 
 def test_skips_a_header_that_comes_again(tmp_path: Path) -> None:

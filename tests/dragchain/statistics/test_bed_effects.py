@@ -50,25 +50,6 @@ def test_additive_effects_tell_what_was_not_run() -> None:
     assert fit.contrast(weights(factors(True), unseen))[0] == pytest.approx(0.01)
 
 
-def held(bed_fraction: float) -> int:
-    """How many of 1000 intervals of a difference hold it where the share of the bed is known."""
-    rng = np.random.default_rng(20260101)
-    own, count = factors(True), 0
-    design, contrast = own.design(), weights(own, {"modulus": 0.01, "step": 0.5})
-    for _ in range(1000):
-        values = simulated(rng, bed_fraction, BEDS)
-        fit = fit_effects(design, values, BEDS, bed_fraction)
-        found, error = fit.contrast(contrast)
-        count += abs(found - 0.06) <= error * stats.t.ppf(0.975, fit.degrees)
-    return count
-
-
-@pytest.mark.parametrize("bed_fraction", [0.0, 0.7])
-def test_intervals_hold_the_truth_as_often_as_they_say(bed_fraction: float) -> None:
-    count = held(bed_fraction)
-    assert stats.binomtest(count, 1000, 0.95).pvalue > 0.01, count
-
-
 @pytest.mark.parametrize("packings", [2, 4])
 @pytest.mark.parametrize("bed_fraction", [0.0, 0.7])
 def test_an_estimated_share_of_the_bed_counts(bed_fraction: float, packings: int) -> None:

@@ -31,7 +31,7 @@ def frame(workpiece, unplaced=(), step=10, opening=False):
 
 
 def add(check, one, force, *, counted):
-    (used,) = check.add(one, [force], np.array([counted]))
+    (used,) = check.add(one, np.array([force], dtype=float), np.array([counted]))
     return used
 
 
@@ -99,6 +99,6 @@ def test_a_frame_that_opens_a_file_is_noted_apart() -> None:
 
 def test_nothing_to_compare_fails() -> None:
     check = Closure()
-    assert add(check, frame(contacts([[1, 0, 0]])), None, counted=False)
+    assert add(check, frame(contacts([[1, 0, 0]])), [np.nan] * 3, counted=False)
     assert "cannot be tested" in str(check.problem())
     assert check.record().worst_step is None

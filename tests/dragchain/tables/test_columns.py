@@ -1,9 +1,7 @@
 import json
 import shutil
 from pathlib import Path
-from typing import Any
 
-import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
@@ -85,14 +83,6 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return write_all(tmp_path_factory.mktemp("described"))
 
 
-@pytest.fixture(scope="module")
-def bare(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """The same tables without units and descriptions."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(parquet, "described", lambda schema, table: schema)
-        return write_all(tmp_path_factory.mktemp("bare"))
-
-
 def metadata(field: pa.Field) -> dict[str, str]:
     return {key.decode(): value.decode() for key, value in (field.metadata or {}).items()}
 
@@ -112,25 +102,6 @@ def test_every_described_column_is_in_its_table(files: dict[str, Path], table: s
     names = set(pq.read_schema(files[table]).names)
     of_wakes = {name for name in plain if "wake" in descriptions(name)[table]}
     assert plain - names <= (of_wakes if table == "summary" else SOME_RUNS_ONLY)
-
-
-@pytest.mark.parametrize("table", TABLES)
-def test_the_data_are_those_without_metadata(
-    files: dict[str, Path], bare: dict[str, Path], table: str
-) -> None:
-    ours, theirs = pq.read_table(files[table]), pq.read_table(bare[table])
-    assert not any("unit" in metadata(field) for field in theirs.schema)
-    assert ours.schema.equals(theirs.schema, check_metadata=False)
-    assert ours.schema.metadata == theirs.schema.metadata
-    one, other = (pd.read_parquet(where[table]) for where in (files, bare))
-    pd.testing.assert_frame_equal(one, other, check_exact=True)
-    assert _bytes(ours) == _bytes(theirs)
-
-
-def _bytes(table: pa.Table) -> list[Any]:
-    """The buffers of all columns: equal only if every bit is."""
-    chunks = [chunk for column in table.columns for chunk in column.chunks]
-    return [buffer and buffer.to_pybytes() for chunk in chunks for buffer in chunk.buffers()]
 
 
 @pytest.mark.parametrize(

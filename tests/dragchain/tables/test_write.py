@@ -277,12 +277,12 @@ def test_samples_are_found_in_blocks_and_gaps_are_not() -> None:
         {"step": np.array(steps), **{name: np.array(steps) + 0.5 for name in names}}
         for steps in ([2, 4], [6, 8])
     ]
-    samples = WorkpieceSamples(blocks)
-    assert samples.first_step == 2
-    assert (samples.at(4).force_n == 4.5).all()
-    assert samples.at(5) is None
-    assert (samples.at(8).ref_m == 8.5).all()
-    assert samples.at(10) is None
+    force, place = WorkpieceSamples(blocks).at(np.array([0, 4, 8]))
+    assert np.isnan(force[0]).all() and (force[1:] == [[4.5], [8.5]]).all()
+    assert (place == [[2.5], [4.5], [8.5]]).all()
+    for step in (5, 10):
+        with pytest.raises(TableError, match=f"has step {step}"):
+            WorkpieceSamples(blocks).at(np.array([4, step]))
     with pytest.raises(TableError, match="no samples"):
         WorkpieceSamples([])
 

@@ -20,10 +20,8 @@ from tradeoff_files import (
 )
 
 from dragchain.cli import main as dragchain
-from dragchain.tradeoff.changes import read_costs
-from dragchain.tradeoff.drops import choose_drop, compare_drops
-from dragchain.tradeoff.report import error_percent, times
-from dragdeck.errors import DocumentError
+from dragchain.tradeoff.outcome import compare_drops
+from dragchain.tradeoff.report import cheaper, error_percent
 
 pytestmark = pytest.mark.slow  # its data take seconds to make
 
@@ -90,7 +88,7 @@ def test_the_page_needs_nothing_else_and_shows_no_broken_number(made: Path, text
     stands_alone((made / "report.html").read_text())
     words = " ".join(text.parts)
     assert not re.search(r"\b(nan|inf|None|NaN)\b", words)
-    assert len(text.images) == 4
+    assert len(text.images) == 1
 
 
 def test_what_is_not_significant_is_never_a_zero(text: Text) -> None:
@@ -98,10 +96,10 @@ def test_what_is_not_significant_is_never_a_zero(text: Text) -> None:
     assert not {"+0.0\N{NO-BREAK SPACE}%", "0\N{NO-BREAK SPACE}%"} & set(text.parts)
 
 
-def test_the_page_says_what_to_choose_and_what_softness_ruins(text: Text) -> None:
+def test_the_page_says_what_to_choose(text: Text) -> None:
     words = " ".join(" ".join(text.parts).replace("\N{NO-BREAK SPACE}", " ").split())
     assert "E x 0.01, 50 % of Rayleigh (20 times cheaper than the reference" in words
-    assert "The <plain> deck: 2 times (1.9 to 2.1)" in words
+    assert "the <plain> deck" in words and "1.9 to 2.1" in words
     assert "no particle lost" in words and "12 particles" in words
     assert "Inertial number of the scene: 0.004 at speed x 1, 0.02 at speed x 5" in words
 
@@ -134,7 +132,7 @@ def test_settings_for_the_advisor_change_the_fidelity_alone(summary: dict[str, A
     assert (own["seeds"], own["runs"], own["failed"]) == (3, 3, 0)
     assert own["relative_cost"] == pytest.approx(0.05)
     assert set(own["errors"]["drag_mean"]) == {
-        "value", "se", "ci95_low", "ci95_high", "bound", "significant", "single_parameter_error"
+        "value", "se", "ci95_low", "ci95_high", "bound", "significant"
     }  # fmt: skip
     failed = settings[0.01, 0.8, 1.0]
     assert (failed["failed"], failed["errors"]) == (1, {})
@@ -146,15 +144,11 @@ def test_drops_are_compared_with_the_finest(summary: dict[str, Any], tmp_path: P
     assert summary["drop_test"][1]["relative_cost"] == pytest.approx(0.2)
     found = compare_drops(drops(tmp_path))
     assert found[1].bound == pytest.approx(0.01) and found[2].bound == pytest.approx(0.125)
-    assert choose_drop(found, 0.02).drop == choose_drop(found, 0.02).nearest == found[1]
-    assert choose_drop(found, 0.2).drop == found[2]
-    assert choose_drop(found, 0.005).drop is None
     assert compare_drops([]) == []
 
 
-def test_tables_and_figures_are_there(made: Path) -> None:
-    for name in ("pareto", "contact_forces", "path", "drop_test"):
-        assert (made / "figures" / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+def test_tables_and_figure_are_there(made: Path) -> None:
+    assert (made / "figures" / "pareto.png").read_bytes().startswith(b"\x89PNG")
     runs, errors = (pd.read_csv(made / f"{name}.csv") for name in ("runs", "errors"))
     assert len(runs) == len(pd.read_parquet(made / "runs.parquet")) == 16
     assert len(errors) == len(pd.read_parquet(made / "errors.parquet"))
@@ -178,15 +172,8 @@ def test_a_page_of_a_single_setting(tmp_path: Path) -> None:
     assert "no setting has two complete runs" in words and not re.search(r"\bnan\b", words)
 
 
-def test_costs_without_a_key_are_refused(tmp_path: Path) -> None:
-    file = tmp_path / "costs.json"
-    file.write_text(json.dumps({"schema": 2, "costs": [{"name": "plain"}]}))
-    with pytest.raises(DocumentError, match=r"costs\[0\]\.scene: a required key is missing"):
-        read_costs(file)
-
-
 def test_numbers_in_words() -> None:
     assert [error_percent(x) for x in (0.1234, -0.0123, 0.00049, 0.0)] == [
         "+12", "\N{MINUS SIGN}1.2", "+0.05", "0"
     ]  # fmt: skip
-    assert times(41.7) == "42" and times(float("nan")) == "\N{EN DASH}"
+    assert cheaper(41.7) == "42 times cheaper" and cheaper(0.5) == "2 times more expensive"

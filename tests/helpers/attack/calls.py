@@ -2,7 +2,6 @@
 
 import contextlib
 import math
-import os
 import re
 import resource
 import signal
@@ -14,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import psutil
-from preloaded import PACKAGES, USER, environment
+from preloaded import USER, environment, plain_environment
 
 LARGEST_FILE = 64 * 2**20
 """No command that is attacked may write a file beyond this, bytes."""
@@ -83,9 +82,7 @@ class Call:
     def __init__(self, words: Sequence[str], folder: Path, log: Path) -> None:
         self.log = log
         self._begun = time.monotonic()
-        scripts = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
-        seen = {**os.environ, "PYTHONPATH": PACKAGES, "PATH": scripts, "PYTHONUNBUFFERED": "1"}
-        seen.pop("DISPLAY", None)
+        seen = plain_environment() | {"PYTHONUNBUFFERED": "1"}
         with log.open("wb") as sink:
             self.process = subprocess.Popen(
                 words,
@@ -122,12 +119,13 @@ class Call:
 
     def wait(self, patience_s: float = PATIENCE_S) -> Said:
         """Wait for the end; beyond this processor time everything is killed."""
-        while (status := self.process.poll()) is None:
-            if self._is_beyond(patience_s):
-                kill(self.tree())
-                self.process.wait()
-                break
-            time.sleep(_POLL_S)
+        status = None
+        while status is None and not self._is_beyond(patience_s):
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                status = self.process.wait(1.0)
+        if status is None:
+            kill(self.tree())
+            self.process.wait()
         return Said(status, self.log.read_text(encoding="utf-8", errors="replace"))
 
 

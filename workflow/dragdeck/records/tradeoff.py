@@ -71,7 +71,6 @@ class ErrorEntry(Part):
     ci95_high: SixDigits
     bound: SixDigits
     significant: bool
-    single_parameter_error: SixDigits
 
 
 class QuantityEntry(Part):
