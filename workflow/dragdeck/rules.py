@@ -134,6 +134,28 @@ def of_whole_run(place: str, file: str) -> FromRun[str]:
     )
 
 
+def add_records(rules: Iterable[Any]) -> None:
+    """Give each of Snakemake's rules that has a command a log, a benchmark and an environment.
+
+    They stand in ``logs/`` and ``benchmarks/`` of the folder of its run or study, and are called
+    like the rule, without the place of its runs.
+    """
+    for rule in rules:
+        if rule.norun:
+            continue
+        folders, name = str(next(iter(rule.output), "results")).split("/"), rule.name
+        depth = 2
+        if "run" in rule.wildcard_names:
+            depth, name = 4, name.removesuffix(f"_{folders[2]}").removesuffix("_of")
+        folder = "/".join(folders[:depth])
+        others = sorted(rule.wildcard_names - {"study", "run"})
+        name += "".join(f"-{{{wildcard}}}" for wildcard in others)
+        rule.log_modifier = rule.benchmark_modifier = rule.output_modifier
+        rule.set_log(f"{folder}/logs/{name}.log")
+        rule.benchmark = f"{folder}/benchmarks/{name}.tsv"
+        rule.conda_env = "../envs/python.yaml"
+
+
 class Workflow:
     """What a call of Snakemake works on.
 

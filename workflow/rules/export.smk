@@ -11,12 +11,6 @@ rule export_paraview:
             of_run("process", f"export/paraview/{name}")
             for name in ("run.pvd", "view.py", "view.json")
         ],
-    log:
-        of_run("process", "logs/export.log"),
-    benchmark:
-        of_run("process", "benchmarks/export.tsv")
-    conda:
-        "../envs/python.yaml"
     params:
         source=source_hash("dragchain.export.write", "dragchain.export.view"),
     shell:

@@ -10,12 +10,6 @@ rule measure_costs:
         script=WORK.files("benchmarks/costs/*.*"),
     output:
         WORK.of_tradeoff("costs.json"),
-    log:
-        WORK.of_tradeoff("logs/costs.log"),
-    benchmark:
-        WORK.of_tradeoff("benchmarks/costs.tsv")
-    conda:
-        "../envs/python.yaml"
     threads: workflow.cores
     resources:
         prints=1,
@@ -46,12 +40,6 @@ rule write_tradeoff:
         measured=WORK.of_tradeoff("tradeoff.json"),
         runs=multiext(WORK.of_tradeoff(""), "runs.csv", "runs.parquet"),
         errors=multiext(WORK.of_tradeoff(""), "errors.csv", "errors.parquet"),
-    log:
-        WORK.of_tradeoff("logs/report.log"),
-    benchmark:
-        WORK.of_tradeoff("benchmarks/report.tsv")
-    conda:
-        "../envs/python.yaml"
     params:
         reference=lambda wildcards: WORK.every_point("")[0],
         drops=lambda wildcards: WORK.every_drop_point(""),

@@ -247,7 +247,7 @@ def test_an_interrupted_run_goes_on(process: Path, other: Path, tmp_path: Path) 
 
 
 @pytest.mark.parametrize(("log", "said"), [
-    ("render.log", "would reach below the floor"), ("tables.log", "ends inside a frame"),
+    ("render.log", "would reach below the floor"), ("tabulate.log", "ends inside a frame"),
 ])  # fmt: skip
 def test_the_step_that_failed_says_why(
     process: Path, other: Path, tmp_path: Path, log: str, said: str

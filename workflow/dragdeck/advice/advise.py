@@ -330,10 +330,6 @@ def _drop_option(process: Fidelity, drop: DropEntry, fraction: float) -> Option:
     return Option(process, cost, cost, abs(drop.restitution_error), fraction)
 
 
-SCALE = 1e-3
-"""On the modulus of the short run; more where the engine refuses so soft a particle."""
-
-
 @dataclass(frozen=True)
 class Advice:
     """The settings for a tolerance.
