@@ -1,7 +1,6 @@
 """CAD parts in STEP files: meshed, checked, turned and placed, or refused."""
 
 import re
-import runpy
 import signal
 import subprocess
 import sys
@@ -249,30 +248,3 @@ def test_however_the_mesher_ends_the_file_is_named(
     assert caught.value.value == (
         "last line" if code == 1 else f"the mesher ended with code {code}"
     )
-
-
-# --- the parts that come with the project ----------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("name", "volume_mm3", "low_mm", "high_mm"),
-    [
-        ("shaft", SHAFT_VOLUME_MM3, (0, -6, -6), (85, 6, 6)),
-        ("cutter", 5118.9, (-5, -5, 0), (5, 5, 75)),
-    ],
-)
-def test_the_script_makes_the_parts_that_are_there(
-    tmp_path: Path,
-    name: str,
-    volume_mm3: float,
-    low_mm: tuple[float, ...],
-    high_mm: tuple[float, ...],
-) -> None:
-    again = runpy.run_path(str(MESHES / "parts.py"))["step"](name, tmp_path)
-    for file in (MESHES / f"{name}.step", again):
-        assert file.stat().st_size < 200_000
-        found = mesh_step(file, "mm", 2.0, 2.0)
-        assert found["volume"] == pytest.approx(volume_mm3, rel=1e-4)
-        points = np.array(found["points"])
-        assert points.min(axis=0) == pytest.approx(low_mm, abs=0.03)
-        assert points.max(axis=0) == pytest.approx(high_mm, abs=0.03)

@@ -212,9 +212,9 @@ def write_stl(mesh: Trimesh, path: Path | str) -> None:
     write_text(Path(path), stl_text(mesh))
 
 
-def stl_text(mesh: Trimesh, factor: float = 1.0) -> str:
-    """Return the ASCII STL text of a mesh, its coordinates times `factor`."""
-    corners = factor * mesh.triangles + 0.0  # + 0.0 turns -0 into 0
+def stl_text(mesh: Trimesh) -> str:
+    """Return the ASCII STL text of a mesh."""
+    corners = mesh.triangles + 0.0  # + 0.0 turns -0 into 0
     normals = np.round(mesh.face_normals, 9) + 0.0
     facets = [
         "facet normal {:.9g} {:.9g} {:.9g}\nouter loop\n".format(*normal)
