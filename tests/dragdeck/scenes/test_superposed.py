@@ -11,7 +11,6 @@ import pytest
 import yaml
 from pydantic import ValidationError
 
-from dragdeck.campaigns.machine_speed import short_case
 from dragdeck.cases.bed import bed_timestep, skin
 from dragdeck.cases.case import Case
 from dragdeck.decks.render import deck_text
@@ -174,19 +173,9 @@ def test_the_highest_surface_speed_counts_all_that_moves(with_motion: Callable[.
     assert surface_speed(plain, radius) == 0.02
 
 
-def test_the_short_run_for_its_speed_keeps_the_turn_per_step(
-    with_motion: Callable[..., Case],
-) -> None:
-    case = with_motion(spin={"rpm": 300}, counted_from_revolution=1)
-    short = short_case(case)
-    assert short.study.motion.spin is not None and short.study.motion.spin.rpm is not None
-    per_step = [
-        rpm
-        * bed_timestep(each.study, "timestep_fraction")
-        * each.study.chosen_fidelity().speed_factor
-        for rpm, each in ((300, case), (short.study.motion.spin.rpm, short))
-    ]
-    assert per_step[0] == pytest.approx(per_step[1])
+def test_a_drag_at_another_pace_spins_as_much_faster(with_motion: Callable[..., Case]) -> None:
+    motion = with_motion(spin={"rpm": 300}, counted_from_revolution=1).study.motion.at(2.0, 0.05)
+    assert motion.spin is not None and motion.spin.rpm == 600
 
 
 def test_a_workpiece_that_oscillates_is_as_much_longer(with_motion: Callable[..., Case]) -> None:

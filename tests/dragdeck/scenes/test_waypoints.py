@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 import yaml
 
-from dragdeck.campaigns.machine_speed import DRAG_STEPS, short_case
 from dragdeck.cases.bed import bed_timestep
 from dragdeck.cases.case import Case
 from dragdeck.decks.render import deck_text
@@ -449,11 +448,8 @@ def test_a_fraction_of_the_path(made: Made) -> None:
         np.testing.assert_allclose(one["velocity_m_s"], other["velocity_m_s"], rtol=2e-4)
 
 
-def test_the_short_run_for_its_speed_is_as_short_as_others(made: Made) -> None:
-    case = made(points=[[0, 0, 0], [100, 0, 0], [101, 0.01, 0]], motion={"transient_m": 0.0})
-    short = short_case(case)
-    dt = bed_timestep(short.study, "timestep_fraction")
-    motion = short.study.motion
-    duration = motion.path_length_m / motion.axis_speed_m_s
-    factor = short.study.chosen_fidelity().speed_factor
-    assert duration / factor / dt == pytest.approx(DRAG_STEPS, rel=0.01)
+def test_a_drag_at_another_pace_and_length(made: Made) -> None:
+    own = made(points=[[0, 0, 0], [100, 0, 0], [101, 0.01, 0]], motion={"transient_m": 0.0})
+    motion = own.study.motion.at(2.0, 0.004)
+    assert motion.path_length_m == pytest.approx(0.004)
+    assert motion.axis_speed_m_s == pytest.approx(2 * own.study.motion.axis_speed_m_s)
