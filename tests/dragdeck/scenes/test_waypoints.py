@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 import yaml
 
-from dragdeck.cases.bed import bed_timestep
 from dragdeck.cases.case import Case
 from dragdeck.decks.render import deck_text
 from dragdeck.decks.templates import environment
