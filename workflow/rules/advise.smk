@@ -9,7 +9,6 @@ rule advise:
     params:
         cases=[SCENES["process"].digest(case) for case in by_run(CASES, SCENES["process"]).values()],
         fidelity=WORK.fidelity_option,
-        study=STUDY,
         source=source_hash("dragdeck.advice.forecast"),
     shell:
-        "dragdeck advise {params.study} {params.fidelity} > {log} 2>&1"
+        "dragdeck advise {STUDY} {params.fidelity} > {log} 2>&1"

@@ -25,11 +25,10 @@ rule sweep_drops:
     resources:
         prints=1,
     params:
-        study=STUDY,
         fidelity=WORK.fidelity_option,
         source=source_hash("dragdeck.campaigns.restitution_drops"),
     shell:
-        "dragdeck step drops {params.study} sweep {params.fidelity}"
+        "dragdeck step drops {STUDY} sweep {params.fidelity}"
         " --out $(dirname {output}) 2>&1 | tee -i {log}"
 
 
@@ -59,11 +58,10 @@ rule confirm_restitution:
     resources:
         prints=1,
     params:
-        study=STUDY,
         fidelity=WORK.fidelity_option,
         source=source_hash("dragdeck.campaigns.restitution_drops"),
     shell:
-        "dragdeck step drops {params.study} confirm {params.fidelity} --fit {input.fit}"
+        "dragdeck step drops {STUDY} confirm {params.fidelity} --fit {input.fit}"
         " --out $(dirname {output}) 2>&1 | tee -i {log}"
 
 

@@ -10,10 +10,9 @@ rule draw_set_up:
     params:
         case=SCENES["process"].digest(CASES[0]),
         fidelity=WORK.fidelity_option,
-        study=STUDY,
         source=source_hash("dragdeck.preview.page", "dragdeck.preview.layout"),
     shell:
-        "dragdeck preview {params.study} {params.fidelity} > {log} 2>&1"
+        "dragdeck preview {STUDY} {params.fidelity} > {log} 2>&1"
 
 
 rule write_report:

@@ -92,8 +92,8 @@ def test_cylinder_against_the_formulas(facet_size_m: float):
     assert workpiece.area_faces[~on_side].sum() == pytest.approx(2 * section, rel=1e-12)
     assert workpiece.bounds[:, 2].tolist() == [0.0, length]
     assert m.place(workpiece).vertices == pytest.approx(workpiece.vertices, abs=1e-15)
-    assert m.envelope(workpiece).radius_m == pytest.approx(corner)
-    assert m.cylinder_radius(radius, length, facet_size_m) == m.envelope(workpiece).radius_m
+    assert m.outer_radius(workpiece) == pytest.approx(corner)
+    assert m.cylinder_radius(radius, length, facet_size_m) == m.outer_radius(workpiece)
     assert m.findings(workpiece, surroundings=SCENE) == []
 
 

@@ -19,9 +19,8 @@ from dragdeck.mesh.shapes import (
     prism,
 )
 from dragdeck.mesh.surface import (
-    Envelope,
-    envelope,
     facing_out,
+    outer_radius,
     place,
     points_below,
     surface,
@@ -32,7 +31,6 @@ from dragdeck.mesh.surface import (
 
 __all__ = [
     "UNITS",
-    "Envelope",
     "Finding",
     "Surroundings",
     "bowl",
@@ -40,9 +38,9 @@ __all__ = [
     "cylinder",
     "cylinder_facets",
     "cylinder_radius",
-    "envelope",
     "facing_out",
     "findings",
+    "outer_radius",
     "place",
     "points_below",
     "polygon_radius",

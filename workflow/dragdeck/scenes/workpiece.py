@@ -36,8 +36,8 @@ from dragdeck.mesh import (
     cylinder,
     cylinder_facets,
     cylinder_radius,
-    envelope,
     facing_out,
+    outer_radius,
     place,
     points_below,
     read,
@@ -181,7 +181,8 @@ def workpiece_length(case: Case) -> float:
     """Height of the workpiece, m: its length if it is not tilted."""
     study = case.study
     if isinstance(study.workpiece.shape, MeshShape) or study.motion.tilt_deg:
-        return envelope(workpiece_mesh(case)).length_m
+        low, high = workpiece_mesh(case).bounds[:, 2]
+        return float(high - low)
     return _generated_length(case)
 
 
@@ -198,8 +199,7 @@ def workpiece_radius(case: Case) -> float:
     shape = case.study.workpiece.shape
     if isinstance(shape, CylinderShape):
         return cylinder_radius(shape.radius_m, _generated_length(case), shape.facet_size_m)
-    mesh, _ = _of_case(case, shape)
-    return envelope(mesh).radius_m
+    return outer_radius(_of_case(case, shape)[0])
 
 
 def workpiece_reach(case: Case) -> float:
