@@ -294,40 +294,22 @@ def test_the_bed_rotates_with_the_bowl_about_a_workpiece_at_rest(runs: Runs, rpm
     assert force["drag_n"].mean() < 0
 
 
-@pytest.mark.parametrize("path", [{"path": CIRCLE, "speed_m_s": 0.021}, WAYPOINTS])
-def test_a_resumed_run_continues_the_motion(runs: Runs, path: dict[str, Any]) -> None:
-    """From a checkpoint within the second stage: a restart file has no moved centre of spin."""
-    motion = {**path, "spin": REVERSING, "oscillation": UP_AND_DOWN}
-    folder = runs.shallow(**motion)
-    engine(folder)
-    case, checkpoints = load_case(folder), sorted(folder.glob("checkpoint.*.restart"))
-    stages = case.superposed[-1].model_dump()["stages"]
-    begun = drag_phase(case).start_step + stages[0]["steps"]
-    checkpoint = next(
-        file
-        for file in sorted(checkpoints, key=lambda file: int(file.name.split(".")[1]))
-        if int(file.name.split(".")[1]) > begun + 100
-    )
-    for file in folder.glob("corners.*"):
-        file.unlink()
-    engine(folder, *f"-var part 2 -var resume 1 -var from {checkpoint.name}".split())
-    steps, place = reference(folder, part=2)
-    assert drag_phase(case).end_step == steps[-1]
-    whole, before = reference(folder)
-    np.testing.assert_allclose(place, before[np.isin(whole, steps)], atol=1e-11)
-    off = place - analytic(case, motion, steps)
-    assert np.abs(off[:, :2]).max() < 1e-9
-    assert farthest_corner(folder, steps, place) < 1e-7
+STAGES = {"spin": REVERSING, "oscillation": UP_AND_DOWN}
 
 
-@pytest.mark.parametrize("name", ["tilt-spin-fixed", "eight-tilt-spin", "inclined"])
-def test_a_resumed_run_continues_the_pose(runs: Runs, name: str) -> None:
+@pytest.mark.parametrize("motion", [
+    POSED["tilt-spin-fixed"], POSED["eight-tilt-spin"], INCLINED, {**WAYPOINTS, **STAGES},
+    {"path": CIRCLE, "speed_m_s": 0.021, **STAGES},
+])  # fmt: skip
+def test_a_resumed_run_continues_the_pose(runs: Runs, motion: dict[str, Any]) -> None:
     """From a checkpoint within the drag: a restart file keeps neither axis nor moved centre."""
-    folder = runs.shallow(**POSED[name])
+    folder = runs.shallow(**motion)
     engine(folder)
     drag, whole = drag_phase(load_case(folder)), reference(folder)
     written = [int(file.name.split(".")[1]) for file in folder.glob("checkpoint.*.restart")]
-    step = min(step for step in written if step > drag.start_step + 100)
+    first = next(iter(motion.get("spin", {}).get("schedule", ())), {"until_s": 0.0})
+    begun = drag.start_step + first["until_s"] / load_case(folder).timestep_s
+    step = min(step for step in written if step > begun + 100)
     for file in folder.glob("corners.*"):
         file.unlink()
     engine(folder, *f"-var part 2 -var resume 1 -var from checkpoint.{step}.restart".split())

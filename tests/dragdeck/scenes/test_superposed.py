@@ -1,7 +1,6 @@
 """Motions that are superposed on the path: study fields, speeds, checks, input scripts."""
 
 import math
-import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -60,23 +59,6 @@ def test_a_study_without_them_is_as_it_was(case: Case, project: Project) -> None
     assert "superpose" not in script(case, project)
     assert not {"spin", "oscillation", "counted_from_revolution"} & set(case.study.motion.plain())
     assert "superposed_speed" not in describe(case)
-
-
-def test_spin_follows_the_path_and_starts_where_the_engine_has_the_workpiece(
-    with_motion: Callable[..., Case], project: Project
-) -> None:
-    """The path carries the centre of what is defined after it, and is unfixed last."""
-    text = script(with_motion(spin={"rpm": -300}), project)
-    names = re.findall(r"^(fix|unfix) (move_drag|superpose_\w+)", text, re.MULTILINE)
-    assert names == [
-        ("fix", "move_drag"), ("fix", "superpose_spin"),
-        ("unfix", "superpose_spin"), ("unfix", "move_drag"),
-    ]  # fmt: skip
-    assert (
-        "rotate/variable origin ${reference_x} ${reference_y} ${reference_z} axis 0. 0. 1." in text
-    )
-    rate = re.search(r"^variable spin_rate_1 equal (.*)$", text, re.MULTILINE)
-    assert rate is not None and float(rate[1]) == pytest.approx(-RATE, rel=1e-4)
 
 
 def test_every_speed_grows_by_the_speed_factor(with_motion: Callable[..., Case]) -> None:

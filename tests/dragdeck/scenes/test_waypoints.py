@@ -361,30 +361,6 @@ def test_a_path_that_crosses_particles_in_a_step_is_refused(made: Made) -> None:
 # --- input script and preview --------------------------------------------------------------------
 
 
-def test_the_input_script_has_a_formula_per_axis(made: Made, project: Project) -> None:
-    case = made(motion={"spin": {"rpm": 60}})
-    scene = process_scene(case, BED)
-    text, drag = deck_text(scene, environment(project.templates)), scene.case.phases[-1]
-    stages = motion_of_run(case)["stages"]
-    fixes = re.findall(r"^(fix|unfix) (move_drag|superpose_\w+)", text, re.MULTILINE)
-    assert fixes == [
-        ("fix", "move_drag"), ("fix", "superpose_spin"),
-        ("unfix", "superpose_spin"), ("unfix", "move_drag"),
-    ]  # fmt: skip
-    mover = "linear/variable v_stage_vx_1 v_stage_vy_1 v_stage_vz_1\n"
-    assert f"fix move_drag all move/mesh mesh workpiece {mover}" in text
-    ends = drag.start_step + np.cumsum([stage["steps"] for stage in stages])
-    for axis, name in enumerate("xyz"):
-        first, *others = (repr(stage["velocity_m_s"][axis]) for stage in stages)
-        formula = first + "".join(
-            f"*(step<={end})+({velocity})*(step>{end})"
-            for velocity, end in zip(others, ends, strict=False)
-        )
-        assert f"variable stage_v{name}_1 equal {formula}\n" in text
-    assert sum(stage["steps"] for stage in stages) == drag.end_step - drag.start_step
-    assert stages[2]["velocity_m_s"] == [0, 0, 0]
-
-
 def test_long_paths_take_several_formulas(made: Made, project: Project) -> None:
     """Each has the steps and values of its stages, and no line is too long for the engine."""
     points = [[n / 100, 0.01 * math.sin(n), 0.01 * math.cos(n)] for n in range(100)]
