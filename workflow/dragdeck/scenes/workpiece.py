@@ -29,18 +29,14 @@ from dragdeck.cases.bed import (
 )
 from dragdeck.cases.case import Case, mesh_file, of_each_workpiece
 from dragdeck.errors import Caution, InputError, together
-from dragdeck.mesh import (
-    Finding,
-    Surroundings,
-    check,
-    cylinder,
-    cylinder_facets,
-    cylinder_radius,
+from dragdeck.mesh.checks import Finding, Surroundings, check
+from dragdeck.mesh.files import read
+from dragdeck.mesh.shapes import cylinder, cylinder_facets, cylinder_radius
+from dragdeck.mesh.surface import (
     facing_out,
     outer_radius,
     place,
     points_below,
-    read,
     surface,
     tilted,
     upright,
