@@ -553,7 +553,7 @@ def _engine_contacts(
     """The contacts of one frame as the engine wrote them, with bowl and workpiece."""
     bowl_radius = case.bowl.radius_m
     walls = workpiece.workpiece, workpiece.bowl
-    rows = contact_rows(frame, pairs, *walls, bowl_radius, friction_with(case, "media"))
+    rows = contact_rows(frame, pairs, *walls, bowl_radius, friction_with(case, "particle"))
     ids = np.asarray(frame.columns["particle_id"], dtype=np.int64)
     a = np.searchsorted(ids, rows.a_id)
     b = np.where(rows.b_id > 0, np.searchsorted(ids, rows.b_id), -1)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from made_run import line, made_case, output, phases, write_documents
+from made_run import line, made_case, output, phases, touching, write_documents
 
 STEP_S = 1e-4
 PERIOD = 10
@@ -44,12 +44,12 @@ def case_json(**motion: Any) -> dict[str, Any]:
     steel = {"youngs_modulus_pa": 2e11, "poissons_ratio": 0.3}
     inputs = {
         "media.material": "ceramic", "workpiece.material": "steel",
-        "pairs.ceramic-steel.friction": MU,
         **{f"materials.{m}.{k}": v for m in ("ceramic", "steel") for k, v in steel.items()},
     }  # fmt: skip
     return made_case(
         "process", "made-process", timestep_s=STEP_S, rayleigh_time_s=2e-4, inputs=inputs,
-        bowl={"radius_m": 0.1}, surface_m=SURFACE, motion=line(SPEED) | motion,
+        contact_moduli=touching(MU), bowl={"radius_m": 0.1},
+        surface_m=SURFACE, motion=line(SPEED) | motion,
         workpiece={"kind": "mesh", "radius_m": 0.01, "length_m": SIZE, "immersion_depth_m": SIZE},
         phases=phases(START, LAST), statistics={"transient_s": 0.0},
     )  # fmt: skip

@@ -80,6 +80,12 @@ def made_case(scene: str, run: str, **values: Any) -> dict[str, Any]:
     return with_motion(case, **motion)
 
 
+def touching(friction: float) -> dict[str, Any]:
+    """What a particle touches, with one friction for all."""
+    constants = {"modulus_pa": 1e9, "shear_pa": 4e8, "restitution": 0.5, "friction": friction}
+    return dict.fromkeys(("particle", "bowl", "workpiece"), constants)
+
+
 def line(speed_m_s: float, **path: Any) -> dict[str, Any]:
     """A motion along +x from the bowl's axis; fields of the path may be others."""
     return {"path": {"kind": "line", "start_m": [0.0, 0.0], **path}, "speed_m_s": speed_m_s}

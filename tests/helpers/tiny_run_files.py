@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from made_run import Raw, line, made_case, output, phases, write_documents
+from made_run import Raw, line, made_case, output, phases, touching, write_documents
 
 TIMESTEP_S = 1e-3
 GRAVITY_M_S2 = 9.81
@@ -139,7 +139,6 @@ def case_json(**values: Any) -> dict[str, Any]:
         "media.count": 4,
         "media.material": "stone",
         **dict.fromkeys(("bowl.material", "workpiece.material"), "steel"),
-        **dict.fromkeys(("pairs.stone-stone.friction", "pairs.steel-stone.friction"), FRICTION),
         **{f"materials.{m}.youngs_modulus_pa": 1e9 for m in ("stone", "steel")},
         **{f"materials.{m}.poissons_ratio": 0.3 for m in ("stone", "steel")},
     }
@@ -147,7 +146,8 @@ def case_json(**values: Any) -> dict[str, Any]:
         "study": "tiny", "case": "tiny", "timestep_s": TIMESTEP_S, "surface_m": SURFACE_M,
         "upstream": {"filling": "filling-00000000", "drop_test": "drop-00000000"},
         "fidelity": {"ranks": 2}, "media": {"radius_mean_m": RADIUS_M}, "inputs": inputs,
-        "bowl": {"radius_m": BOWL_RADIUS_M}, "workpiece": {"immersion_depth_m": 0.03},
+        "contact_moduli": touching(FRICTION), "bowl": {"radius_m": BOWL_RADIUS_M},
+        "workpiece": {"immersion_depth_m": 0.03},
         "motion": line(SPEED_M_S), "phases": phases(DRAG_START, LAST),
         "statistics": {"transient_s": 0.02},
         "assumptions": [{"field": "bowl.radius_m", "value": BOWL_RADIUS_M, "why": "by hand"}],

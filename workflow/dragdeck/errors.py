@@ -163,6 +163,7 @@ class TruncatedDumpError(DumpError):
 
 
 CautionCode = Literal[
+    "cohesion",
     "facets",
     "gap",
     "implausible",

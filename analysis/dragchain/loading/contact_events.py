@@ -85,7 +85,7 @@ def surfaces(case: CaseOfRun) -> Surfaces:
     TableError
         If ``case.json`` does not give the materials.
     """
-    friction = friction_with(case, "workpiece")
+    friction = friction_with(case, "workpiece").friction
     bodies = [input_of(case, f"{body}.material") for body in ("media", "workpiece")]
     names = ("youngs_modulus_pa", "poissons_ratio")
     first, second = (

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from dragchain.arrays import Floats, Ints
 from dragchain.errors import TableError
 from dragchain.loading.contact_events import AMOUNTS, POINT, SLIP, Thresholds, surfaces
+from dragchain.run.case import attracts
 from dragchain.run.kinematics import (
     axis_speed,
     bowl_velocity,
@@ -25,6 +26,7 @@ from dragchain.run.kinematics import (
 from dragchain.run.workpiece import Surface, off_facet
 from dragchain.statistics.correlated import slow_waves
 from dragchain.tables.by_step import read_groups
+from dragchain.tables.columns import ATTRACTION
 from dragdeck.decks.outputs import load_outputs
 from dragdeck.records.case import CaseOfRun
 
@@ -101,7 +103,7 @@ def sample(run_dir: Path, case: CaseOfRun, limits: Thresholds) -> Sampled:
     steps, interval_s = _counted_steps(run_dir, case)
     workpiece = _workpiece_at(tables / "workpiece_force.parquet", steps)
     parts = []
-    for contacts in _read_contacts(tables / "workpiece_contacts.parquet", run_dir):
+    for contacts in _read_contacts(tables / "workpiece_contacts.parquet", run_dir, case):
         contacts["frame"] = np.searchsorted(steps, contacts["step"])
         at = workpiece.reindex(contacts["step"])
         parts.append(_with_amounts(contacts, at, case, interval_s, limits))
@@ -128,9 +130,10 @@ def _workpiece_at(file: Path, steps: Ints) -> pd.DataFrame:
     return workpiece
 
 
-def _read_contacts(file: Path, run_dir: Path) -> Iterator[pd.DataFrame]:
+def _read_contacts(file: Path, run_dir: Path, case: CaseOfRun) -> Iterator[pd.DataFrame]:
     """Counted contacts with force, a row group at a time."""
-    for contacts in read_groups(file, _CONTACT):
+    columns = [*_CONTACT, *([ATTRACTION] if attracts(case) else [])]
+    for contacts in read_groups(file, columns):
         loaded = contacts[_loaded(contacts)].reset_index(drop=True)
         if loaded[_VELOCITY].isna().any(axis=None):
             raise TableError(
@@ -174,7 +177,7 @@ def _with_amounts(
     steps = rows["step"].to_numpy()
     rotation = workpiece_rotation(steps, heading, case)
     speed = np.linalg.norm(slip, axis=1)
-    most = surfaces(case).friction * normal
+    most = surfaces(case).friction * (normal + rows.get(ATTRACTION, 0.0))
     mobilisation = np.divide(tangential, most, out=np.full_like(most, np.inf), where=most > 0.0)
     mobilised = mobilisation >= limits.mobilised
     velocity = workpiece_velocity(steps, point, reference, case)

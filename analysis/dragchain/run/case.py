@@ -6,6 +6,7 @@ from pathlib import Path
 from pydantic import JsonValue
 
 from dragchain.errors import TableError
+from dragdeck.physics.coulomb import FrictionLimit
 from dragdeck.records.case import CaseOfRun
 
 
@@ -41,16 +42,14 @@ def number_of(case: CaseOfRun, name: str) -> float:
     return float(value)
 
 
-def friction_with(case: CaseOfRun, body: str) -> float:
-    """Coefficient of friction of a particle with ``media``, ``bowl`` or ``workpiece``.
-
-    Times the normal force of a contact it limits the tangential force.
+def friction_with(case: CaseOfRun, body: str) -> FrictionLimit:
+    """What limits the friction of a particle with ``particle``, ``bowl`` or ``workpiece``.
 
     Raises
     ------
     TableError
-        If the inputs of ``case.json`` do not give it, or the contact law adds a force to the
-        one that limits friction.
+        If ``case.json`` does not give it, or a template's contact law adds a force to the one
+        that limits friction.
     """
     if case.added_forces:
         raise TableError(
@@ -59,9 +58,15 @@ def friction_with(case: CaseOfRun, body: str) -> float:
             "friction work and chains cannot be told from the output; tables of the force "
             "on the workpiece, of energies and particles, and the raw output are not affected"
         )
-    particle, other = (input_of(case, f"{name}.material") for name in ("media", body))
-    names = [f"pairs.{pair}.friction" for pair in (f"{particle}-{other}", f"{other}-{particle}")]
-    return number_of(case, next((name for name in names if name in case.inputs), names[0]))
+    if body not in case.contact_moduli:
+        raise TableError(f"{case.run}: case.json has no contact_moduli.{body}; render it again")
+    friction = case.contact_moduli[body].friction
+    return FrictionLimit(friction, case.attractive.get(body, {}), wall=body != "particle")
+
+
+def attracts(case: CaseOfRun) -> bool:
+    """Whether the contact law attracts particles to the workpiece."""
+    return "workpiece" in case.attractive
 
 
 def upstream_folders(run_dir: Path, case: CaseOfRun) -> dict[str, Path]:

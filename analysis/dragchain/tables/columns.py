@@ -41,6 +41,9 @@ WORKPIECE_CONTACTS = (
     "normal_force_n", "tangential_force_n", "overlap_m", *SLIP, "normal_velocity_m_s",
     "azimuth_rad", "depth_m", "in_statistics",
 )  # fmt: skip
+ATTRACTION = "attraction_n"
+"""Column of ``workpiece_contacts`` beside these where the contact law attracts particles."""
+
 CONTACTS = (
     "step", "time_s", "kind", "a_id", "b_id", *POINT, *FORCES,
     "normal_force_n", "tangential_force_n", "overlap_m",

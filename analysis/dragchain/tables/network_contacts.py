@@ -12,7 +12,7 @@ from dragchain.tables.columns import CENTRE, FLOOR_FORCES, FORCES, SIDE_FORCES
 from dragchain.tables.workpiece_contacts import WallContacts, tangential_force
 from dragdeck.documents import Document
 from dragdeck.dumps.frame import Frame
-from dragdeck.physics.coulomb import within_friction
+from dragdeck.physics.coulomb import FrictionLimit, within_friction
 
 KINDS = ("particle-particle", "particle-workpiece", "particle-floor", "particle-side")
 """Kinds of contact; their position is the code in `ContactRows.kind`."""
@@ -37,7 +37,7 @@ class ContactRows:
         Normal part of the force, positive in compression; magnitude of the
         rest; overlap.
     removed_n : (N,) ndarray
-        What was cut off the tangential force as written; see `within_friction`.
+        What was cut off the tangential force as written; see `FrictionLimit`.
     """
 
     kind: NDArray[np.int8]
@@ -78,7 +78,7 @@ def contact_rows(
     workpiece: WallContacts,
     bowl: WallContacts,
     bowl_radius_m: float,
-    friction: float,
+    friction: FrictionLimit,
 ) -> ContactRows:
     """Bring the contacts of one step into one form.
 
@@ -93,8 +93,8 @@ def contact_rows(
         Contacts on the workpiece and on a meshed bowl at the same step.
     bowl_radius_m : float
         Inner radius of the bowl, about the z axis.
-    friction : float
-        Coefficient of friction between particles, to which their forces are cut.
+    friction : FrictionLimit
+        Of contacts between particles, to which their forces are cut.
 
     Returns
     -------
@@ -136,7 +136,9 @@ def contact_rows(
     return _joined(groups)
 
 
-def _particle_particle(particles: _Particles, contacts: Frame, friction: float) -> ContactRows:
+def _particle_particle(
+    particles: _Particles, contacts: Frame, friction: FrictionLimit
+) -> ContactRows:
     """Contact point: centre 1 + (R1 - overlap / 2) n, with n from particle 1 to particle 2."""
     contacts = contacts.take(np.flatnonzero(contacts.vectors(*FORCES).any(axis=1)))
     first, second = contacts.ids("particle1_id"), contacts.ids("particle2_id")
@@ -146,7 +148,12 @@ def _particle_particle(particles: _Particles, contacts: Frame, friction: float) 
     away = between / np.linalg.norm(between, axis=1, keepdims=True)
     overlap = np.asarray(contacts.columns["overlap_m"], dtype=np.float64)
     point = centre + (particles.radii[at_first] - 0.5 * overlap)[:, None] * away
-    force, removed = within_friction(contacts.vectors(*FORCES), away, friction)
+    first_m, second_m = particles.radii[at_first], particles.radii[at_second]
+    reduced = first_m * second_m / (first_m + second_m)
+    attraction = friction.attraction_n(reduced, overlap)
+    force, removed = within_friction(
+        contacts.vectors(*FORCES), -away, friction.friction, attraction
+    )
     rows = _rows("particle-particle", first, second, point, force, -away, overlap)
     return replace(rows, removed_n=removed)
 

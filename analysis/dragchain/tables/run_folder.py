@@ -17,6 +17,7 @@ from dragchain.tables.by_step import read_table
 from dragchain.tables.workpiece_contacts import Meshes, WorkpieceFrames, join_workpiece_frames
 from dragdeck.decks.outputs import OutputOfRun, load_outputs
 from dragdeck.dumps.frame import Columns, Frame
+from dragdeck.physics.coulomb import FrictionLimit
 from dragdeck.records.case import CaseOfRun, load_case
 from dragdeck.study.drive import Rotation
 
@@ -30,7 +31,7 @@ class WorkpiecePair:
 
     particles: Frame
     contacts: Frame
-    friction: tuple[float, float]
+    friction: tuple[FrictionLimit, FrictionLimit]
     meshes: Meshes
 
     @property

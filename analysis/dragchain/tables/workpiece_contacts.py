@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from dragchain.arrays import Floats, Ints
 from dragchain.errors import TableError
-from dragchain.tables.columns import CENTRE, FORCES, POINT, SPIN, VELOCITY
+from dragchain.tables.columns import ATTRACTION, CENTRE, FORCES, POINT, SPIN, VELOCITY
 from dragdeck.dumps.frame import Columns, Frame
-from dragdeck.physics.coulomb import within_friction
+from dragdeck.physics.coulomb import FrictionLimit, within_friction
 
 _NORMAL = ("normal_x", "normal_y", "normal_z")
 
@@ -56,6 +56,8 @@ class WallContacts:
         everywhere if ``workpiece_particles`` holds no velocities.
     overlap_m : (N,) ndarray
         Overlap.
+    attraction_n : (N,) ndarray
+        Magnitude of the attractive force that the contact law includes.
     silent : (N,) ndarray of bool
         Contacts of particles that received no force: they overlap, but damping
         would have made the force attractive and the engine cuts that to zero.
@@ -69,6 +71,7 @@ class WallContacts:
     normal: Floats
     surface_m_s: Floats
     overlap_m: Floats
+    attraction_n: Floats
     silent: NDArray[np.bool_]
 
     def __len__(self) -> int:
@@ -127,7 +130,7 @@ def tangential_force(force_n: Floats, normal: Floats) -> Floats:
 def join_workpiece_frames(
     particles: Sequence[Frame],
     contacts: Sequence[Frame],
-    friction: tuple[float, float],
+    friction: tuple[FrictionLimit, FrictionLimit],
     meshes: Meshes = _ONE_WORKPIECE,
     *,
     merge: bool = True,
@@ -144,8 +147,8 @@ def join_workpiece_frames(
     ----------
     particles, contacts : sequence of Frame
         ``workpiece_particles`` and ``workpiece_contacts`` of the same steps.
-    friction : (float, float)
-        Coefficients of friction of a particle with workpiece and bowl.
+    friction : (FrictionLimit, FrictionLimit)
+        Of particles on workpiece and bowl.
     meshes : Meshes
         Whose contacts are asked for; those on other workpieces are left out.
     merge : bool
@@ -225,16 +228,23 @@ def _rows_of(contacts: Frame, particles: Frame) -> tuple[NDArray[np.bool_], Ints
 
 
 def _within_friction(
-    contacts: Frame, particles: Frame, friction: tuple[float, float], bowl: int
+    contacts: Frame, particles: Frame, friction: tuple[FrictionLimit, FrictionLimit], bowl: int
 ) -> Frame:
     """Add the normals, and cut the evaluated forces on particles that received one."""
     loud, at = _rows_of(contacts, particles)
     forces, points = contacts.vectors(*FORCES), contacts.vectors(*POINT)
     normal = np.zeros_like(points)
     normal[loud] = _unit(particles.vectors(*CENTRE)[at] - points[loud])
-    limit = np.array(friction)[(_on(contacts)[loud] == bowl).astype(int)]
-    forces[loud], _ = within_friction(forces[loud], normal[loud], limit)
-    return contacts.replaced((*FORCES, *_NORMAL), np.column_stack([forces, normal]))
+    radius = np.asarray(particles.columns["radius_m"][at], dtype=np.float64)
+    overlap = np.asarray(contacts.columns["overlap_m"][loud], dtype=np.float64)
+    on_bowl = _on(contacts)[loud] == bowl
+    limit = np.where(on_bowl, friction[1].friction, friction[0].friction)
+    attraction = np.zeros(contacts.rows)
+    both = (one.attraction_n(radius, overlap) for one in friction)
+    attraction[loud] = np.where(~on_bowl, *both)
+    forces[loud], _ = within_friction(forces[loud], normal[loud], limit, attraction[loud])
+    added = (*FORCES, *_NORMAL, ATTRACTION)
+    return contacts.replaced(added, np.column_stack([forces, normal, attraction]))
 
 
 def _merged(contacts: Frame, particles: Frame) -> Frame:
@@ -260,8 +270,9 @@ def _merged(contacts: Frame, particles: Frame) -> Frame:
     mean = sums(slot, overlap[:, None] ** 1.5 * normals, len(kept))
     normal = normals[kept]
     normal[several] = _unit(mean[several])
-    both = np.column_stack([sums(slot, forces, len(kept)), normal])
-    return contacts.take(kept).replaced((*FORCES, *_NORMAL), both)
+    attraction = np.bincount(slot, contacts.columns[ATTRACTION], len(kept))
+    joined = np.column_stack([sums(slot, forces, len(kept)), normal, attraction])
+    return contacts.take(kept).replaced((*FORCES, *_NORMAL, ATTRACTION), joined)
 
 
 def _heads(particle_id: Ints, body: Ints, points: Floats, patch_m2: Floats) -> Ints:
@@ -303,6 +314,7 @@ def _place(contacts: Frame, particles: Frame, above: int) -> WallContacts:
         normal=contacts.vectors(*_NORMAL),
         surface_m_s=surface,
         overlap_m=np.asarray(contacts.columns["overlap_m"], dtype=np.float64),
+        attraction_n=np.asarray(contacts.columns[ATTRACTION], dtype=np.float64),
         silent=~loud,
     )
 

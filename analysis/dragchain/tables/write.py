@@ -11,7 +11,7 @@ import pyarrow as pa
 
 from dragchain.arrays import Floats, Ints
 from dragchain.errors import TableError
-from dragchain.run.case import friction_with
+from dragchain.run.case import attracts, friction_with
 from dragchain.run.kinematics import (
     counted_mask,
     directions,
@@ -25,6 +25,7 @@ from dragchain.run.kinematics import (
 from dragchain.tables.bed import describe_bed
 from dragchain.tables.closure import LIMIT, SHARED_LIMIT, Closure
 from dragchain.tables.columns import (
+    ATTRACTION,
     BODY,
     CONTACTS,
     FORCES,
@@ -211,7 +212,8 @@ def _write_workpiece_contacts(run: Run, file: Path) -> None:
     shared = run.case.bowl.walls == "mesh"
     closure = Closure(limit=SHARED_LIMIT if shared else LIMIT)
     samples = WorkpieceSamples(run.prints("workpiece_force"))
-    with table_writer(file, WORKPIECE_CONTACTS) as table:
+    columns = WORKPIECE_CONTACTS + ((ATTRACTION,) if attracts(run.case) else ())
+    with table_writer(file, columns) as table:
         for frames in run.workpiece_frames():
             of_step = [samples.from_start(step) for step in frames.step.tolist()]
             places, at = np.array([one.ref_m for one in of_step]), frames.workpiece_at
@@ -269,6 +271,7 @@ def workpiece_contact_rows(
         "azimuth_rad": wrap_angle(np.arctan2(y, x) - heading),
         "depth_m": needed(case.surface_m, "surface_m") - contacts.point_m[:, 2],
         "in_statistics": counted_mask(steps, case),
+        **({ATTRACTION: contacts.attraction_n} if attracts(case) else {}),
     }
 
 
@@ -291,7 +294,7 @@ def _write_particles(run: Run, file: Path) -> None:
 def _write_contacts(run: Run, file: Path) -> None:
     bowl_radius = run.case.bowl.radius_m
     particles, pairs = run.frames("particles"), run.workpiece_pairs()
-    friction, corrected = friction_with(run.case, "media"), np.zeros(8)
+    friction, corrected = friction_with(run.case, "particle"), np.zeros(8)
     with table_writer(file, CONTACTS) as table:
         for frame in run.frames("contacts"):
             workpiece = _frame_at(pairs, frame.step, "workpiece_contacts").join()
@@ -300,7 +303,7 @@ def _write_contacts(run: Run, file: Path) -> None:
             rows = contact_rows(beside, frame, *touching, bowl_radius, friction)
             corrected += count_corrections(rows, workpiece.merged)
             table.write(_contact_columns(frame.step, rows, run.case))
-    Corrections.of(friction, corrected).write(run.table("corrections.json"))
+    Corrections.of(friction.friction, corrected).write(run.table("corrections.json"))
 
 
 class _Stepped(Protocol):

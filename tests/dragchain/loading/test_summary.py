@@ -243,9 +243,8 @@ def test_a_run_without_a_workpiece_is_refused(tmp_path: Path) -> None:
 
 def test_missing_friction_is_named(run: Path) -> None:
     case = load_case(run)
-    inputs = {k: v for k, v in case.inputs.items() if "friction" not in k}
-    with pytest.raises(TableError, match=r"pairs\.ceramic-steel\.friction"):
-        surfaces(changed(case, inputs=inputs))
+    with pytest.raises(TableError, match=r"contact_moduli\.workpiece"):
+        surfaces(changed(case, contact_moduli={}))
 
 
 def test_the_contact_time_is_that_of_hertz(run: Path) -> None:
@@ -320,7 +319,7 @@ def test_a_particle_that_moves_with_the_workpiece_does_not_slip(
         particle_id=np.array([1]), facet_id=np.array([0]), point_m=point[None],
         force_n=np.array([[-1.0, 0, 0]]), evaluated_n=np.zeros((1, 3)),
         normal=np.array([[-1.0, 0, 0]]), surface_m_s=surface[None],
-        overlap_m=np.zeros(1), silent=np.array([False]),
+        overlap_m=np.zeros(1), attraction_n=np.zeros(1), silent=np.array([False]),
     )  # fmt: skip
     at = np.array([200]), contacts, reference[None]
     rows = workpiece_contact_rows(*at, case)

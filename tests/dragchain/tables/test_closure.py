@@ -17,6 +17,7 @@ def contacts(forces, evaluated=None, silent=None):
         normal=np.zeros((count, 3)),
         surface_m_s=np.zeros((count, 3)),
         overlap_m=np.zeros(count),
+        attraction_n=np.zeros(count),
         silent=np.zeros(count, dtype=bool) if silent is None else np.array(silent),
     )
 

@@ -28,14 +28,14 @@ from dragchain.loading.samples import BODY as BODY_IMPULSE
 from dragchain.loading.write import write_loading
 from dragchain.report.study_report import write_study_report
 from dragchain.tables import parquet
-from dragchain.tables.columns import BODY, columns_of, descriptions, unit_of
+from dragchain.tables.columns import ATTRACTION, BODY, columns_of, descriptions, unit_of
 
 TABLES = (
     *("workpiece_force", "workpiece_contacts", "particles", "contacts", "network", "chains"),
     *("clusters", "facets", "contact_events", "impacts", "thermo", "summary"),
 )
-SOME_RUNS_ONLY = {*BODY, *BODY_IMPULSE, "fastest_particle_m_s"}
-"""Columns of workpieces that spin, and one that the small run does not write."""
+SOME_RUNS_ONLY = {*BODY, *BODY_IMPULSE, ATTRACTION, "fastest_particle_m_s"}
+"""Columns of workpieces that spin or attract, and one that the small run does not write."""
 
 
 def write_drop(folder: Path) -> None:

@@ -5,6 +5,7 @@ from dragchain.errors import TableError
 from dragchain.tables.network_contacts import KINDS, Corrections, contact_rows, count_corrections
 from dragchain.tables.workpiece_contacts import WallContacts
 from dragdeck.dumps.frame import Frame
+from dragdeck.physics.coulomb import FrictionLimit
 
 PARTICLES = (
     *("particle_id", "x_m", "y_m", "z_m", "radius_m"),
@@ -30,6 +31,7 @@ def wall(points=(), forces=(), normals=(), silent=()):
         normal=np.array(normals, dtype=float).reshape(-1, 3),
         surface_m_s=np.zeros((count, 3)),
         overlap_m=np.full(count, 1e-6),
+        attraction_n=np.zeros(count),
         silent=np.array(silent, dtype=bool),
     )
 
@@ -41,7 +43,7 @@ def rows_of(particles, contacts=(), workpiece=None, bowl=None, radius=10.0, fric
         workpiece or wall(),
         bowl or wall(),
         radius,
-        friction,
+        FrictionLimit(friction, wall=False),
     )
 
 

@@ -11,6 +11,7 @@ from dragchain.tables.workpiece_contacts import (
     join_workpiece_frames,
 )
 from dragdeck.dumps.frame import Frame
+from dragdeck.physics.coulomb import FrictionLimit
 
 PARTICLES = ("particle_id", "x_m", "y_m", "z_m", "radius_m", "force_x_n", "force_y_n", "force_z_n")
 CONTACTS = (
@@ -28,8 +29,12 @@ def frame(names, rows, step=100):
     return Frame(step, columns)
 
 
+def limits(friction: float) -> tuple[FrictionLimit, FrictionLimit]:
+    return FrictionLimit(friction), FrictionLimit(friction)
+
+
 def joined_of(particles: Frame, contacts: Frame, friction: float = 10.0) -> WorkpieceFrames:
-    return join_workpiece_frames([particles], [contacts], (friction, friction))
+    return join_workpiece_frames([particles], [contacts], limits(friction))
 
 
 def test_a_single_contact_takes_the_applied_force() -> None:
@@ -152,7 +157,7 @@ def test_a_batch_has_the_contacts_of_each_of_its_frames() -> None:
         (frame(PARTICLES, [[6, 3, 0, 0, 1, 2, 0, 1]]), frame(CONTACTS, [])),
         (over_edge, frame(CONTACTS, EDGE[::-1])),
     ]
-    joined = join_workpiece_frames(*zip(*batch, strict=True), (0.5, 0.5))
+    joined = join_workpiece_frames(*zip(*batch, strict=True), limits(0.5))
     alone = [joined_of(*pair, friction=0.5) for pair in batch]
     for name in WallContacts.__dataclass_fields__:
         parts = [getattr(one.workpiece, name) for one in alone]

@@ -6,14 +6,19 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from scipy.optimize import brentq
 
+from dragchain.run.run_parts import iter_frames
 from dragdeck.cases.case import Case
-from dragdeck.decks.outputs import ColumnsFile
+from dragdeck.decks.outputs import ColumnsFile, load_outputs
 from dragdeck.decks.render import deck_text, write_run
 from dragdeck.decks.templates import environment
 from dragdeck.engine.log import read_samples
 from dragdeck.engine.run_folder import run
+from dragdeck.physics.contact_mechanics import effective_modulus, pull_off_force
+from dragdeck.physics.coulomb import Floats, FrictionLimit
 from dragdeck.project import Project
 from dragdeck.scenes.filling import FILLING, filling_scene
 from dragdeck.scenes.process import SCENES, process_scene
@@ -67,7 +72,10 @@ def test_particles_and_walls_share_the_contact_model(
         laws = re.findall(r"^(?:pair_style|fix .* wall/gran) .*$", text, re.MULTILINE)
         assert len(laws) > 2
         assert all(row.model in law and law.endswith(row.settings) for law in laws)
-        assert re.search(rf"{row.engine} peratomtypepair 2 (?:0\.1 ?){{4}}$", text, re.MULTILINE)
+        simulated = USED * scene.deck.materials.youngs_modulus_scale**row.modulus_power
+        values = re.search(rf"{row.engine} peratomtypepair 2 (.*)$", text, re.MULTILINE)
+        assert values
+        assert [*map(float, values[1].split())] == pytest.approx(4 * [simulated], rel=1e-9)
 
 
 @pytest.mark.parametrize("name", OPTIONAL)
@@ -103,13 +111,22 @@ def test_what_a_contact_law_adds_to_the_force_that_limits_friction(
 def test_a_coefficient_says_whether_it_adds_a_force(name: str) -> None:
     law = f"gran model {contact_model([Pair(restitution=0.9, friction=0.3)])}"
     row = coefficients()[name]
-    assert bool(added_forces(f"{law} {row.model}".split())) == row.adds_force
+    assert bool(added_forces(f"{law} {row.model}".split())) == (row.attraction is not None)
+
+
+def _linear(value: float, radius: Floats, overlap: Floats, wall: bool) -> Floats:
+    return value * overlap
 
 
 def test_a_coefficient_that_adds_a_force_is_found_in_a_script(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    row = Coefficient("liquid", "liquid", "surface wet", adds_force=True)
+    row = Coefficient(
+        "liquid",
+        "liquid",
+        "surface wet",
+        attraction=_linear,
+    )
     monkeypatch.setattr(contact_law, "coefficients", lambda: {"liquid": row})
     assert added_forces(["gran", "model", "hertz", "surface", "wet"]) == ["surface wet"]
 
@@ -160,3 +177,77 @@ def test_a_rolling_particle_slows_down_by_five_sevenths_of_the_coefficient(
     first, last = (math.sqrt(2 * samples[i].kinetic_energy_j / mass) for i in (2, -1))
     slowing = (first - last) / ((samples[-1].step - samples[2].step) * step)
     assert slowing == pytest.approx(5 / 7 * mu * gravity, rel=0.01)
+
+
+@pytest.mark.parametrize("name", [name for name, row in coefficients().items() if row.attraction])
+def test_a_softened_pair_keeps_its_largest_tension(name: str) -> None:
+    """The tension falls with the square of the moduli at the same coefficient."""
+    pair = Pair.model_validate({"restitution": 0.5, "friction": 0.5, name: 1e5})
+    for wall in (True, False):
+        tensions = [
+            pull_off_force(
+                float(
+                    FrictionLimit(0.5, pair.softened(scale).attractive(), wall).attraction_n(
+                        np.array([0.003]), np.array([1.0])
+                    )[0]
+                ),
+                scale * 1e9,
+                0.003,
+            )
+            for scale in (1.0, 1e-3)
+        ]
+        assert tensions[0] == pytest.approx(tensions[1]) != 0.0
+
+
+@pytest.mark.engine
+@pytest.mark.parametrize("wall", [True, False], ids=["wall", "pair"])
+@pytest.mark.parametrize("share", [0.97, 1.03])
+def test_a_cohesive_contact_opens_at_its_tension(
+    share: float, wall: bool, tmp_path: Path, project: Project
+) -> None:
+    """A hanging particle, alone or below another one, stays up to the largest tension."""
+    radius, density = 0.003, 2500.0
+    glass = Material(youngs_modulus_pa=1e8, poissons_ratio=0.2, density_kg_m3=density)
+    modulus = effective_modulus(glass, glass)
+    mass = density * 4 / 3 * math.pi * radius**3
+    weaker, stronger = (
+        Pair(restitution=0.2, friction=0.5, cohesion_j_m3=density) for density in (2e5, 1.2e6)
+    )
+    reduced = radius if wall else radius / 2
+    attraction = FrictionLimit(0.5, weaker.attractive(), wall).attraction_n
+    slope = float(attraction(np.array([reduced]), np.array([1.0]))[0])
+    tension = pull_off_force(slope, modulus, reduced)
+
+    def hanging(slope_n_m: float, reduced_m: float, pull_n: float) -> float:
+        """The stable overlap of a contact under a pull, or that of the largest tension."""
+        opening = (slope_n_m / (2 * modulus * math.sqrt(reduced_m))) ** 2
+
+        def held(overlap: float) -> float:
+            return slope_n_m * overlap - 4 / 3 * modulus * math.sqrt(reduced_m) * overlap**1.5
+
+        return float(brentq(lambda d: held(d) - pull_n, opening, 9 / 4 * opening))
+
+    pull = share * tension
+    strong = FrictionLimit(0.5, stronger.attractive()).attraction_n
+    strong_slope = float(strong(np.array([radius]), np.array([1.0]))[0])
+    overlap = hanging(slope, reduced, min(pull, 0.999 * tension))
+    above = 0.0 if wall else 2 * radius - hanging(strong_slope, radius, 2 * pull)
+    distance = radius if wall else 2 * radius
+    place = above + distance - overlap
+    places = [place] if wall else [above - radius, place - radius]
+    bodies = [PlacedSphere(1, radius, (0, 0, z)) for z in places]
+    scene = collide_scene(
+        experiment(
+            "hanging", 1, "A hanging particle", [], types=[("particle", glass), ("plane", glass)],
+            pairs={(1, 1): weaker, (1, 2): weaker if wall else stronger}, bodies=bodies,
+            walls=[Wall("ceiling", 2, "zplane 0.0")], timestep_s=1e-6, series="", vary="",
+            contacts=[], gravity_m_s2=(0, 0, pull / mass), steps_per_contact=1, steps=60_000,
+            period=20_000,
+        )
+    )  # fmt: skip
+    folder = tmp_path / "hanging"
+    write_run(scene, folder, environment(project.templates))
+    assert run(folder, lambda line: None).state == "complete"
+    frames = list(iter_frames(folder, load_outputs(folder)["bodies"]))
+    moved = frames[-1].columns["z_m"].max() - places[-1]
+    assert (moved < 0.01 * radius) == (share < 1)

@@ -1,7 +1,7 @@
 """A scene as data: what its input script and its ``case.json`` are made from."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Generic, TypeVar
 
 from dragdeck import __version__
@@ -9,6 +9,7 @@ from dragdeck.decks.outputs import Output
 from dragdeck.errors import Caution
 from dragdeck.physics.contact_mechanics import ENGINE_HARD_PA, ENGINE_NEIGHBOURS
 from dragdeck.physics.domain_split import ENGINE_CHOOSES
+from dragdeck.physics.rounding import round_to
 from dragdeck.records.run import CaseFile
 from dragdeck.study.contact_law import Pair, contact_model, contact_settings, present
 
@@ -20,6 +21,7 @@ class PairTable:
     name: str
     engine: str
     values: Sequence[float]
+    modulus_power: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,14 @@ class ContactLaw:
     tables: Sequence[PairTable]
     model: str
     settings: Sequence[str]
+
+
+@dataclass(frozen=True)
+class Properties:
+    """Young's moduli, one per type, and the coefficients that go with them."""
+
+    youngs_moduli_pa: Sequence[float]
+    tables: Sequence[PairTable]
 
 
 @dataclass(frozen=True)
@@ -62,12 +72,25 @@ class Materials:
     law: ContactLaw
     youngs_modulus_scale: float = 1.0
 
+    def softened(self, scale: float) -> Properties:
+        """What changes if the Young's moduli are multiplied by a further factor."""
+        moduli = [round_to(scale * modulus, 12) for modulus in self.youngs_moduli_pa]
+        tables = [
+            replace(
+                table,
+                values=[round_to(scale**table.modulus_power * one, 12) for one in table.values],
+            )
+            for table in self.law.tables
+            if table.modulus_power
+        ]
+        return Properties(moduli, tables)
+
 
 def contact_law(pairs: Sequence[Sequence[Pair]]) -> ContactLaw:
     """The contact law of a square table of pairs: a row and a column for each type."""
     every = [pair for row in pairs for pair in row]
     tables = [
-        PairTable(name, row.engine, [getattr(pair, name) for pair in every])
+        PairTable(name, row.engine, [getattr(pair, name) for pair in every], row.modulus_power)
         for name, row in present(every).items()
     ]
     return ContactLaw(tables, contact_model(every), contact_settings(every))

@@ -132,7 +132,9 @@ def _of_its_law(scene: AnyScene, templates: jinja2.Environment) -> dict[str, tup
     text, original = _rendered(scene, templates), _rendered(scene, without(templates))
     known = law_commands(original)
     changed = tuple(command for command in law_commands(text) if command not in known)
-    return {"added_forces": tuple(deck_added_forces(text)), "changed_law": changed}
+    known = deck_added_forces(original)  # each has its formula in dragdeck.study.contact_law
+    added = tuple(force for force in deck_added_forces(text) if force not in known or changed)
+    return {"added_forces": added, "changed_law": changed}
 
 
 def write_workpiece(

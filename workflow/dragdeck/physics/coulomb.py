@@ -1,15 +1,57 @@
 """Coulomb's limit of friction, to which the forces in dumps of contacts are cut."""
 
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
 import numpy as np
 from numpy.typing import NDArray
+
+from dragdeck.study.contact_law import coefficients
 
 Floats = NDArray[np.float64]
 
 
+@dataclass(frozen=True)
+class FrictionLimit:
+    """What limits the tangential forces of particles on one body.
+
+    Attributes
+    ----------
+    friction : float
+        Coefficient of friction.
+    attractive : mapping
+        Coefficients that add an attractive force by name, as simulated.
+    wall : bool
+        Whether the body is a wall; otherwise it is another particle.
+    """
+
+    friction: float
+    attractive: Mapping[str, float] = field(default_factory=dict)
+    wall: bool = True
+
+    def attraction_n(self, reduced_radius_m: Floats, overlap_m: Floats) -> Floats:
+        """Magnitude of the attractive forces of (N,) contacts, N.
+
+        The reduced radius R* is that of the particle at a wall.
+        """
+        total = np.zeros_like(overlap_m)
+        for name, value in self.attractive.items():
+            attraction = coefficients()[name].attraction
+            assert attraction is not None, name
+            total += attraction(value, reduced_radius_m, np.maximum(overlap_m, 0.0), self.wall)
+        return total
+
+
 def within_friction(
-    force_n: Floats, normal: Floats, friction: Floats | float
+    force_n: Floats,
+    normal: Floats,
+    friction: Floats | float,
+    attraction_n: Floats | float = 0.0,
 ) -> tuple[Floats, Floats]:
-    """Cut the tangential part of forces to friction times the magnitude of the normal part.
+    """Cut the tangential part of forces to friction times the repulsive normal force.
+
+    The repulsive force is the normal part of the force as written, plus the attraction which the
+    contact law subtracts from it.
 
     LIGGGHTS evaluates the contact law again when it writes a contact. In the step the tangential
     spring of a sliding contact was shortened to the limit; the second evaluation finds it within
@@ -19,9 +61,11 @@ def within_friction(
     Parameters
     ----------
     force_n, normal : (N, 3) ndarray
-        Forces as written, and unit normals of the contacts.
+        Forces as written, and unit normals of the contacts in the direction of repulsion.
     friction : float or (N,) ndarray
         Coefficients of friction.
+    attraction_n : float or (N,) ndarray
+        Magnitudes of the attractive forces, N.
 
     Returns
     -------
@@ -33,6 +77,6 @@ def within_friction(
     along = np.einsum("ij,ij->i", force_n, normal)
     tangential = force_n - along[:, None] * normal
     size = np.linalg.norm(tangential, axis=1)
-    removed = np.maximum(size - friction * np.abs(along), 0.0)
+    removed = np.maximum(size - friction * np.abs(along + attraction_n), 0.0)
     fraction = np.divide(removed, size, out=np.zeros_like(size), where=size > 0.0)
     return force_n - fraction[:, None] * tangential, removed

@@ -149,6 +149,9 @@ class CaseOfRun(CaseFile):
     contact_moduli : mapping
         Contact constants of a particle with a ``particle``, the ``bowl`` and the ``workpiece``,
         softened as the run is.
+    attractive : mapping
+        By the same names, coefficients that add an attractive force, as simulated; absent if the
+        contact law has none.
     unsafe_timestep : str or None
         Why a step of the process beyond the stable one is accepted.
     fidelity : FidelityOfRun
@@ -187,6 +190,7 @@ class CaseOfRun(CaseFile):
     media: MediaOfRun
     bowl: BowlOfRun
     contact_moduli: Mapping[str, ContactConstants]
+    attractive: Mapping[str, Mapping[str, float]] = omitted({})
     assumptions: tuple[AssumptionOfRun, ...]
     reference: Reference | None
     unsafe_timestep: str | None = None

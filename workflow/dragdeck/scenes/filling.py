@@ -5,6 +5,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
+import numpy as np
+
 from dragdeck.cases.bed import (
     JUST_BEYOND,
     bed_radii,
@@ -31,7 +33,9 @@ from dragdeck.physics.contact_mechanics import (
     fall_energy,
     fall_speed,
     particle_mass,
+    pull_off_force,
 )
+from dragdeck.physics.coulomb import FrictionLimit
 from dragdeck.physics.domain_split import FilledBowl, Split, rank_warnings, split
 from dragdeck.physics.packing import Bed, Particles, pour
 from dragdeck.physics.rounding import rounded
@@ -244,6 +248,7 @@ def filling_cautions(case: Case) -> Iterator[Caution]:
     study = case.study
     yield from rank_warnings(rank_split(case))
     yield from _overlap_caution(study)
+    yield from _cohesion_caution(study)
     particles = first_particles(study)
     speed = math.hypot(particles.fastest_m_s, _arrival_speed(study, particles))
     yield from outrun(study, "filling_timestep_fraction", "particles fall", speed)
@@ -263,6 +268,22 @@ def _overlap_caution(study: Study) -> Iterator[Caution]:
         + (f"the packing is too dense; {remedy}" if scale < 1 else "too much for Hertz's theory"),
         {"youngs_modulus_scale": stiffer} if scale < 1 else {},
     )
+
+
+def _cohesion_caution(study: Study) -> Iterator[Caution]:
+    """A warning where an attraction holds more than a particle's weight."""
+    particle, radius = particle_material(study), study.media.radius_mean_m
+    pair = study.pair(study.media.material, study.media.material)
+    one, half = np.ones(1), np.full(1, radius / 2)
+    slope = float(FrictionLimit(0.0, pair.attractive(), wall=False).attraction_n(half, one)[0])
+    largest = pull_off_force(slope, effective_modulus(particle, particle), radius / 2)
+    bond = largest / (particle_mass(particle, radius) * study.gravity_m_s2)
+    if bond > 1:
+        yield Caution(
+            "cohesion",
+            f"cohesion holds {bond:.3g} times the weight of a mean particle (Bond number); above 1 "
+            "a bed fills loosely or bridges, and may not come to rest",
+        )
 
 
 def bed_limits(study: Study, top_m: float, speed_m_s: float) -> RunLimits:

@@ -6,13 +6,13 @@ raised in stages while the drag goes on, the bed relaxes, and the statistics beg
 """
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 from dragdeck.cases.bed import bed_timestep
 from dragdeck.cases.case import Case, Stretch, of_each_workpiece
+from dragdeck.decks.deck import Materials
 from dragdeck.errors import InputError
-from dragdeck.physics.rounding import round_to
 from dragdeck.scenes.motion import Stop, driven, output_periods
 from dragdeck.study.drive import Drive
 from dragdeck.study.model import SoftStart, Study
@@ -170,9 +170,7 @@ def step_at(fraction: float, drag: Drive) -> int:
     return drag.start + round(fraction * (drag.end - drag.start))
 
 
-def stops(
-    case: Case, drag: Drive, steps: Covered, youngs_moduli_pa: Sequence[float]
-) -> Iterator[Stop]:
+def stops(case: Case, drag: Drive, steps: Covered, materials: Materials) -> Iterator[Stop]:
     """Where the engine stops in the drag: at marks, where the moduli change, and at the end.
 
     Parameters
@@ -181,8 +179,8 @@ def stops(
         As `led` returns it.
     drag : Drive
     steps : Covered
-    youngs_moduli_pa : sequence of float
-        Of the run, one per type.
+    materials : Materials
+        Of the run.
     """
     if steps.entry:
         chosen = case.study.chosen_fidelity()
@@ -190,8 +188,7 @@ def stops(
         every = (steps.ramp_end - steps.entry) // RAMP_STAGES
         for stage in range(1, RAMP_STAGES + 1):
             softer = first ** (1 - stage / RAMP_STAGES)
-            moduli = [round_to(softer * modulus, 12) for modulus in youngs_moduli_pa]
-            yield Stop(steps.entry + stage * every, moduli, first=stage == 1)
+            yield Stop(steps.entry + stage * every, materials.softened(softer), first=stage == 1)
     ends = [step_at(mark, drag) for mark in case.stretch.marks]
     for number, end in enumerate(ends, 1):
         yield Stop(end, writes=number == 1, mark=mark_file(number))

@@ -15,7 +15,7 @@ import numpy as np
 
 from dragdeck.cases.bed import bed_timestep
 from dragdeck.cases.case import Case
-from dragdeck.decks.deck import Deck
+from dragdeck.decks.deck import Deck, Properties
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import round_to
 from dragdeck.study.drive import Drive, EngineMotion, Floats, Rotation, rotation_vector
@@ -73,8 +73,8 @@ class Stop:
     Attributes
     ----------
     step : int
-    youngs_moduli_pa : sequence of float
-        Of each type from here on; empty if they stay.
+    properties : Properties or None
+        Of the materials from here on; None if they stay.
     first : bool
         Whether the run of a lead begins here.
     writes : bool
@@ -84,7 +84,7 @@ class Stop:
     """
 
     step: int
-    youngs_moduli_pa: Sequence[float] = ()
+    properties: Properties | None = None
     first: bool = False
     writes: bool = False
     mark: str = ""

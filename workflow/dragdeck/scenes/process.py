@@ -122,7 +122,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         bowl_rad_s=courses[0].driven.bowl_rad_s,
         workpiece_type=types.index(study.workpiece.material) + 1,
         workpieces=moved,
-        stops=list(stops(whole, drag, steps, materials.youngs_moduli_pa)),
+        stops=list(stops(whole, drag, steps, materials)),
         entry_step=steps.entry,
     )
     number = max(case.number, 1) - 1

@@ -177,6 +177,7 @@ def case_of_study(
             walls="primitive" if study.bowl_facet_size_m is None else "mesh",
         ),
         "contact_moduli": _contact_moduli(study, fidelity.youngs_modulus_scale),
+        "attractive": _attractive(study, fidelity.youngs_modulus_scale),
         "assumptions": _assumptions(study),
         "reference": study.reference,
         "versions": {"dragdeck": __version__},
@@ -184,13 +185,25 @@ def case_of_study(
     return kind(**{**entries, **own})
 
 
-def _contact_moduli(study: Study, scale: float) -> dict[str, ContactConstants]:
-    particle = particle_material(study)
-    others = {
+def _bodies(study: Study) -> dict[str, str]:
+    """The material of what a particle touches."""
+    return {
         "particle": study.media.material,
         "bowl": study.bowl.material,
         "workpiece": study.workpiece.material,
     }
+
+
+def _attractive(study: Study, scale: float) -> dict[str, dict[str, float]]:
+    pairs = {
+        body: study.pair(study.media.material, other) for body, other in _bodies(study).items()
+    }
+    found = {body: pair.softened(scale).attractive() for body, pair in pairs.items()}
+    return {body: values for body, values in found.items() if values}
+
+
+def _contact_moduli(study: Study, scale: float) -> dict[str, ContactConstants]:
+    particle = particle_material(study)
     return {
         name: ContactConstants(
             modulus_pa=effective_modulus(particle, study.materials[other], scale),
@@ -198,7 +211,7 @@ def _contact_moduli(study: Study, scale: float) -> dict[str, ContactConstants]:
             restitution=study.pair(study.media.material, other).restitution,
             friction=study.pair(study.media.material, other).friction,
         )
-        for name, other in others.items()
+        for name, other in _bodies(study).items()
     }
 
 
@@ -247,7 +260,7 @@ def material_table(
     for name, modulus in zip(names, moduli, strict=True):
         _check_modulus(name, modulus, scale, case)
     size = range(len(names))
-    with_particle = [study.pair(names[0], name) for name in names]
+    with_particle = [study.pair(names[0], name).softened(scale) for name in names]
     if one_particle:
         with_particle[0] = with_particle[-1]
     # pairs that never touch repeat one that does

@@ -6,18 +6,26 @@ properties and model keywords for particles and walls alike, run ids, what `expl
 numbers that scenes are compared by, and the range of the advisor.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
 from typing import Annotated, Literal
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from dragdeck.study.base import Model, Number
 
 _PUSHING = ("hertz", "hertz/stiffness", "hooke", "hooke/stiffness")
 """Normal models whose force, in LIGGGHTS, is the one to which Coulomb's limit refers."""
+
+_Floats = NDArray[np.float64]
+Attraction = Callable[[float, _Floats, _Floats, bool], _Floats]
+"""Attractive force of (N,) contacts, N, from the coefficient, reduced radii and overlaps, m, and
+whether the other body is a wall."""
 
 _BASE_MODEL = "hertz tangential history"
 """Hertz-Mindlin with the history of the tangential spring (LIGGGHTS: ``pair gran``)."""
@@ -40,9 +48,11 @@ class Coefficient:
     compared : {"each", "lowest"}
         Which value of a scene must lie within the measured range: that of each of the pairs
         particle-particle and particle-workpiece, or the lowest of all pairs.
-    adds_force : bool
-        Whether its model adds a normal force, such as cohesion. LIGGGHTS limits friction by the
-        force without it, so that Coulomb's limit does not follow from the contact force.
+    attraction : callable or None
+        The attractive force that its model subtracts from the normal force, as cohesion does.
+        LIGGGHTS limits friction by the force without it.
+    modulus_power : float
+        With moduli times s, it is simulated times s to this power.
     """
 
     engine: str
@@ -50,7 +60,16 @@ class Coefficient:
     model: str = ""
     settings: str = ""
     compared: Literal["each", "lowest"] = "each"
-    adds_force: bool = False
+    attraction: Attraction | None = None
+    modulus_power: float = 0.0
+
+
+def _sjkr2(density_j_m3: float, reduced_m: _Floats, overlap_m: _Floats, wall: bool) -> _Floats:
+    """Cohesion of LIGGGHTS's model ``sjkr2``: a density times the area 2 pi d (2 R*).
+
+    Its area at a wall is half of that, 2 pi d R.
+    """
+    return (2 if wall else 4) * math.pi * density_j_m3 * reduced_m * overlap_m
 
 
 class Pair(Model):
@@ -77,6 +96,31 @@ class Pair(Model):
         Coefficient("coefficientRollingFriction", "rolling friction", "rolling_friction epsd2",
                     "torsionTorque on"),
     ] = 0.0  # fmt: skip
+    cohesion_j_m3: Annotated[
+        Number,
+        Field(ge=0, description="cohesion energy density: attractive force / contact area",
+              exclude_if=lambda value: value == 0),
+        Coefficient("cohesionEnergyDensity", "cohesion", "cohesion sjkr2", attraction=_sjkr2,
+                    modulus_power=2 / 3),
+    ] = 0.0  # fmt: skip
+
+    def softened(self, scale: float) -> "Pair":
+        """The pair as it is simulated with moduli times `scale`."""
+        powers = {
+            name: row.modulus_power for name, row in coefficients().items() if row.modulus_power
+        }
+        return self.model_copy(
+            update={
+                name: float(f"{getattr(self, name) * scale**power:.12g}")
+                for name, power in powers.items()
+                if name not in self.absent()
+            }
+        )
+
+    def attractive(self) -> dict[str, float]:
+        """Coefficients that add an attractive force."""
+        rows = present([self]).items()
+        return {name: getattr(self, name) for name, row in rows if row.attraction}
 
     def absent(self) -> set[str]:
         """Coefficients at their default."""
@@ -144,7 +188,9 @@ def added_forces(law: Sequence[str]) -> list[str]:
     named = dict(pairwise(models))
     if named.get("cohesion", "off") != "off":
         found.append(f"cohesion {named['cohesion']}")
-    rows = (row.model for row in coefficients().values() if row.adds_force)
+    if named.get("tangential_reduce", "off") != "off":
+        found.append("tangential_reduce on")
+    rows = (row.model for row in coefficients().values() if row.attraction)
     found += [model for model in rows if model in " ".join(words) and model not in found]
     return found
 

@@ -84,6 +84,7 @@ _RANGES = {
     "materials.*.density_kg_m3": _Range(50, 300, 2.3e4, 3e4, {"g/cm3": 1e3}),
     "pairs.*.restitution": _Range(0.05, 0.05, 1, 1, {}),
     "pairs.*friction": _Range(0, 0, 2, 10, {}),
+    "pairs.*.cohesion_j_m3": _Range(0, 0, 1e9, 1e12, {"kJ/m3": 1e3, "MJ/m3": 1e6}),
     "gravity_m_s2": _Range(0.01, 1, 30, 500, {"cm/s2": 0.01, "mm/s2": 1e-3}),
     "outputs.*_hz": _Range(1e-3, 0.1, 2e5, 1e8, _RATE),
     "outputs.n_checkpoints": _Range(0, 0, 1000, 1000, {}),
