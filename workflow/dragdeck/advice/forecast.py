@@ -46,13 +46,6 @@ def question(case: Case, tolerance: float | None, quantity: str | None) -> Toler
     return Tolerance.model_validate({**base.model_dump(), **given})
 
 
-def roles(advice: Advice) -> Iterator[tuple[str, Option]]:
-    """Roles and options of an advice, each option once."""
-    yield "advised", advice.chosen
-    if advice.reference != advice.chosen:
-        yield "reference", advice.reference
-
-
 def advised_case(case: Case, advice: Advice, results: Path) -> AdvisedCase:
     """A case of ``advice.json``: its options with their steps and wall time.
 
