@@ -15,7 +15,7 @@ rule measure_costs:
         prints=1,
     params:
         fidelity=WORK.fidelity_option,
-        rounds=lambda wildcards: WORK.points.cost_rounds,
+        rounds=lambda wildcards: WORK.points_of(PLAN).cost_rounds,
         cases=[scene.digest(CASES[0]) for scene in SCENES.values()],
         source=source_hash("dragdeck.engine.batch", "dragdeck.project", "dragchain.tables.write"),
     shell:
@@ -27,7 +27,9 @@ rule write_tradeoff:
     input:
         measures=lambda wildcards: WORK.every_point("measures.json"),
         drops=lambda wildcards: WORK.every_drop_point("tables/impacts.parquet"),
-        costs=lambda wildcards: [WORK.of_tradeoff("costs.json")] if WORK.points.cost_rounds else [],
+        costs=lambda wildcards: (
+            [WORK.of_tradeoff("costs.json")] if WORK.points_of(PLAN).cost_rounds else []
+        ),
         templates=WORK.page_templates("tradeoff/tradeoff.html.j2"),
     output:
         page=report(
