@@ -19,10 +19,9 @@ from dragdeck.campaigns.restitution_drops import confirmation, run_drops, sweep
 from dragdeck.cases.case import Case
 from dragdeck.cases.ranks import check_ranks, cores_here
 from dragdeck.decks.render import (
-    deck_added_forces,
-    deck_text,
     effective,
     idle,
+    of_its_law,
     overriding,
     write_run,
     write_workpiece,
@@ -116,13 +115,13 @@ class _Findings:
         case = next(iter(runs.values()))
         try:
             scene = _built(kind, case, None)
-            script = deck_text(scene, self.templates)
+            unknown = _friction_unknown(scene, self.templates)
         except InputError as error:
             self.errors.append(error)
             raise
         self.overriding |= overriding(scene, self.templates)
         self.effective |= effective(scene, self.templates)
-        for text in dict.fromkeys([*map(str, scene.warnings), *_friction_unknown(script)]):
+        for text in dict.fromkeys([*map(str, scene.warnings), *unknown]):
             names = self.warnings.setdefault(text, [])
             names += [case.name] if case.name not in names else []
         if kind.needs_bed and (text := not_corrected(case)):
@@ -143,9 +142,9 @@ class _Findings:
             print(f"{_first(names)}\n  {text}")
 
 
-def _friction_unknown(script: str) -> list[str]:
-    """A warning that contacts of a run cannot be analysed, if its contact law adds a force."""
-    added = deck_added_forces(script)
+def _friction_unknown(scene: StudyScene, templates: jinja2.Environment) -> list[str]:
+    """A warning that contacts of a run cannot be analysed, if a template adds a force."""
+    added = of_its_law(scene, templates)["added_forces"]
     if not added:
         return []
     return [
@@ -352,7 +351,7 @@ def render(
     templates = environment(project.templates, study_templates(case))
     built = _built(kind, case, _bed(kind, packing))
     _check_overrides(built, every, templates)
-    for warning in (*built.warnings, *_friction_unknown(deck_text(built, templates))):
+    for warning in (*built.warnings, *_friction_unknown(built, templates)):
         say(f"warning: {warning}")
     folder = project.run_folder(case, kind, of_plan=plan is not None)
     if case.number > 1:

@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 from dragchain.run.run_parts import iter_frames
 from dragdeck.cases.case import Case
 from dragdeck.decks.outputs import ColumnsFile, load_outputs
-from dragdeck.decks.render import deck_text, write_run
+from dragdeck.decks.render import deck_text, of_its_law, write_run
 from dragdeck.decks.templates import environment
 from dragdeck.engine.log import read_samples
 from dragdeck.engine.run_folder import run
@@ -76,6 +76,14 @@ def test_particles_and_walls_share_the_contact_model(
         values = re.search(rf"{row.engine} peratomtypepair 2 (.*)$", text, re.MULTILINE)
         assert values
         assert [*map(float, values[1].split())] == pytest.approx(4 * [simulated], rel=1e-9)
+
+
+def test_cohesion_of_the_study_is_no_unknown_force(
+    small: Small, write_study: Write, project: Project
+) -> None:
+    case = with_coefficient(small, write_study, "cohesion_j_m3", USED)
+    for scene in (filling_scene(case), process_scene(case)):
+        assert of_its_law(scene, environment(project.templates))["added_forces"] == ()
 
 
 @pytest.mark.parametrize("name", OPTIONAL)
