@@ -7,8 +7,9 @@ rule advise:
     priority: 1
     localrule: True
     params:
+        study=STUDY,
         cases=[SCENES["process"].digest(case) for case in by_run(CASES, SCENES["process"]).values()],
         fidelity=WORK.fidelity_option,
         source=source_hash("dragdeck.advice.forecast"),
     shell:
-        "dragdeck advise {STUDY} {params.fidelity} > {log} 2>&1"
+        "dragdeck advise {params.study} {params.fidelity} > {log} 2>&1"

@@ -25,10 +25,11 @@ rule sweep_drops:
     resources:
         prints=1,
     params:
+        study=STUDY,
         fidelity=WORK.fidelity_option,
         source=source_hash("dragdeck.campaigns.restitution_drops"),
     shell:
-        "dragdeck step drops {STUDY} sweep {params.fidelity}"
+        "dragdeck step drops {params.study} sweep {params.fidelity}"
         " --out $(dirname {output}) 2>&1 | tee -i {log}"
 
 
@@ -58,10 +59,11 @@ rule confirm_restitution:
     resources:
         prints=1,
     params:
+        study=STUDY,
         fidelity=WORK.fidelity_option,
         source=source_hash("dragdeck.campaigns.restitution_drops"),
     shell:
-        "dragdeck step drops {STUDY} confirm {params.fidelity} --fit {input.fit}"
+        "dragdeck step drops {params.study} confirm {params.fidelity} --fit {input.fit}"
         " --out $(dirname {output}) 2>&1 | tee -i {log}"
 
 

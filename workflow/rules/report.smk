@@ -8,11 +8,12 @@ rule draw_set_up:
         f"results/{STUDY}/set_up.png",
     localrule: True
     params:
+        study=STUDY,
         case=SCENES["process"].digest(CASES[0]),
         fidelity=WORK.fidelity_option,
         source=source_hash("dragdeck.preview.page", "dragdeck.preview.layout"),
     shell:
-        "dragdeck preview {STUDY} {params.fidelity} > {log} 2>&1"
+        "dragdeck preview {params.study} {params.fidelity} > {log} 2>&1"
 
 
 rule write_report:

@@ -14,12 +14,13 @@ rule measure_costs:
     resources:
         prints=1,
     params:
+        study=STUDY,
         fidelity=WORK.fidelity_option,
         rounds=lambda wildcards: WORK.points_of(PLAN).cost_rounds,
         cases=[scene.digest(CASES[0]) for scene in SCENES.values()],
         source=source_hash("dragdeck.engine.batch", "dragdeck.project", "dragchain.tables.write"),
     shell:
-        "python benchmarks/costs {STUDY} {params.fidelity} --rounds {params.rounds}"
+        "python benchmarks/costs {params.study} {params.fidelity} --rounds {params.rounds}"
         " --out {output} 2>&1 | tee -i {log}"
 
 

@@ -25,11 +25,12 @@ rule judge_verification:
     resources:
         prints=1,
     params:
+        study=STUDY,
         fidelity=WORK.fidelity_option,
         cases=[scene.digest(CASES[0]) for scene in SCENES.values()],
         source=source_hash("evidence.verification.report"),
     shell:
-        "python -m evidence verify {STUDY} {params.fidelity} --cores {threads}"
+        "python -m evidence verify {params.study} {params.fidelity} --cores {threads}"
         " --out $(dirname {output.page}) 2>&1 | tee -i {log}"
 
 
