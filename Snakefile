@@ -65,10 +65,10 @@ rule figures:
         WORK.every("process", "figures/journal/workpiece.pdf"),
 
 
-# The process runs as time series for ParaView and OVITO, with a view for ParaView.
+# The process runs as time series for ParaView and OVITO.
 rule export:
     input:
-        WORK.every("process", "export/paraview/run.pvd", "export/paraview/view.py"),
+        WORK.every("process", "export/paraview/run.pvd"),
 
 
 # The study's inputs, runs and report as an RO-Crate.

@@ -10,6 +10,7 @@ import yaml
 from hypothesis import settings
 from made_study import Load, Made, put
 from paths import ROOT, SMALL_STUDY
+from tiny_run_files import write_tiny_run
 
 from dragdeck.cases.case import Case
 from dragdeck.project import Project
@@ -47,8 +48,13 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 def _longest_files_first(items: list[pytest.Item]) -> None:
     """Let no process begin with a long file when the others have nothing left to do."""
-    slow = {item.path for item in items if item.get_closest_marker("slow")}
-    items.sort(key=lambda item: ("workflow" not in item.path.parts[-2:], item.path not in slow))
+    marked = {
+        item.path
+        for item in items
+        for mark in item.iter_markers()
+        if mark.name in ("slow", "engine")
+    }
+    items.sort(key=lambda item: ("workflow" not in item.path.parts[-2:], item.path not in marked))
 
 
 @pytest.fixture
@@ -109,3 +115,19 @@ def case(load: Load) -> Case:
     """The one case of the small study."""
     (only,) = load()
     return only
+
+
+@pytest.fixture
+def tiny_run(tmp_path: Path) -> Path:
+    """Folder of a process run with four particles, without its tables.
+
+    The workpiece, a cylinder of 5 mm, moves along +x from the bowl's axis at 0.1 mm/s
+    from step 20 to 100, a step being 1 ms. Particle 1 touches it, particle 2 touches
+    particle 1 and the bowl's side: a straight chain at z = 30 mm whose three
+    contacts share the overlap ``40 um + workpiece_x`` equally and carry 100 N/mm of
+    it: (4 N + 1e5 N/m workpiece_x) / 3. The workpiece holds particle 1 up, the side particle 2.
+    Particle 4 lies on particle 3 and that on the floor. Nothing touches the workpiece at
+    step 0; the forces in ``workpiece_contacts`` are 5 % above the applied ones.
+    Samples count from step 40 on.
+    """
+    return write_tiny_run(tmp_path / "tiny")

@@ -71,15 +71,13 @@ class DragPeaks:
     ----------
     index : (N,) ndarray of int64
         Positions in the series.
-    time_s, drag_n, prominence_n : (N,) ndarray
-        When they are, the force along the motion there (negative), and how far
-        each stands out of its surroundings.
+    time_s, drag_n : (N,) ndarray
+        When they are, and the force along the motion there (negative).
     """
 
     index: NDArray[np.int64]
     time_s: Floats
     drag_n: Floats
-    prominence_n: Floats
 
 
 def drag_peaks(samples: pd.DataFrame, case: CaseOfRun) -> DragPeaks:
@@ -134,8 +132,8 @@ def find_drag_peaks(
         raise SeriesError("peaks require a constant sampling interval")
     prominence = float(np.std(drag_n, ddof=1)) if min_prominence_n is None else min_prominence_n
     distance = max(1.0, min_separation_s / interval)
-    index, found = find_peaks(-drag_n, prominence=prominence, distance=distance)
-    return DragPeaks(index.astype(np.int64), time_s[index], drag_n[index], found["prominences"])
+    index, _ = find_peaks(-drag_n, prominence=prominence, distance=distance)
+    return DragPeaks(index.astype(np.int64), time_s[index], drag_n[index])
 
 
 def peak_separation_s(case: CaseOfRun) -> float:

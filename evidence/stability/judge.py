@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from dragchain.statistics.estimate import Estimate, flattened
 from dragdeck.records.run import AcceptanceCheck, CheckCode, CheckReason
@@ -397,28 +396,23 @@ def restitution_errors(points: pd.DataFrame) -> RestitutionErrors:
     """Restitution error against steps per contact, over all head-on impacts that ended."""
     impacts = head_on_impacts(points)
     impacts = impacts[impacts["state"] == "complete"]
-    steps = impacts["steps_per_contact"].to_numpy()
-    bins = np.floor(np.log10(steps) * _ERROR_BINS_PER_DECADE).astype(int)
-    ordinary = (impacts["setting_restitution"] >= _ORDINARY_RESTITUTION).to_numpy()
-    groups = [bins == number for number in np.unique(bins)]
-    errors = impacts["restitution_error"].abs().to_numpy()
-    forces = impacts["peak_force_error"].abs().to_numpy()
+    decades = np.log(impacts["steps_per_contact"])
+    bins = np.floor(np.log10(impacts["steps_per_contact"]) * _ERROR_BINS_PER_DECADE)
+    errors, forces = impacts["restitution_error"].abs(), impacts["peak_force_error"].abs()
+    ordinary = errors.where(impacts["setting_restitution"] >= _ORDINARY_RESTITUTION)
     return RestitutionErrors(
-        steps_per_contact=tuple(float(np.exp(np.log(steps[own]).mean())) for own in groups),
-        median=tuple(float(np.median(errors[own])) for own in groups),
-        ordinary_worst=_envelope(errors, [own & ordinary for own in groups]),
-        worst=_envelope(errors, groups),
-        peak_force_worst=_envelope(forces, groups),
-        runs=tuple(int(own.sum()) for own in groups),
+        steps_per_contact=tuple(np.exp(decades.groupby(bins).mean())),
+        median=tuple(errors.groupby(bins).median()),
+        ordinary_worst=_envelope(ordinary.groupby(bins).max()),
+        worst=_envelope(errors.groupby(bins).max()),
+        peak_force_worst=_envelope(forces.groupby(bins).max()),
+        runs=tuple(errors.groupby(bins).size()),
     )
 
 
-def _envelope(
-    values: NDArray[np.float64], groups: Sequence[NDArray[np.bool_]]
-) -> tuple[float, ...]:
+def _envelope(largest: pd.Series) -> tuple[float, ...]:
     """Largest value of each group and of all after it: more steps never make it larger."""
-    largest = [values[own].max(initial=0.0) for own in groups]
-    return tuple(np.maximum.accumulate(largest[::-1])[::-1].tolist())
+    return tuple(largest.fillna(0.0)[::-1].cummax()[::-1])
 
 
 def summarise_map(

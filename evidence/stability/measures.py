@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from dragchain.arrays import Floats, Ints
 from dragchain.errors import TableError
@@ -28,6 +27,7 @@ from dragdeck.physics.contact_mechanics import (
     fall_energy,
     largest_eigenvalue,
     sphere_mass,
+    touching,
 )
 from dragdeck.records.case import CaseOfRun
 from dragdeck.records.run import RunRecord
@@ -137,71 +137,6 @@ def read_points(lists: Sequence[Path]) -> list[PointRun]:
 # --- the critical time step of a loaded contact network ----------------------------------------
 
 
-def hertz_stiffness(
-    overlap_m: Floats, radius_m: Floats, modulus_pa: Floats, shear_pa: Floats
-) -> tuple[Floats, Floats]:
-    """Tangent stiffnesses of Hertzian contacts.
-
-    ``k_n = 2 E* sqrt(R* d)`` (the derivative of Johnson 1985, eq. 4.23, by the overlap d) and
-    ``k_t = 8 G* sqrt(R* d)`` (Mindlin 1949, no slip).
-
-    Parameters
-    ----------
-    overlap_m, radius_m : (M,) ndarray
-        Overlaps and effective radii.
-    modulus_pa, shear_pa : (M,) ndarray
-        Effective moduli E* and G*.
-
-    Returns
-    -------
-    (M,) ndarray, (M,) ndarray
-        k_n and k_t, N/m; zero where bodies do not overlap.
-    """
-    contact_radius = np.sqrt(radius_m * np.maximum(overlap_m, 0.0))
-    return 2.0 * modulus_pa * contact_radius, 8.0 * shear_pa * contact_radius
-
-
-def largest_frequency(
-    mass_kg: Floats, a: Ints, b: Ints, normal: Floats, stiffness_n_m: tuple[Floats, Floats]
-) -> float:
-    """Largest eigenfrequency of a contact network, rotations included.
-
-    The largest eigenvalue of ``M^-1/2 K M^-1/2`` by Lanczos iteration, K being the sum over all
-    contacts of ``G^T (k_n n n^T + k_t (1 - n n^T)) G`` with G the relative displacement at the
-    contact for unit displacements and rotations of its two bodies. Every contact sticks (a sliding
-    one is softer, so the frequency is an upper bound) and nothing is damped.
-
-    Parameters
-    ----------
-    mass_kg : (N,) ndarray
-        Of the particles.
-    a, b : (M,) ndarray of int
-        The bodies of a contact as rows of the particles; ``b`` is -1 for a wall, which does not
-        move.
-    normal : (M, 3) ndarray
-        Unit vectors from ``a`` to ``b``.
-    stiffness_n_m : (M,) ndarray, (M,) ndarray
-        Normal and tangential tangent stiffness.
-
-    Returns
-    -------
-    float
-        rad/s; 0 where there are no contacts.
-
-    References
-    ----------
-    Otsubo, O'Sullivan and Shire (2017), Empirical assessment of the critical time increment in
-    explicit particulate discrete element method simulations, Computers and Geotechnics 86, 67-79.
-    """
-    if not len(a):
-        return 0.0
-    # a wall is the last body, row -1, and has no inverse mass
-    inverse_mass = np.append(1.0 / mass_kg, 0.0)
-    stiffness = np.stack(stiffness_n_m)
-    largest = largest_eigenvalue(np.stack([a, b]), normal, stiffness, inverse_mass)
-    return float(np.sqrt(max(largest, 0.0)))
-
-
 def critical_step(frequency_rad_s: float) -> float:
     """Largest stable step of central differences without damping, ``2 / omega``, s.
 
@@ -233,33 +168,27 @@ _PARTNERS = np.array([PARTICLE, WORKPIECE, BOWL, BOWL])
 
 @dataclass(frozen=True)
 class Contacts:
-    """N contacts.
+    """M contacts of N particles.
 
     Attributes
     ----------
-    a, b : (N,) ndarray of int
-        Rows of the particles; ``b`` is -1 for another body.
-    partner : (N,) ndarray of int
-        Index of body b into `PARTNERS`.
-    normal : (N, 3) ndarray
-        Unit vectors from a to b.
-    overlap_m : (N,) ndarray
+    bodies : (2, M) ndarray of int
+        Rows of the particles; N for another body.
+    normal : (M, 3) ndarray
+        Unit vectors from the first to the second.
+    overlap_m : (M,) ndarray
+    partner : (M,) ndarray of int
+        Index of the second body into `PARTNERS`.
     """
 
-    a: Ints
-    b: Ints
-    partner: Ints
+    bodies: Ints
     normal: Floats
     overlap_m: Floats
+    partner: Ints
 
     def overlap_ratio(self, radius_m: Floats) -> float:
-        """Largest overlap over the radius of body a; 0 without a contact."""
-        return float((self.overlap_m / radius_m[self.a]).max(initial=0.0))
-
-    def effective_radius_m(self, radius_m: Floats) -> Floats:
-        """Effective radii; bowl and workpiece count as planes."""
-        own, other = radius_m[self.a], radius_m[np.where(self.b < 0, 0, self.b)]
-        return np.where(self.b < 0, own, own * other / (own + other))
+        """Largest overlap over the radius of the first body; 0 without a contact."""
+        return float((self.overlap_m / radius_m[self.bodies[0]]).max(initial=0.0))
 
 
 def _in_id_order(frame: Frame) -> Frame:
@@ -274,38 +203,13 @@ def _radii(frame: Frame) -> Floats:
     return frame.vectors("radius_m")[:, 0]
 
 
-def touching(centre_m: Floats, radius_m: Floats, bowl_radius_m: float) -> Contacts:
-    """Contacts of particles with each other, the floor and the side, from where they are."""
-    pairs = KDTree(centre_m).query_pairs(2.0 * float(radius_m.max()), output_type="ndarray")
-    pairs = pairs.astype(np.int64)
-    away = centre_m[pairs[:, 1]] - centre_m[pairs[:, 0]]
-    distance = np.linalg.norm(away, axis=1)
-    overlap = radius_m[pairs].sum(axis=1) - distance
-    hit = overlap > 0.0
-    across = np.linalg.norm(centre_m[:, :2], axis=1)
-    side, floor = radius_m - (bowl_radius_m - across), radius_m - centre_m[:, 2]
-    at_side, at_floor = np.flatnonzero(side > 0.0), np.flatnonzero(floor > 0.0)
-    outward = np.zeros((len(at_side), 3))
-    outward[:, :2] = centre_m[at_side, :2] / across[at_side, None]
-    down = np.tile([0.0, 0.0, -1.0], (len(at_floor), 1))
-    particles, walls = int(hit.sum()), len(at_side) + len(at_floor)
-    return Contacts(
-        a=np.concatenate([pairs[hit, 0], at_side, at_floor]),
-        b=np.concatenate([pairs[hit, 1], np.full(walls, -1)]),
-        partner=np.repeat([PARTICLE, BOWL], [particles, walls]),
-        normal=np.concatenate([away[hit] / distance[hit, None], outward, down]),
-        overlap_m=np.concatenate([overlap[hit], side[at_side], floor[at_floor]]),
-    )
+def network_frequency(case: CaseOfRun, sticks: bool, radius_m: Floats, contacts: Contacts) -> float:
+    """Largest eigenfrequency of the contacts' network, rotations included, rad/s.
 
-
-def network_frequency(
-    case: CaseOfRun,
-    sticks: bool,
-    radius_m: Floats,
-    contacts: Contacts,
-    effective_radius_m: Floats | None = None,
-) -> float:
-    """Largest eigenfrequency of the contacts' network, rad/s.
+    Stiffnesses are those of `dragdeck.physics.contact_mechanics.stability_number`, without damping:
+    ``k_n = 2 E* sqrt(R* d)`` (the derivative of Johnson 1985, eq. 4.23, by the overlap d) and
+    ``k_t = 8 G* sqrt(R* d)`` (Mindlin 1949, no slip). Every contact sticks (a sliding one is
+    softer, so the frequency is an upper bound). It is 0 where nothing touches.
 
     Parameters
     ----------
@@ -314,21 +218,24 @@ def network_frequency(
     sticks : bool
         Whether there is friction, and so a tangential stiffness.
     radius_m : (N,) ndarray
-        Of the particles.
+        Of the particles; bowl and workpiece count as planes.
     contacts : Contacts
-    effective_radius_m : (M,) ndarray, optional
-        Of the contacts; from the radii if not given.
+
+    References
+    ----------
+    Otsubo, O'Sullivan and Shire (2017), Computers and Geotechnics 86, 67-79.
     """
-    effective = (
-        contacts.effective_radius_m(radius_m) if effective_radius_m is None else effective_radius_m
-    )
-    moduli = [case.contact_moduli[name] for name in PARTNERS]
-    modulus = np.array([pair.modulus_pa for pair in moduli])[contacts.partner]
-    shear = np.array([pair.shear_pa for pair in moduli])[contacts.partner]
-    normal, tangential = hertz_stiffness(contacts.overlap_m, effective, modulus, shear)
-    mass = sphere_mass(radius_m, case.media.density_kg_m3)
-    stiffness = normal, tangential if sticks else 0.0 * tangential
-    return largest_frequency(mass, contacts.a, contacts.b, contacts.normal, stiffness)
+    if not (contacts.overlap_m > 0.0).any():
+        return 0.0
+    # another body is the last one: it has no curvature and never moves
+    curvature = np.append(1.0 / radius_m, 0.0)
+    inverse_mass = np.append(1.0 / sphere_mass(radius_m, case.media.density_kg_m3), 0.0)
+    contact_radius = np.sqrt(contacts.overlap_m / curvature[contacts.bodies].sum(axis=0))
+    pairs = [case.contact_moduli[name] for name in PARTNERS]
+    moduli = np.array([(2 * pair.modulus_pa, 8 * sticks * pair.shear_pa) for pair in pairs])
+    stiffness = moduli[contacts.partner].T * contact_radius
+    largest = largest_eigenvalue(contacts.bodies, contacts.normal, stiffness, inverse_mass)
+    return math.sqrt(max(largest, 0.0))
 
 
 # --- beds: one that settles, and one at rest under a load --------------------------------------
@@ -366,7 +273,9 @@ def _measure_resting(point: PointRun, run: Run) -> Row:
 
 def _bed(point: PointRun, case: CaseOfRun, frame: Frame) -> Row:
     radius = _radii(frame)
-    contacts = touching(_centres(frame), radius, case.bowl.radius_m)
+    bodies, normal, overlap = touching(_centres(frame), radius, case.bowl.radius_m)
+    partner = np.where(bodies[1] == len(radius), BOWL, PARTICLE)
+    contacts = Contacts(bodies, normal, overlap, partner)
     return {
         "overlap_ratio": contacts.overlap_ratio(radius),
         "frequency_rad_s": network_frequency(case, point.sticks, radius, contacts),
@@ -422,17 +331,18 @@ def _measure_impacts(point: PointRun, run: Run) -> Row:
         for frame in (first, last)
     )
     deepest = Contacts(
-        a=np.array([0]),
-        b=np.array([-1 if plate else 1]),
-        partner=np.array([PARTICLE]),  # a plate is of the particles' material
+        bodies=np.array([[0], [1]]),
         normal=np.array([[0.0, 0.0, -1.0]]),
         overlap_m=np.array([overlap]),
+        partner=np.array([PARTICLE]),  # a plate is of the particles' material
     )
-    effective, bodies = np.array([impact.effective_radius_m]), _radii(first)[: 1 if plate else 2]
+    radius = _radii(first)
     peaks = _spread("peak_force", force.max(axis=0))
     return {
-        "overlap_ratio": overlap / float(_radii(first).min()),
-        "frequency_rad_s": network_frequency(run.case, point.sticks, bodies, deepest, effective),
+        "overlap_ratio": overlap / float(radius.min()),
+        "frequency_rad_s": network_frequency(
+            run.case, point.sticks, radius[: 1 if plate else 2], deepest
+        ),
         **_spread("restitution", speed[:, 2] / impact.normal_speed_m_s),
         **peaks,
         "peak_force_n": peaks["peak_force_mean"],
@@ -556,11 +466,12 @@ def _engine_contacts(
     rows = contact_rows(frame, pairs, *walls, bowl_radius, friction_with(case, "particle"))
     ids = np.asarray(frame.columns["particle_id"], dtype=np.int64)
     a = np.searchsorted(ids, rows.a_id)
-    b = np.where(rows.b_id > 0, np.searchsorted(ids, rows.b_id), -1)
+    b = np.where(rows.b_id > 0, np.searchsorted(ids, rows.b_id), len(ids))
     towards = rows.point_m - _centres(frame)[a]
     normal = towards / np.linalg.norm(towards, axis=1, keepdims=True)
     hit = rows.overlap_m > 0.0
-    return Contacts(a[hit], b[hit], _PARTNERS[rows.kind[hit]], normal[hit], rows.overlap_m[hit])
+    bodies, partner = np.stack([a, b])[:, hit], _PARTNERS[rows.kind[hit]]
+    return Contacts(bodies, normal[hit], rows.overlap_m[hit], partner)
 
 
 def _drag_errors(own: Row, fine: Row) -> dict[str, Estimate]:

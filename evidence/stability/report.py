@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from dragchain.arrays import Floats
-from dragchain.figures.panels import head, key, legend_below, log_ticks, new_panels, row_names
+from dragchain.figures.panels import head, key, legend_below, new_panels, row_names
 from dragchain.figures.style import BLUE, GREEN, GREY, INK, ORANGE, RED
 from dragchain.report.campaign import write_report
 from dragdeck.records.stability import RestitutionErrors
@@ -30,8 +30,9 @@ from evidence.stability.judge import (
     judge_points,
     summarise_map,
 )
-from evidence.stability.measures import PointRun, read_points
+from evidence.stability.measures import read_points
 from evidence.stability.points import REGIMES
+from evidence.stability.scenes import PHASES
 
 
 def write_stability(out_dir: Path, lists: Sequence[Path]) -> None:
@@ -55,18 +56,18 @@ def write_stability(out_dir: Path, lists: Sequence[Path]) -> None:
     runs = read_points(lists)
     points, verdicts = judge_points(runs)
     found = conditions(points)
-    summary, sizes = summarise_map(points, found, runs), _run_sizes(runs)
+    summary = summarise_map(points, found, runs)
     tested = points[~points["reference"]]
     axes = points.groupby(["regime", "axis"], sort=False)["label"]
     write_report(
         out_dir,
         "stability/stability.html.j2",
-        draw=lambda: draw_map(points, found, summary.restitution_error, sizes),
+        draw=lambda: draw_map(points, found, summary.restitution_error),
         tables={"points": points, "conditions": found},
         documents={"stability": summary},
         package="evidence",
         summary=summary,
-        sizes=sizes,
+        phases=PHASES,
         class_names=CLASSES,
         classes=[
             {"regime": regime, **Counter(dict.fromkeys(CLASSES, 0)), **Counter(own["class"])}
@@ -95,16 +96,6 @@ def _with_reference(row: Mapping[Hashable, object]) -> dict[Hashable, object]:
     return {**row, "reference": f"{row['reference_class']}{why}"}
 
 
-def _run_sizes(runs: Sequence[PointRun]) -> dict[str, int]:
-    """Impacts, or particles, of a run, by regime; of the base point where it was run."""
-    sizes: dict[str, int] = {}
-    for run in sorted(runs, key=lambda run: run.point.axis != "base"):
-        if run.case is not None:
-            pairs = 2 if run.point.settings.get("size_ratio") else 1
-            sizes.setdefault(run.point.regime, run.case.media.count // pairs)
-    return sizes
-
-
 # --- figures -----------------------------------------------------------------------------------
 
 COLOURS = {
@@ -122,8 +113,8 @@ _CRITICAL = {"-": "critical step of the contact network", ":": "critical step, d
 """Lines of the maps."""
 
 _TITLES = {
-    "impact": "Single impacts ({} per run, at different phases within a time step)",
-    "settle": "Settling of {} particles in a bowl",
+    "impact": f"Single impacts ({PHASES} per run, at different phases within a time step)",
+    "settle": "Settling of particles in a bowl",
     "column": "At rest under load: settled packing or column of particles in a tube",
     "drag": "Slow drag: workpiece plunges in and is dragged through the packing",
 }
@@ -133,7 +124,6 @@ def draw_map(
     points: pd.DataFrame,
     conditions: pd.DataFrame,
     errors: RestitutionErrors,
-    sizes: Mapping[str, int],
 ) -> dict[str, Figure]:
     """All figures by name.
 
@@ -142,21 +132,18 @@ def draw_map(
     points, conditions : DataFrame
         One row per point, and per condition.
     errors : RestitutionErrors
-    sizes : mapping of str to int
-        Impacts or particles of a run, by regime.
     """
     tested = points[~points["reference"]]
     drawn = {}
     for regime in (one for one in REGIMES if (points["regime"] == one).any()):
         own, rows = (table[table["regime"] == regime] for table in (tested, conditions))
-        drawn[f"map_{regime}"] = _map(own, rows, _TITLES[regime].format(sizes.get(regime)))
+        drawn[f"map_{regime}"] = draw_regime(own, rows, _TITLES[regime])
     if errors.steps_per_contact:
         drawn["restitution_error"] = _errors(head_on_impacts(points), errors)
-    drawn["fraction_of_critical"] = _fractions(tested)
     return drawn
 
 
-def _map(points: pd.DataFrame, conditions: pd.DataFrame, title: str) -> Figure:
+def draw_regime(points: pd.DataFrame, conditions: pd.DataFrame, title: str) -> Figure:
     """Conditions down, steps across, a colour and a letter per class."""
     steps = np.sort(points["fraction"].unique())
     figure, (axes,) = new_panels(1.5 + 0.24 * len(conditions))
@@ -176,16 +163,16 @@ def _map(points: pd.DataFrame, conditions: pd.DataFrame, title: str) -> Figure:
     axes.grid(False)
     axes.tick_params(length=0)
     axes.tick_params("y", labelsize=7.5)
-    _class_keys(axes, points, _LETTERS)
+    _class_keys(axes, points)
     for style, name in _CRITICAL.items():
         key(axes, name, marker="", ls=style, color=INK, lw=1.6)
     return legend_below(figure)
 
 
-def _class_keys(axes: Axes, points: pd.DataFrame, letters: Mapping[str, str]) -> None:
+def _class_keys(axes: Axes, points: pd.DataFrame) -> None:
     """Name the colours of the classes that occur."""
     for kind in (one for one in CLASSES if (points["class"] == one).any()):
-        name = f"{letters.get(kind, '')} {kind}".strip()
+        name = f"{_LETTERS[kind]} {kind}".strip()
         key(axes, name, color=COLOURS[kind], marker="s", ms=8)
 
 
@@ -220,30 +207,3 @@ def _errors(impacts: pd.DataFrame, table: RestitutionErrors) -> Figure:
     axes.legend(loc="upper right")
     figure.colorbar(dots, label="input restitution")
     return figure
-
-
-def _fractions(points: pd.DataFrame) -> Figure:
-    """Every point over its step as a fraction of the Rayleigh time and of the critical step."""
-    figure, panels = new_panels(4.2, 2, sharey=True)
-    columns = (
-        ("fraction", "time step / Rayleigh time", RULE),
-        ("fraction_of_critical", "time step / critical step", 1.0),
-    )
-    for axes, (column, label, limit) in zip(panels, columns, strict=True):
-        known = points[np.isfinite(points[column])]
-        for line, regime in enumerate(REGIMES):
-            own = known[known["regime"] == regime]
-            axes.scatter(own[column], line + _offsets(own), 9, own["class"].map(COLOURS), lw=0)
-        axes.axvline(limit, color=INK, ls="--", lw=1)
-        axes.set(xscale="log", xlabel=label)
-        log_ticks(axes.xaxis, steps=(1.0, 2.0, 5.0))
-    row_names(panels[0], REGIMES)
-    _class_keys(panels[0], points, {})
-    return legend_below(figure)
-
-
-def _offsets(points: pd.DataFrame) -> Floats:
-    """Place of each point's condition within the line of its regime, (N,)."""
-    codes, names = pd.factorize(points["condition"])
-    spread = np.linspace(-0.36, 0.36, len(names)) if len(names) > 1 else np.zeros(1)
-    return np.asarray(spread[codes])

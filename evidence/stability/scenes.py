@@ -24,7 +24,7 @@ from dragdeck.scenes.scene import case_of_study, material_table
 
 # --- single impacts, many at once: particles on a plate, or small particles on large ones ------
 
-_PHASES = 16
+PHASES = 16
 """Impacts in one run, each begun at another sixteenth of a step."""
 
 _FRAMES_PER_CONTACT = 200
@@ -125,7 +125,7 @@ def impact_scene(
     steps = math.ceil((_CONTACT_TIMES * contact / dt + 10) / period) * period
     travel = impact.speed_m_s * steps * dt
     bodies = _bodies(radius, material.density_kg_m3, impact, dt)
-    side = 6 * radius * max(1.0, impact.size_ratio) * _PHASES + travel
+    side = 6 * radius * max(1.0, impact.size_ratio) * PHASES + travel
     height = 2 * radius * (2 + 2 * impact.size_ratio) + 2 * travel
     largest = max(1.0, impact.size_ratio) ** 3
     deck = _ImpactDeck(
@@ -180,9 +180,9 @@ def _bodies(radius_m: float, density_kg_m3: float, impact: ImpactSettings, dt: f
     struck_m = impact.size_ratio * radius_m
     pitch = 6 * max(radius_m, struck_m)
     bodies = []
-    for phase in range(_PHASES):
-        y = pitch * (phase - 0.5 * (_PHASES - 1))
-        gap = normal * dt * (1 + (phase + 0.5) / _PHASES)
+    for phase in range(PHASES):
+        y = pitch * (phase - 0.5 * (PHASES - 1))
+        gap = normal * dt * (1 + (phase + 0.5) / PHASES)
         place, velocity = (0.0, y, radius_m + gap), (along, 0.0, -normal)
         bodies.append(Body(1, radius_m, density_kg_m3, place, velocity))
         if struck_m > 0.0:

@@ -1,1 +1,1 @@
-"""A study against what its source says: forces, chains and peaks, and the source's statements."""
+"""A study against what its source says: forces, load, and the source's statements."""

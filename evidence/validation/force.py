@@ -6,9 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 import pandas as pd
 from pydantic import JsonValue
-from scipy import signal, stats
+from scipy import stats
 
-from dragchain.arrays import Floats
 from dragchain.drag import (
     FORCES,
     find_drag_peaks,
@@ -18,21 +17,16 @@ from dragchain.drag import (
 )
 from dragchain.loading.contact_events import Thresholds
 from dragchain.loading.document import FILE, ContactType, Loading
-from dragchain.run.kinematics import drag_start_s
 from dragchain.run.reference import reference_drags
 from dragchain.statistics.bed_effects import fit_effects
 from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import Estimate, Real
-from dragchain.tables.by_step import read_table
 from dragdeck.documents import Part
 from dragdeck.records.case import CaseOfRun
 from evidence.validation.runs import MeasuredRun, RunsByBed, packing_mean
 
 _PROMINENCES = (0.5, 1.0, 2.0)
 """Least prominence of a peak in standard deviations of the drag; the middle one is the rule."""
-
-SEGMENT = 6.0
-"""Length of the spectrum's segments in particle diameters of path (Welch 1967)."""
 
 
 class PackingForce(Part):
@@ -65,59 +59,16 @@ class Likeness(Part):
     standard_error_within_n: Real
 
 
-class PeakCounts(Part):
-    """Peaks of the drag.
-
-    Attributes
-    ----------
-    per_metre : mapping
-        Least prominence in standard deviations to the number of peaks per metre of path.
-    process_time_s : sequence of sequence of float
-        When they are in each packing, by the rule.
-    largest_n : sequence of float
-        Drag of the largest of each packing.
-    """
-
-    per_metre: Mapping[str, Estimate]
-    process_time_s: tuple[tuple[float, ...], ...]
-    largest_n: tuple[Real, ...]
-
-
-class Density(Part):
-    """Power in N^2 diameters: mean, lowest and highest of the packings, (F,) each."""
-
-    mean: tuple[float, ...]
-    ci95_low: tuple[float, ...]
-    ci95_high: tuple[float, ...]
-
-
-class Spectrum(Part):
-    """Power spectrum of the drag along the path.
-
-    Attributes
-    ----------
-    waves_per_diameter : (F,) sequence of float
-    density : Density
-    half_wave : Estimate
-        Half of the variance lies in waves longer than so many diameters.
-    segment : float
-        Length of the segments in diameters.
-    """
-
-    waves_per_diameter: tuple[float, ...]
-    density: Density
-    half_wave: Estimate
-    segment: float = SEGMENT
-
-
 class Force(Part):
-    """The force of every packing, and of all of them together by component."""
+    """The force of every packing, and of all of them together by component.
+
+    Peaks of the drag per metre are counted by their least prominence in standard deviations.
+    """
 
     packings: tuple[PackingForce, ...]
     together: Mapping[str, Together]
     alike: Likeness
-    peaks: PeakCounts
-    spectrum: Spectrum
+    peaks_per_m: Mapping[str, Estimate]
 
 
 class Compared(Part):
@@ -148,8 +99,7 @@ def force_of_packings(packings: Sequence[MeasuredRun]) -> Force:
         packings=tuple(rows),
         together={name: _together([getattr(row, name) for row in rows]) for name in FORCES},
         alike=_alike([row.drag_n for row in rows]),
-        peaks=_peaks(packings),
-        spectrum=spectrum(packings),
+        peaks_per_m=_peaks(packings),
     )
 
 
@@ -185,10 +135,9 @@ def _alike(drags: Sequence[MeanEstimate]) -> Likeness:
     )
 
 
-def _peaks(packings: Sequence[MeasuredRun]) -> PeakCounts:
+def _peaks(packings: Sequence[MeasuredRun]) -> dict[str, Estimate]:
     """Peaks by the rule of docs/reference/results.md, at three least prominences."""
-    counts: dict[float, list[float]] = {factor: [] for factor in _PROMINENCES}
-    times, largest = [], []
+    counts: dict[str, list[float]] = {f"{factor:g}": [] for factor in _PROMINENCES}
     for run in packings:
         samples = read_counted(run.folder, ("time_s", "drag_n"))
         time_s, drag = (samples[name].to_numpy(np.float64) for name in ("time_s", "drag_n"))
@@ -199,47 +148,8 @@ def _peaks(packings: Sequence[MeasuredRun]) -> PeakCounts:
                 min_separation_s=peak_separation_s(run.case),
                 min_prominence_n=factor * float(np.std(drag, ddof=1)),
             )
-            counts[factor].append(len(peaks.index) / run.measures.arc_m)
-            if factor == 1.0:
-                times.append(tuple((peaks.time_s - drag_start_s(run.case)).tolist()))
-                largest.append(float(peaks.drag_n.min(initial=math.inf)))
-    return PeakCounts(
-        per_metre={f"{factor:g}": packing_mean(found) for factor, found in counts.items()},
-        process_time_s=tuple(times),
-        largest_n=tuple(largest),
-    )
-
-
-def spectrum(packings: Sequence[MeasuredRun]) -> Spectrum:
-    """Power spectrum of the drag along the path, by Welch's method, mean over packings.
-
-    Welch (1967), IEEE Trans. Audio Electroacoust. 15, 70-73: Hann windows of
-    `SEGMENT` particle diameters, half overlapping.
-    """
-    curves, halves = [], []
-    grid = np.empty(0)
-    for run in packings:
-        drag = read_counted(run.folder, ("drag_n",))["drag_n"].to_numpy(np.float64)
-        spacing = run.measures.arc_m / len(drag) / (2.0 * run.case.media.radius_mean_m)
-        length = min(len(drag), round(SEGMENT / spacing))
-        waves, density = (half[1:] for half in signal.welch(drag, 1.0 / spacing, nperseg=length))
-        grid = grid if grid.size else waves
-        curves.append(np.interp(grid, waves, density))
-        halves.append(_half_wave(waves, density))
-    together = np.array(curves)
-    mean, low, high = (tuple(row.tolist()) for row in (
-        together.mean(axis=0), together.min(axis=0), together.max(axis=0)
-    ))  # fmt: skip
-    return Spectrum(
-        waves_per_diameter=tuple(grid.tolist()),
-        density=Density(mean=mean, ci95_low=low, ci95_high=high),
-        half_wave=packing_mean(halves, ratio=True),
-    )
-
-
-def _half_wave(waves: Floats, density: Floats) -> float:
-    total = np.cumsum(density)
-    return float(1.0 / np.interp(0.5 * total[-1], total - 0.5 * density, waves))
+            counts[f"{factor:g}"].append(len(peaks.index) / run.measures.arc_m)
+    return {factor: packing_mean(found) for factor, found in counts.items()}
 
 
 def compare_drag(drag: Together, case: CaseOfRun) -> tuple[Compared, ...]:
@@ -455,12 +365,3 @@ def _shares(types: Sequence[ContactType]) -> dict[str, Estimate]:
         name: packing_mean([100.0 * one.fraction_of[name].value for one in types])
         for name in _SHARES
     }
-
-
-def facets(packings: Sequence[MeasuredRun]) -> pd.DataFrame:
-    """The facets of every packing, one row per facet and packing."""
-    tables = [
-        read_table(run.folder / "tables" / "facets.parquet").assign(packing=run.seed)
-        for run in packings
-    ]
-    return pd.concat(tables, ignore_index=True)

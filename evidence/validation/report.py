@@ -1,7 +1,6 @@
 """The report on a validation: its document, tables, figures and page."""
 
 import json
-import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -22,23 +21,18 @@ from dragchain.figures.panels import (
     row,
     row_names,
 )
-from dragchain.figures.style import BLUE, COLOURS, GREY, RED
+from dragchain.figures.style import BLUE, COLOURS, GREY
 from dragchain.report.campaign import write_report
 from dragchain.run.kinematics import drag_start_s
-from dragchain.scaling.document import ScalingFile
-from dragchain.scaling.fit import SCENE, draw_scalings, read_scalings
 from dragchain.statistics.estimate import Estimate, EstimateColumns
 from dragdeck.documents import Document
-from evidence.validation import peaks as chain_peaks
 from evidence.validation.force import (
     Compared,
     Effect,
     Force,
     LoadingOverPackings,
-    Spectrum,
     compare_drag,
     effect_table,
-    facets,
     force_of_packings,
     load_of_packings,
     setting_effects,
@@ -46,7 +40,6 @@ from evidence.validation.force import (
 from evidence.validation.runs import MeasuredRun, RunsByBed, read_validation_runs
 from evidence.validation.statements import (
     Claim,
-    Network,
     PackingProfile,
     Statements,
     claim_table,
@@ -67,7 +60,6 @@ class Validation(Document):
     comparison: tuple[Compared, ...]
     load: LoadingOverPackings
     statements: Statements
-    scalings: tuple[ScalingFile, ...]
     claims: tuple[Claim, ...]
     effects: tuple[Effect, ...]
 
@@ -95,18 +87,15 @@ def write_validation(out_dir: Path, run_dirs: Sequence[Path], command: str) -> N
     """
     runs = read_validation_runs(run_dirs)
     first, found = runs.packings[0], validation_of(runs, command)
-    peaks = chain_peaks.of_runs([run.folder for run in runs.packings])
     write_report(
         out_dir,
         "validation/validation.html.j2",
         draw=lambda: _draw(runs, found),
         pictures={"workpiece": (first.folder / "figures" / "workpiece.png").read_bytes()},
-        tables={**_tables(runs, found), "chain_tests": peaks.table()},
-        documents={"validation": found, "peaks": peaks},
+        tables=_tables(found),
+        documents={"validation": found},
         package="evidence",
         found=json.loads(found.as_text()),
-        scalings=found.scalings,
-        peaks=json.loads(peaks.as_text()),
         assumptions=first.case.assumptions,
         varied={row.field for row in found.effects},
         runs=runs,
@@ -114,7 +103,7 @@ def write_validation(out_dir: Path, run_dirs: Sequence[Path], command: str) -> N
 
 
 def validation_of(runs: RunsByBed, command: str) -> Validation:
-    """All numbers of the page but those of peaks and chains."""
+    """All numbers of the page."""
     first = runs.packings[0]
     force, statements = force_of_packings(runs.packings), of_packings(runs.packings)
     return Validation(
@@ -127,25 +116,15 @@ def validation_of(runs: RunsByBed, command: str) -> Validation:
         comparison=compare_drag(force.together["drag_n"], first.case),
         load=load_of_packings(runs.packings),
         statements=statements,
-        scalings=tuple(_scalings_of(first.measures.numbers)),
         claims=claims(statements),
         effects=tuple(setting_effects(runs)),
     )
 
 
-def _scalings_of(numbers: Mapping[str, float]) -> list[ScalingFile]:
-    """The packaged sweeps that were made in a scene with these numbers."""
-    return [
-        found
-        for found in read_scalings()
-        if all(math.isclose(found.scene[k], numbers[k], rel_tol=0.01) for k in SCENE)
-    ]
-
-
-def _tables(runs: RunsByBed, found: Validation) -> dict[str, pd.DataFrame]:
+def _tables(found: Validation) -> dict[str, pd.DataFrame]:
     """The numbers of the page as tables, by name."""
     force, statements = found.force, found.statements
-    network, spectrum = statements.network, force.spectrum
+    network = statements.network
     compared = [
         row.model_dump(exclude={"std_ratio"} if row.std_ratio is None else None)
         for row in found.comparison
@@ -154,7 +133,6 @@ def _tables(runs: RunsByBed, found: Validation) -> dict[str, pd.DataFrame]:
         "packings": pd.json_normalize([row.model_dump() for row in force.packings], sep="_"),
         "effects": effect_table(found.effects),
         "load": pd.DataFrame([dict(row) for row in found.load.rows]),
-        "facets": facets(runs.packings),
         "comparison": pd.json_normalize(compared, sep="_"),
         "statements": claim_table(found.claims),
         "corridor": pd.DataFrame(
@@ -166,9 +144,6 @@ def _tables(runs: RunsByBed, found: Validation) -> dict[str, pd.DataFrame]:
         ),
         "around": _profile(statements.azimuth, "rad"),
         "depth": _profile(statements.depth, "m"),
-        "spectrum": pd.DataFrame(
-            {"waves_per_diameter": spectrum.waves_per_diameter, **dict(spectrum.density)}
-        ),
     }
 
 
@@ -190,18 +165,12 @@ def _profile(profile: PackingProfile, unit: str) -> pd.DataFrame:
 
 def _draw(runs: RunsByBed, found: Validation) -> dict[str, Figure]:
     """The figures of the page, by name."""
-    drawn = {
+    return {
         "comparison": _comparison(found.force, found.comparison, found.effects),
         "traces": _traces(runs.packings, found.comparison),
-        "spectrum": _spectrum(found.force.spectrum),
         "around": _around(found.statements),
-        "corridor": _corridor(found.statements.network),
+        "corridor": _corridor(found.statements),
     }
-    if any(row.field for row in found.effects):
-        drawn["assumed"] = _assumed(found.effects)
-    if found.scalings:
-        drawn["scaling"] = draw_scalings(found.scalings)
-    return drawn
 
 
 def _traces(packings: Sequence[MeasuredRun], compared: Sequence[Compared]) -> Figure:
@@ -266,22 +235,6 @@ def _fidelity(effect: Effect) -> str:
     return name if effect.speed_factor == 1.0 else f"{name}, speed x {effect.speed_factor:g}"
 
 
-def _assumed(effects: Sequence[Effect]) -> Figure:
-    """What each assumed input does to the mean drag."""
-    rows: list[_Row] = []
-    for one in effects:
-        if one.quantity == "drag_mean" and one.field:
-            name = f"{one.field} = {_value(one.value)} (assumed: {_value(one.reference_value)})"
-            rows.append((name, _change(one).over(0.01), BLUE))
-    figure = _rows(rows, "change of the mean drag (%); bars: 95 % CI")
-    figure.axes[0].axvline(0.0, color="black", linewidth=0.8)
-    return figure
-
-
-def _value(value: object) -> str:
-    return f"{value:g}" if isinstance(value, int | float) else str(value)
-
-
 def _rows(rows: Sequence[_Row], label: str) -> Figure:
     """Values with their intervals, one below the other."""
     figure, (axes,) = new_panels(0.9 + 0.27 * len(rows))
@@ -289,20 +242,6 @@ def _rows(rows: Sequence[_Row], label: str) -> Figure:
         row(axes, place, one.value, one, colour)
     row_names(axes, [name for name, *_ in rows])
     axes.set(xlabel=label)
-    return figure
-
-
-def _spectrum(found: Spectrum) -> Figure:
-    """Power spectrum of the drag along the path."""
-    figure, (axes,) = new_panels(3.2)
-    waves, density, half = found.waves_per_diameter, found.density, found.half_wave.value
-    band(axes, waves, density, BLUE)
-    axes.loglog(waves, density.mean, color=BLUE, label="mean over packings; band: their range")
-    label = f"half of the variance to the left (wavelength > {half:.1f} particle diameters)"
-    axes.axvline(1.0 / half, color=RED, linestyle="--", label=label)
-    axes.set_xlabel("wavenumber (1 / particle diameter)")
-    axes.set_ylabel("power density (N² particle diameters)")
-    axes.legend(loc="upper right")
     return figure
 
 
@@ -318,8 +257,9 @@ def _around(found: Statements) -> Figure:
     return figure
 
 
-def _corridor(network: Network) -> Figure:
+def _corridor(found: Statements) -> Figure:
     """Mean contact force of the network ahead of the workpiece and behind it."""
+    network, far = found.network, found.numbers["far_n"]
     figure, (axes,) = new_panels(3.2)
     edges = np.array(network.edges_diameters)
     middle = (edges[1:] + edges[:-1]) / 2
@@ -329,7 +269,8 @@ def _corridor(network: Network) -> Figure:
         band(axes, middle, side, colour)
         axes.plot(middle, side.value, "o-", color=colour, label=name)
     wall = network.wall_diameters
-    axes.axhline(network.far_n.value, color="black", linestyle="--", label="far field")
+    if far is not None:
+        axes.axhline(far.value, color="black", linestyle="--", label="far field")
     axes.axvline(wall, color=GREY, linewidth=2.0)
     axes.text(wall, 0.0, " bowl wall", color=GREY, va="bottom")
     axes.set(ylabel="mean normal force\nper contact (N)", xlim=(0, wall + 0.5), ylim=(0, None))

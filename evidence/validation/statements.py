@@ -81,45 +81,22 @@ class Corridor:
 
 
 class Network(Part):
-    """The corridor over the packings.
-
-    Attributes
-    ----------
-    edges_diameters, wall_diameters, ahead_n, behind_n, far_n
-        As of `Corridor`.
-    ratio, at_wall : Estimate
-        Ratios of the mean contact force: ahead to behind; at the bowl's wall ahead to far away.
-    half_reach_diameters : Estimate or None
-        See `Corridor.half_reach`; None unless every packing has it.
-    """
+    """The corridor over the packings; see `Corridor`."""
 
     edges_diameters: tuple[float, ...]
     wall_diameters: float
     ahead_n: EstimateColumns
     behind_n: EstimateColumns
-    far_n: Estimate
-    ratio: Estimate
-    at_wall: Estimate
-    half_reach_diameters: Estimate | None
 
 
-def network(corridors: Sequence[Corridor]) -> Network:
-    """Average the corridors of the packings."""
-    ahead = np.array([one.ahead for one in corridors])
-    behind = np.array([one.behind for one in corridors])
-    far = [one.far for one in corridors]
-    ratios = (ahead.mean(axis=1) / behind.mean(axis=1)).tolist()
-    at_wall = (ahead[:, -1] / np.array(far)).tolist()
-    return Network(
-        edges_diameters=tuple(corridors[0].edges.tolist()),
-        wall_diameters=corridors[0].wall,
-        ahead_n=bin_by_bin(ahead),
-        behind_n=bin_by_bin(behind),
-        far_n=packing_mean(far),
-        ratio=packing_mean(ratios, ratio=True),
-        at_wall=packing_mean(at_wall, ratio=True),
-        half_reach_diameters=_together([one.half_reach for one in corridors], ratio=True),
-    )
+def network_numbers(one: Corridor) -> dict[str, float | None]:
+    """Numbers of a corridor, as of `Statements`."""
+    return {
+        "network_ratio": float(one.ahead.mean() / one.behind.mean()),
+        "network_at_wall": float(one.ahead[-1]) / one.far,
+        "far_n": one.far,
+        "half_reach_diameters": one.half_reach,
+    }
 
 
 def bin_by_bin(curves: Floats) -> EstimateColumns:
@@ -238,63 +215,63 @@ class Statements(Part):
 
     Attributes
     ----------
-    ahead_behind, deep_over_shallow, front_over_flank : Estimate
-        Ratios: of the normal force ahead to that behind, of a contact's mean normal force in the
-        deepest third to that in the shallowest, of the force on the front quarter to that on the
-        two eighths beside it.
-    outer_over_inner : Estimate or None
-        Ratio of the normal force on the half that points away from the bowl's axis to that on the
-        other; None off a circle.
-    fraction_ahead, front_fraction : Estimate
-        Fraction of the normal force ahead, and on the front quarter.
-    front_contact_n, flank_contact_n : Estimate
-        Mean normal force of a contact there.
-    depth_slope_n_per_m : Estimate
-        Slope of a contact's normal force over its depth.
+    numbers : mapping of str to Estimate or None
+        None unless every packing has the number.
+
+        ``ahead_behind``, ``deep_over_shallow``, ``front_over_flank``: ratios of the normal force
+        ahead to that behind, of a contact's mean normal force in the deepest third to that in the
+        shallowest, of the force on the front quarter to that on the two eighths beside it.
+        ``outer_over_inner``: ratio of the normal force on the half that points away from the bowl's
+        axis to that on the other, on a circle.
+        ``fraction_ahead``, ``front_fraction``: fraction of the normal force ahead, and on the front
+        quarter. ``front_contact_n``, ``flank_contact_n``: mean normal force of a contact there.
+        ``depth_slope_n_per_m``: slope of a contact's normal force over its depth.
+        ``network_ratio``, ``network_at_wall``: ratios of the mean contact force of the corridor,
+        ahead to behind, and at the bowl's wall ahead to far away. ``far_n``: that far away.
+        ``half_reach_diameters``: see `Corridor.half_reach`.
     azimuth, depth : PackingProfile
         See `Around`.
     network : Network
     """
 
     packings: int
-    ahead_behind: Estimate
-    fraction_ahead: Estimate
-    depth_slope_n_per_m: Estimate
-    deep_over_shallow: Estimate
-    front_fraction: Estimate
-    front_contact_n: Estimate
-    flank_contact_n: Estimate
-    front_over_flank: Estimate
-    outer_over_inner: Estimate | None
+    numbers: Mapping[str, Estimate | None]
     azimuth: PackingProfile
     depth: PackingProfile
     network: Network
 
 
-_RATIOS = ("ahead_behind", "deep_over_shallow", "front_over_flank", "outer_over_inner")
-"""Numbers that are averaged by their logarithms."""
+_NO_RATIOS = (
+    *("fraction_ahead", "front_fraction", "front_contact_n", "flank_contact_n"),
+    *("depth_slope_n_per_m", "far_n"),
+)
+"""Numbers that are averaged as they are, the others by their logarithms."""
 
 
 def of_packings(packings: Sequence[MeasuredRun]) -> Statements:
     """Every number over the packings."""
-    around = [contacts_of(run) for run in packings]
-    numbers = {
-        name: _together([one.numbers[name] for one in around], ratio=name in _RATIOS)
-        for name in around[0].numbers
-    }
-    profiles = {
-        "azimuth": _profile([one.azimuth for one in around], circumference(AZIMUTH_BINS)),
-        "depth": _profile([one.depth for one in around], around[0].depth_edges_m),
-    }
-    corridors = network([corridor(run) for run in packings])
-    return Statements.model_validate(
-        {"packings": len(packings), **numbers, **profiles, "network": corridors}
+    around, corridors = [contacts_of(run) for run in packings], [corridor(run) for run in packings]
+    found = [
+        {**one.numbers, **network_numbers(own)} for one, own in zip(around, corridors, strict=True)
+    ]
+    return Statements(
+        packings=len(packings),
+        numbers={name: _together(name, [one[name] for one in found]) for name in found[0]},
+        azimuth=_profile([one.azimuth for one in around], circumference(AZIMUTH_BINS)),
+        depth=_profile([one.depth for one in around], around[0].depth_edges_m),
+        network=Network(
+            edges_diameters=tuple(corridors[0].edges.tolist()),
+            wall_diameters=corridors[0].wall,
+            ahead_n=bin_by_bin(np.array([one.ahead for one in corridors])),
+            behind_n=bin_by_bin(np.array([one.behind for one in corridors])),
+        ),
     )
 
 
-def _together(values: Sequence[float | None], *, ratio: bool) -> Estimate | None:
+def _together(name: str, values: Sequence[float | None]) -> Estimate | None:
     """The mean over the packings; None unless every packing has the number."""
     known = [value for value in values if value is not None]
+    ratio = name not in _NO_RATIOS
     return packing_mean(known, ratio=ratio) if len(known) == len(values) else None
 
 
@@ -410,19 +387,17 @@ _CLAIMS = (
 
 def claims(found: Statements) -> tuple[Claim, ...]:
     """The statements that have a number here."""
-    network = {"network_ratio": found.network.ratio, "network_at_wall": found.network.at_wall}
-    numbers = {**dict(found), **network}
     return tuple(
         Claim(
             statement=statement,
             number=number,
             null=null,
             unit=unit,
-            verdict=numbers[number].exceeds(null),
-            estimate=numbers[number],
+            verdict=estimate.exceeds(null),
+            estimate=estimate,
         )
         for statement, number, null, unit in _CLAIMS
-        if numbers[number] is not None
+        if (estimate := found.numbers[number]) is not None
     )
 
 

@@ -53,7 +53,7 @@ READ_OFF, READ_OFF_CURVE = 0.01, 0.05
 """Points of a published figure, and values between them."""
 
 EXACT = "exact formula"
-INTEGRATED = "law integrated by scipy"
+INTEGRATED = "law integrated in small steps"
 COULOMB = "Coulomb sliding of rigid bodies"
 INPUT = "input restitution"
 PUBLISHED = "published curve"

@@ -18,7 +18,7 @@ from evidence.verification.law import (
     ContactPair,
     Particle,
     RelativeMotion,
-    integrated_impact,
+    integrated_impacts,
     sliding_impact,
 )
 
@@ -62,6 +62,14 @@ class Recording:
     def contacts(self) -> "tuple[RecordedContact, ...]":
         """The contacts of the run."""
         return tuple(RecordedContact(self, meeting) for meeting in self.case.contacts)
+
+    @cached_property
+    def integrated(self) -> Sequence[RelativeMotion]:
+        """Motions after the impacts by the integrated law."""
+        impacts = self.contacts
+        return integrated_impacts(
+            [one.constants for one in impacts], [one.before for one in impacts]
+        )
 
     @property
     def contact(self) -> "RecordedContact":
@@ -163,10 +171,10 @@ class RecordedContact:
         """Normal speed after the impact over that before."""
         return self.after.normal_m_s / self.before.normal_m_s
 
-    @cached_property
+    @property
     def integrated(self) -> RelativeMotion:
-        """Motion after the impact by the law integrated by scipy."""
-        return integrated_impact(self.constants, self.before).after
+        """Motion after the impact by the integrated law."""
+        return self.run.integrated[self.run.case.contacts.index(self.meeting)]
 
     @property
     def slid(self) -> RelativeMotion | None:

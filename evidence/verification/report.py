@@ -202,7 +202,7 @@ def in_words(quantity: str) -> str:
 
 _LINES: Mapping[str, Mapping[str, Any]] = {
     EXACT: {"label": "line: exact formula"},
-    INTEGRATED: {"label": "line: contact law integrated by scipy"},
+    INTEGRATED: {"label": "line: contact law integrated in small steps"},
     COULOMB: {"color": "black", "ls": "--", "label": "rigid-body sliding with Coulomb friction"},
     INPUT: {"color": "black", "ls": ":", "label": "input value"},
     TOLERANCE: {"color": GREY, "ls": ":", "label": "tolerance"},

@@ -1,12 +1,13 @@
 """The verification suite: what each test of ``suite.yaml`` asks LIGGGHTS for."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
+import numpy as np
 import yaml
 from pydantic import Field, model_validator
 
@@ -107,20 +108,16 @@ class Lab:
         return f"{self._own.get(first, first)} on {self._own.get(second, second)}"
 
 
+Make = Callable[..., Experiment]
+"""`experiment` of a test: its further arguments."""
+
+
 class Test(Model):
     """A test of the suite: its number, what a reader calls it, and paragraphs (HTML) about it."""
 
     number: Whole
     title: str
     text: tuple[str, ...]
-
-    def experiments(self, name: str, lab: Lab) -> Iterator[Experiment]:
-        """The runs of the test of that name."""
-        raise NotImplementedError
-
-    def made(self, name: str, *slug: str, **own: Any) -> Experiment:
-        """A run of this test, see `experiment`."""
-        return experiment(name, self.number, self.title, slug, **own)
 
 
 # --- impacts, many in a run -----------------------------------------------------------------
@@ -168,15 +165,15 @@ class Impacts(Test):
         """Normal speed of particle and partner towards each other, m/s."""
         return self.speed_m_s * math.cos(math.radians(self.angle_deg)) + self.partner_speed_m_s
 
-    def experiments(self, name: str, lab: Lab) -> Iterator[Experiment]:
+    def racks(self, lab: Lab, made: Make) -> Iterator[Experiment]:
         """A run for each series, contact option and number of steps."""
         for series in self.series:
             for limit_force in self.limit_force:
                 for steps in self.steps_per_contact or (lab.steps_per_contact,):
-                    yield self._rack(name, lab, series, limit_force, steps)
+                    yield self._rack(made, lab, series, limit_force, steps)
 
     def _rack(
-        self, name: str, lab: Lab, series: Series, limit_force: bool, steps: int
+        self, made: Make, lab: Lab, series: Series, limit_force: bool, steps: int
     ) -> Experiment:
         """All impacts of a series side by side, far from each other."""
         ((kind, values),) = self.vary.items()
@@ -200,10 +197,9 @@ class Impacts(Test):
             met = first + 1 if self.partner == "particle" else "plane"
             contacts.append(ContactFacts(first, met, value))
         words = lab.series(series.material, struck)
-        return self.made(
-            name,
-            *(series.material, struck, "limited" if limit_force else "unlimited"),
-            *([f"{steps}-steps"] if self.steps_per_contact else []),
+        slug = [series.material, struck, "limited" if limit_force else "unlimited"]
+        return made(
+            [*slug, f"{steps}-steps"] if self.steps_per_contact else slug,
             series=words,
             vary=kind,
             steps_per_contact=steps,
@@ -256,196 +252,135 @@ class Impacts(Test):
 
 # --- tests that the suite has once each -----------------------------------------------------
 
-
-class OnWall(Test):
-    """Particles of a material and walls of another."""
-
-    material: str
-    against: str
-    radius_m: Positive
-    steps_per_contact: list[Whole]
+_RADIUS_M = 0.0025
+"""Of the particles on walls, which are of the study's media, m; the walls are of its workpiece."""
 
 
-class Bounce(OnWall):
+def _bounces(lab: Lab, made: Make) -> Iterator[Experiment]:
     """One elastic particle between two walls: what many impacts do to its energy."""
-
-    speed_m_s: Positive
-    impacts: Whole
-    flight_contacts: Positive = Field(description="flight between impacts over the contact time")
-
-    def experiments(self, name: str, lab: Lab) -> Iterator[Experiment]:
-        """A run for each number of steps."""
-        particle, wall = lab.material(self.material), lab.material(self.against)
-        time = hertz_time(particle, self.radius_m, wall, None, self.speed_m_s)
-        flight = self.flight_contacts * time
-        top = 2 * self.radius_m + self.speed_m_s * flight
-        for steps in self.steps_per_contact:
-            dt = round_to(time / steps, 4)
-            yield self.made(
-                name,
-                f"{steps}-steps",
-                series=lab.series(self.material, self.against),
-                vary="impact",
-                steps_per_contact=steps,
-                contacts=[ContactFacts(1, "floor", 0)],
-                impacts=self.impacts,
-                types=[(self.material, particle), (self.against, wall)],
-                pairs={(1, 2): Pair(restitution=1, friction=0)},
-                bodies=[PlacedSphere(1, self.radius_m, (0, 0, top / 2), (0, 0, -self.speed_m_s))],
-                walls=[Wall("floor", 2, "zplane 0.0"), Wall("ceiling", 2, f"zplane {top!r}")],
-                timestep_s=dt,
-                steps=math.ceil(self.impacts * (flight + 1.03 * time) / dt),
-                period=max(1, steps // 5),
-            )
-
-
-class Collision(Model):
-    """A closed collision of two particles."""
-
-    axis: tuple[Number, Number, Number]
-    velocity_m_s: tuple[Number, Number, Number]
-    spin_rad_s: tuple[Number, Number, Number]
-    partner_spin_rad_s: tuple[Number, Number, Number]
-
-    @property
-    def direction(self) -> Vector:
-        """Unit vector from the partner to the first particle."""
-        size = math.hypot(*self.axis)
-        x, y, z = (component / size for component in self.axis)
-        return (x, y, z)
-
-    @property
-    def closing_m_s(self) -> float:
-        """Speed at which the first particle comes down its line of centres, m/s."""
-        return -sum(v * x for v, x in zip(self.velocity_m_s, self.direction, strict=True))
-
-
-class Momentum(Test):
-    """Closed collisions in any direction: momentum is kept."""
-
-    material: str
-    radii_m: tuple[Positive, Positive]
-    collisions: list[Collision]
-
-    def experiments(self, name: str, lab: Lab) -> Iterator[Experiment]:
-        """All collisions in one run."""
-        particle, (first, second) = lab.material(self.material), self.radii_m
-        times = [
-            hertz_time(particle, first, particle, second, collision.closing_m_s)
-            for collision in self.collisions
-        ]
-        dt = round_to(min(times) / lab.steps_per_contact, 4)
-        bodies = [
-            body
-            for at, collision in enumerate(self.collisions)
-            for body in self._bodies(at, collision, dt)
-        ]
-        yield self.made(
-            name,
-            self.material,
-            series=lab.series(self.material, self.material),
-            vary="collision",
-            steps_per_contact=lab.steps_per_contact,
-            contacts=[ContactFacts(at, at + 1, (at + 1) / 2) for at in range(1, len(bodies), 2)],
-            types=[(self.material, particle)],
-            pairs={(1, 1): lab.pair(self.material, self.material)},
-            bodies=bodies,
-            timestep_s=dt,
-            steps=math.ceil(_LONGEST_CONTACTS * max(times) / dt),
-        )
-
-    def _bodies(self, at: int, collision: Collision, timestep_s: float) -> Iterator[PlacedSphere]:
-        first, second = self.radii_m
-        distance = first + second + _APPROACH_STEPS * timestep_s * collision.closing_m_s
-        centre = (0.0, at * 8 * second, 0.0)
-        x, y, z = (c + distance * n for c, n in zip(centre, collision.direction, strict=True))
-        yield PlacedSphere(1, first, (x, y, z), collision.velocity_m_s, collision.spin_rad_s)
-        yield PlacedSphere(1, second, centre, spin_rad_s=collision.partner_spin_rad_s)
-
-
-class Resting(OnWall):
-    """Particles on a plane."""
-
-    duration_s: Positive
-
-    def resting(
-        self,
-        name: str,
-        lab: Lab,
-        slug: str,
-        bodies: Sequence[PlacedSphere],
-        frames: int,
-        **more: Any,
-    ) -> Experiment:
-        """The run; its plane is the last type, and its particles have one each or share one."""
-        particle, floor = lab.material(self.material), lab.material(self.against)
-        steps, last = self.steps_per_contact[0], max(body.type for body in bodies) + 1
-        fallen = mechanics.fall_speed(self.radius_m, lab.study.gravity_m_s2)
-        dt = round_to(hertz_time(particle, self.radius_m, floor, None, fallen) / steps, 4)
-        return self.made(
-            name,
-            slug,
-            series=lab.series(self.material, self.against),
+    particle, wall = lab.material("media"), lab.material("workpiece")
+    speed, impacts = 0.4429, 1000
+    time = hertz_time(particle, _RADIUS_M, wall, None, speed)
+    flight = 1.37 * time
+    top = 2 * _RADIUS_M + speed * flight
+    for steps in (20, 100):
+        dt = round_to(time / steps, 4)
+        yield made(
+            [f"{steps}-steps"],
+            series=lab.series("media", "workpiece"),
+            vary="impact",
             steps_per_contact=steps,
-            types=[*[(self.material, particle)] * (last - 1), (self.against, floor)],
-            bodies=bodies,
-            walls=[Wall("plane", last, "zplane 0.0")],
+            contacts=[ContactFacts(1, "floor", 0)],
+            impacts=impacts,
+            types=[("media", particle), ("workpiece", wall)],
+            pairs={(1, 2): Pair(restitution=1, friction=0)},
+            bodies=[PlacedSphere(1, _RADIUS_M, (0, 0, top / 2), (0, 0, -speed))],
+            walls=[Wall("floor", 2, "zplane 0.0"), Wall("ceiling", 2, f"zplane {top!r}")],
             timestep_s=dt,
-            steps=math.ceil(self.duration_s / dt),
-            period=max(1, round(self.duration_s / dt / frames)),
-            **more,
+            steps=math.ceil(impacts * (flight + 1.03 * time) / dt),
+            period=max(1, steps // 5),
         )
 
 
-class StandingColumn(Resting):
+_COLLISIONS: tuple[tuple[Vector, Vector, Vector, Vector], ...] = (
+    ((0, 0, 1), (0.3, 0.1, -0.5), (50, -20, 30), (0, 0, 0)),
+    ((1, 2, 2), (-0.4, -0.1, -0.3), (-80, 10, 0), (30, 40, -10)),
+    ((-3, 1, 1), (0.6, 0.2, -0.1), (0, 0, 200), (0, 150, 0)),
+)
+"""Closed collisions of two particles: line of centres, velocity of the first in m/s, spins of both
+in rad/s."""
+
+
+def _collisions(lab: Lab, made: Make) -> Iterator[Experiment]:
+    """Closed collisions in any direction, all in one run: momentum is kept."""
+    particle, first, second = lab.material("media"), 0.003, 0.0042
+    lines = [np.array(axis) / math.hypot(*axis) for axis, *_ in _COLLISIONS]
+    closing = [-float(np.dot(v, line)) for line, (_, v, *_) in zip(lines, _COLLISIONS, strict=True)]
+    times = [hertz_time(particle, first, particle, second, speed) for speed in closing]
+    dt = round_to(min(times) / lab.steps_per_contact, 4)
+    bodies = []
+    for at, (_, velocity, spin, partner_spin) in enumerate(_COLLISIONS):
+        distance = first + second + _APPROACH_STEPS * dt * closing[at]
+        centre = (0.0, at * 8 * second, 0.0)
+        x, y, z = (centre + distance * lines[at]).tolist()
+        bodies.append(PlacedSphere(1, first, (x, y, z), velocity, spin))
+        bodies.append(PlacedSphere(1, second, centre, spin_rad_s=partner_spin))
+    yield made(
+        ["media"],
+        series=lab.series("media", "media"),
+        vary="collision",
+        steps_per_contact=lab.steps_per_contact,
+        contacts=[ContactFacts(at, at + 1, (at + 1) / 2) for at in range(1, len(bodies), 2)],
+        types=[("media", particle)],
+        pairs={(1, 1): lab.pair("media", "media")},
+        bodies=bodies,
+        timestep_s=dt,
+        steps=math.ceil(_LONGEST_CONTACTS * max(times) / dt),
+    )
+
+
+def _on_plane(
+    lab: Lab, make: Make, steps: int, duration_s: float, frames: int, bodies: Sequence[PlacedSphere]
+) -> Make:
+    """Particles on a plane, which is the last type; the particles have one each or share one."""
+    particle, floor = lab.material("media"), lab.material("workpiece")
+    last = max(body.type for body in bodies) + 1
+    fallen = mechanics.fall_speed(_RADIUS_M, lab.study.gravity_m_s2)
+    dt = round_to(hertz_time(particle, _RADIUS_M, floor, None, fallen) / steps, 4)
+    return partial(
+        make,
+        series=lab.series("media", "workpiece"),
+        steps_per_contact=steps,
+        types=[*[("media", particle)] * (last - 1), ("workpiece", floor)],
+        bodies=bodies,
+        walls=[Wall("plane", last, "zplane 0.0")],
+        timestep_s=dt,
+        steps=math.ceil(duration_s / dt),
+        period=max(1, round(duration_s / dt / frames)),
+    )
+
+
+def _column(lab: Lab, made: Make) -> Iterator[Experiment]:
     """Particles that stand on each other: what they do at rest."""
-
-    particles: Whole
-
-    def experiments(self, name: str, lab: Lab) -> Iterator[Experiment]:
-        """One run."""
-        own, radius, numbers = self.material, self.radius_m, range(1, self.particles + 1)
-        yield self.resting(
-            name,
-            lab,
-            f"{self.particles}-particles",
-            vary="particle",
-            contacts=[ContactFacts(at, at - 1 or "plane", at) for at in numbers],
-            pairs={(1, 2): lab.pair(own, self.against), (1, 1): lab.pair(own, own)},
-            bodies=[PlacedSphere(1, radius, (0, 0, (2 * at - 1) * radius)) for at in numbers],
-            gravity_m_s2=(0.0, 0.0, -lab.study.gravity_m_s2),
-            frames=1000,
-        )
+    numbers = range(1, 6)
+    bodies = [PlacedSphere(1, _RADIUS_M, (0, 0, (2 * at - 1) * _RADIUS_M)) for at in numbers]
+    yield _on_plane(lab, made, 25, 0.12, 1000, bodies)(
+        [f"{len(bodies)}-particles"],
+        vary="particle",
+        contacts=[ContactFacts(at, at - 1 or "plane", at) for at in numbers],
+        pairs={(1, 2): lab.pair("media", "workpiece"), (1, 1): lab.pair("media", "media")},
+        gravity_m_s2=(0.0, 0.0, -lab.study.gravity_m_s2),
+    )
 
 
-class Incline(Resting):
-    """Particles in steady motion on an incline; the friction differs from particle to particle."""
+def _incline(lab: Lab, made: Make) -> Iterator[Experiment]:
+    """Particles in steady motion on an incline.
 
-    angle_deg: Positive
-    slip_ratio: list[Positive]
-    restitution: Number
+    Below a friction of 2/7 tan(angle), 1 / ratio of it, a sphere slips.
+    """
+    degrees, ratios = 30.0, dict(enumerate((0.2, 0.5, 0.9, 1.0, 1.1, 1.5, 3.0, 10.0), start=1))
+    angle, size, last = math.radians(degrees), lab.study.gravity_m_s2, len(ratios) + 1
+    pairs = {
+        (at, last): Pair(restitution=0.3, friction=math.tan(angle) / 3.5 / ratio)
+        for at, ratio in ratios.items()
+    }
+    bodies = [PlacedSphere(at, _RADIUS_M, (0, 6 * at * _RADIUS_M, _RADIUS_M)) for at in ratios]
+    yield _on_plane(lab, made, 100, 0.03, 500, bodies)(
+        [f"{degrees:g}-degrees"],
+        vary="slip_ratio",
+        contacts=[ContactFacts(at, "plane", ratio) for at, ratio in ratios.items()],
+        angle_deg=degrees,
+        pairs=pairs,
+        gravity_m_s2=(size * math.sin(angle), 0.0, -size * math.cos(angle)),
+    )
 
-    def experiments(self, name: str, lab: Lab) -> Iterator[Experiment]:
-        """One run. Below a friction of 2/7 tan(angle), 1 / ratio of it, a sphere slips."""
-        angle, size = math.radians(self.angle_deg), lab.study.gravity_m_s2
-        ratios = dict(enumerate(self.slip_ratio, start=1))
-        radius, last = self.radius_m, len(ratios) + 1
-        pairs = {
-            (at, last): Pair(restitution=self.restitution, friction=math.tan(angle) / 3.5 / ratio)
-            for at, ratio in ratios.items()
-        }
-        yield self.resting(
-            name,
-            lab,
-            f"{self.angle_deg:g}-degrees",
-            vary="slip_ratio",
-            contacts=[ContactFacts(at, "plane", ratio) for at, ratio in ratios.items()],
-            angle_deg=self.angle_deg,
-            pairs=pairs,
-            bodies=[PlacedSphere(at, radius, (0, 6 * at * radius, radius)) for at in ratios],
-            gravity_m_s2=(size * math.sin(angle), 0.0, -size * math.cos(angle)),
-            frames=500,
-        )
+
+_OTHERS: Mapping[str, Callable[[Lab, Make], Iterator[Experiment]]] = {
+    "bounce": _bounces,
+    "momentum": _collisions,
+    "column": _column,
+    "incline": _incline,
+}
 
 
 # --- the suite as a whole -------------------------------------------------------------------
@@ -459,15 +394,11 @@ class SuiteFile(Model):
     notes: dict[str, str]
     axes: dict[str, dict[str, str | tuple[float, float]]]
     impacts: dict[str, Impacts]
-    bounce: Bounce
-    momentum: Momentum
-    column: StandingColumn
-    incline: Incline
+    others: dict[str, Test]
 
     def tests(self) -> Mapping[str, Test]:
         """Every test by its name, in the order of the page."""
-        single = ("bounce", "momentum", "column", "incline")
-        return {**self.impacts, **{name: getattr(self, name) for name in single}}
+        return {**self.impacts, **self.others}
 
     def lab(self, study: Study) -> Lab:
         """Where the experiments for a study are made."""
@@ -484,6 +415,8 @@ def suite_file() -> SuiteFile:
 def suite_of(study: Study) -> Mapping[str, Experiment]:
     """The experiments of the suite for a study, by run id."""
     file = suite_file()
-    lab = file.lab(study)
-    every = (one for name, test in file.tests().items() for one in test.experiments(name, lab))
-    return {experiment.case.run: experiment for experiment in every}
+    lab, found = file.lab(study), list[Experiment]()
+    for name, test in file.tests().items():
+        made = partial(experiment, name, test.number, test.title)
+        found += test.racks(lab, made) if isinstance(test, Impacts) else _OTHERS[name](lab, made)
+    return {experiment.case.run: experiment for experiment in found}

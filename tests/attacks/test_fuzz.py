@@ -3,8 +3,8 @@
 from pathlib import Path
 
 import pytest
-from attack.calls import run_function
-from attack.fuzz import FUZZES, fuzzed
+from attack.calls import main_of
+from attack.fuzz import FUZZES
 
 pytestmark = [pytest.mark.engine, pytest.mark.slow]
 
@@ -17,5 +17,5 @@ def test_it_is_read_rightly_or_refused(
     attack: str, tmp_path: Path, seed: int, request: pytest.FixtureRequest
 ) -> None:
     examples = MANY if request.config.getoption("--attacks") else FEW
-    said = run_function(fuzzed, (attack, seed, examples), tmp_path, 300.0)
+    said = main_of("fuzz", (attack, seed, examples), tmp_path, 300.0)
     assert said.status == 0, said.tail

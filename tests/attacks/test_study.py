@@ -1,7 +1,7 @@
 """Hostile studies: no input becomes code, and a mistake is named as what it is."""
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +9,7 @@ import pytest
 from attack.calls import main_of, refused
 from attack.checked import ACCEPTED, ANSWERED_IN_S, HARMLESS, REFUSED, WARNED, checked
 from attack.ground import STUDY, TINY_STUDY, new_project, tiny_study, write_study
+from made_study import put
 
 pytestmark = [pytest.mark.engine, pytest.mark.slow]
 
@@ -28,24 +29,11 @@ _INJECTIONS = {
     "100,000 letters": "a" * 100_000,
 }
 
-Change = Callable[[dict[str, Any]], None]
+Change = Mapping[str, Any] | Callable[[dict[str, Any]], None]
+"""Fields by their dotted names, or what is done to the study."""
 
 
-def put(**values: object) -> Change:
-    """Set fields: dots are double underscores."""
-
-    def change(data: dict[str, Any]) -> None:
-        for path, value in values.items():
-            *above, name = path.split("__")
-            place = data
-            for part in above:
-                place = place.setdefault(part, {})
-            place[name] = value
-
-    return change
-
-
-def _renamed(old: str, new: str) -> Change:
+def _renamed(old: str, new: str) -> Callable[[dict[str, Any]], None]:
     """A material of another name, wherever it stands."""
 
     def change(data: dict[str, Any]) -> None:
@@ -69,17 +57,17 @@ _SETTINGS = {"youngs_modulus_scale": 1e-3, "timestep_fraction": 0.6, "ranks": 1}
 
 def _injected(what: str, text: str) -> dict[str, Study]:
     """Text in every place of a study that takes some."""
-    chosen = put(fidelities={text: _SETTINGS}, fidelity=text)
-    swept = put(sweep={"title": ["b", text]})
+    chosen = {"fidelities": {text: _SETTINGS}, "fidelity": text}
+    swept = {"sweep": {"title": ["b", text]}}
     found: dict[str, Study] = {
-        f"title with {what}": (put(title=text), ("title",), (REFUSED, HARMLESS), STUDY),
+        f"title with {what}": ({"title": text}, ("title",), (REFUSED, HARMLESS), STUDY),
         f"material with {what}": (_renamed("steel", text), ("material",), (REFUSED,), STUDY),
         f"fidelity with {what}": (chosen, ("fidelit",), (REFUSED,), STUDY),
         f"swept title with {what}": (swept, ("title",), (REFUSED, HARMLESS), STUDY),
     }
     if "\x00" not in text and len(text) < 250:
         folder = text.replace("/", "")
-        found[f"study folder with {what}"] = (put(), ("name|study",), (REFUSED,), folder)
+        found[f"study folder with {what}"] = ({}, ("name|study",), (REFUSED,), folder)
     return found
 
 
@@ -125,76 +113,68 @@ _TEXTS: dict[str, bytes] = {
 }
 
 
-def _merge(*changes: Change) -> Change:
-    def change(data: dict[str, Any]) -> None:
-        for each in changes:
-            each(data)
-
-    return change
-
-
-_SHAPE = "workpiece__shape"
+_SHAPE = "workpiece.shape"
 _REFUSED_FIELDS: tuple[tuple[str, Change, tuple[str, ...]], ...] = (
-    ("a key that is unknown", put(speeed=1), ("speeed",)),
-    ("a near miss of a key", put(motion__speed_ms=1), ("speed_ms", "speed_m_s")),
-    ("a pair twice", put(**{"pairs__steel-ceramic": {"restitution": 0.1, "friction": 0.9}}),
+    ("a key that is unknown", {"speeed": 1}, ("speeed",)),
+    ("a near miss of a key", {"motion.speed_ms": 1}, ("speed_ms", "speed_m_s")),
+    ("a pair twice", {"pairs.steel-ceramic": {"restitution": 0.1, "friction": 0.9}},
      ("steel-ceramic", "ceramic-steel")),
-    ("the transient is the path", put(motion__transient_m=0.005026548245743669), ("transient_m",)),
-    ("the transient is beyond the path", put(motion__transient_m=1.0), ("transient_m",)),
-    ("an energy ratio of a bed that moves", put(filling__energy_ratio=1), ("energy_ratio",)),
-    ("a sweep of a sweep", put(sweep={"sweep": [{"seed": [1, 2]}]}), ("sweep",)),
-    ("a sweep into a sweep", put(sweep={"sweep.seed": [[1, 2]]}), ("sweep",)),
-    ("a sweep of nothing", put(sweep={"": [1]}), ("sweep",)),
-    ("a sweep of dots", put(sweep={"motion..speed_m_s": [1]}), ("motion..speed_m_s",)),
-    ("a sweep of __class__", put(sweep={"__class__": [1]}), ("__class__",)),
-    ("a sweep value twice", put(sweep={"seed": [1, 1]}), ("sweep|seed",)),
-    ("a sweep value twice, written otherwise", put(sweep={"seed": [1, 1.0]}), ("sweep|seed",)),
-    ("no sweep value", put(sweep={"seed": []}), ("seed",)),
-    ("1,000,000 cases", put(sweep={"seed": list(range(1000)), "motion.speed_m_s":
-                                   [0.01 + 1e-6 * n for n in range(1000)]}), ("cases",)),
-    ("5000 ranks", put(fidelities__quick__ranks=5000), ("ranks",)),
-    ("a truth value as direction", put(motion__path__direction=True), ("direction",)),
-    ("a time step of twice the Rayleigh time", put(fidelities__quick__timestep_fraction=2.0),
+    ("the transient is the path", {"motion.transient_m": 0.005026548245743669}, ("transient_m",)),
+    ("the transient is beyond the path", {"motion.transient_m": 1.0}, ("transient_m",)),
+    ("an energy ratio of a bed that moves", {"filling.energy_ratio": 1}, ("energy_ratio",)),
+    ("a sweep of a sweep", {"sweep": {"sweep": [{"seed": [1, 2]}]}}, ("sweep",)),
+    ("a sweep into a sweep", {"sweep": {"sweep.seed": [[1, 2]]}}, ("sweep",)),
+    ("a sweep of nothing", {"sweep": {"": [1]}}, ("sweep",)),
+    ("a sweep of dots", {"sweep": {"motion..speed_m_s": [1]}}, ("motion..speed_m_s",)),
+    ("a sweep of __class__", {"sweep": {"__class__": [1]}}, ("__class__",)),
+    ("a sweep value twice", {"sweep": {"seed": [1, 1]}}, ("sweep|seed",)),
+    ("a sweep value twice, written otherwise", {"sweep": {"seed": [1, 1.0]}}, ("sweep|seed",)),
+    ("no sweep value", {"sweep": {"seed": []}}, ("seed",)),
+    ("1,000,000 cases", {"sweep": {"seed": list(range(1000)), "motion.speed_m_s":
+                                   [0.01 + 1e-6 * n for n in range(1000)]}}, ("cases",)),
+    ("5000 ranks", {"fidelities.quick.ranks": 5000}, ("ranks",)),
+    ("a truth value as direction", {"motion.path.direction": True}, ("direction",)),
+    ("a time step of twice the Rayleigh time", {"fidelities.quick.timestep_fraction": 2.0},
      ("timestep_fraction",)),
-    ("a step in which a particle crosses its radius", put(motion__speed_m_s=500.0), ("speed",)),
+    ("a step in which a particle crosses its radius", {"motion.speed_m_s": 500.0}, ("speed",)),
     ("a workpiece shorter than its immersion",
-     put(bowl__height_m=0.03, motion__immersion_depth_m=0.029), ("immersion|height|floor",)),
-    ("a gap below a diameter", put(motion__path__radius_m=0.017), (r"gap|motion\.path",)),
-    ("a path out of the bowl", put(motion__path__radius_m=0.1), ("radius_m|bowl|wall",)),
-    ("more particles than the bowl takes", put(media__count=1_000_000), ("count|height",)),
-    ("1e15 particles", put(media__count=10**15), ("count",)),
-    ("particles of no size", put(media__radius_mean_m=1e-300), ("radius_mean_m",)),
-    ("facets of 1 nm", put(workpiece__shape__facet_size_m=1e-9), ("facet_size_m",)),
-    ("facets of 1 nm in the bowl", put(bowl__facet_size_m=1e-9), ("facet_size_m",)),
-    ("a path of 1e9 revolutions", put(motion__path__revolutions=1e9), ("revolutions|steps",)),
-    ("a speed of 1e-12 m/s", put(motion__speed_m_s=1e-12), ("speed_m_s|steps",)),
-    ("a force sampled at 1e30 Hz", put(outputs__workpiece_force_hz=1e30), ("workpiece_force_hz",)),
-    ("1e18 checkpoints", put(outputs__n_checkpoints=10**18), ("n_checkpoints",)),
-    ("a mesh out of the project", put(**{_SHAPE: {"kind": "mesh", "unit": "mm",
-     "file": "../../../../../../etc/passwd"}}), ("passwd|file",)),
-    ("a mesh that is /dev/zero", put(**{_SHAPE: {"kind": "mesh", "unit": "mm",
-     "file": "/dev/zero"}}), ("zero|file",)),
-    ("a mesh that is a folder", put(**{_SHAPE: {"kind": "mesh", "unit": "mm", "file": "."}}),
+     {"bowl.height_m": 0.03, "motion.immersion_depth_m": 0.029}, ("immersion|height|floor",)),
+    ("a gap below a diameter", {"motion.path.radius_m": 0.017}, (r"gap|motion\.path",)),
+    ("a path out of the bowl", {"motion.path.radius_m": 0.1}, ("radius_m|bowl|wall",)),
+    ("more particles than the bowl takes", {"media.count": 1_000_000}, ("count|height",)),
+    ("1e15 particles", {"media.count": 10**15}, ("count",)),
+    ("particles of no size", {"media.radius_mean_m": 1e-300}, ("radius_mean_m",)),
+    ("facets of 1 nm", {"workpiece.shape.facet_size_m": 1e-9}, ("facet_size_m",)),
+    ("facets of 1 nm in the bowl", {"bowl.facet_size_m": 1e-9}, ("facet_size_m",)),
+    ("a path of 1e9 revolutions", {"motion.path.revolutions": 1e9}, ("revolutions|steps",)),
+    ("a speed of 1e-12 m/s", {"motion.speed_m_s": 1e-12}, ("speed_m_s|steps",)),
+    ("a force sampled at 1e30 Hz", {"outputs.workpiece_force_hz": 1e30}, ("workpiece_force_hz",)),
+    ("1e18 checkpoints", {"outputs.n_checkpoints": 10**18}, ("n_checkpoints",)),
+    ("a mesh out of the project", {_SHAPE: {"kind": "mesh", "unit": "mm",
+     "file": "../../../../../../etc/passwd"}}, ("passwd|file",)),
+    ("a mesh that is /dev/zero", {_SHAPE: {"kind": "mesh", "unit": "mm",
+     "file": "/dev/zero"}}, ("zero|file",)),
+    ("a mesh that is a folder", {_SHAPE: {"kind": "mesh", "unit": "mm", "file": "."}},
      ("file",)),
-    ("three mistakes", _merge(put(bowl__radius_m=-1), put(media__count="many"),
-     put(motion__speed_m_s=0)), ("radius_m", "count", "speed_m_s", r"line \d|yaml:\d")),
+    ("three mistakes", {"bowl.radius_m": -1, "media.count": "many", "motion.speed_m_s": 0},
+     ("radius_m", "count", "speed_m_s", r"line \d|yaml:\d")),
 )  # fmt: skip
 
 _SLIPS: tuple[tuple[str, Change, tuple[str, ...]], ...] = (
-    ("immersion 50 for mm", put(motion__immersion_depth_m=50), ("immersion_depth_m", r"\bmm\b")),
-    ("workpiece of radius 5 for mm", put(workpiece__shape__radius_m=5), ("radius_m", r"\bmm\b")),
-    ("bowl of radius 40 for mm", put(bowl__radius_m=40), ("radius_m", r"\bmm\b")),
-    ("bowl 100 high for mm", put(bowl__height_m=100), ("height_m", r"\bmm\b")),
-    ("particles of radius 3.27 for mm", put(media__radius_mean_m=3.27),
+    ("immersion 50 for mm", {"motion.immersion_depth_m": 50}, ("immersion_depth_m", r"\bmm\b")),
+    ("workpiece of radius 5 for mm", {"workpiece.shape.radius_m": 5}, ("radius_m", r"\bmm\b")),
+    ("bowl of radius 40 for mm", {"bowl.radius_m": 40}, ("radius_m", r"\bmm\b")),
+    ("bowl 100 high for mm", {"bowl.height_m": 100}, ("height_m", r"\bmm\b")),
+    ("particles of radius 3.27 for mm", {"media.radius_mean_m": 3.27},
      ("radius_mean_m", r"\bmm\b")),
-    ("modulus 77 for GPa", put(materials__ceramic__youngs_modulus_pa=77),
+    ("modulus 77 for GPa", {"materials.ceramic.youngs_modulus_pa": 77},
      ("youngs_modulus_pa", "GPa")),
-    ("density 2.656 for g/cm3", put(materials__ceramic__density_kg_m3=2.656),
+    ("density 2.656 for g/cm3", {"materials.ceramic.density_kg_m3": 2.656},
      ("density_kg_m3", "g/cm")),
-    ("a speed of 10 m/s", put(motion__speed_m_s=10), ("speed_m_s", "m/s|mm")),
-    ("network at 1e-9 Hz", put(outputs__network_hz=1e-9), ("network_hz",)),
-    ("gravity of 9810 mm/s2", put(gravity_m_s2=9810), ("gravity_m_s2", "mm")),
-    ("a path of radius 8 mm", put(motion__path__radius_m=8), ("radius_m", r"\bmm\b")),
+    ("a speed of 10 m/s", {"motion.speed_m_s": 10}, ("speed_m_s", "m/s|mm")),
+    ("network at 1e-9 Hz", {"outputs.network_hz": 1e-9}, ("network_hz",)),
+    ("gravity of 9810 mm/s2", {"gravity_m_s2": 9810}, ("gravity_m_s2", "mm")),
+    ("a path of radius 8 mm", {"motion.path.radius_m": 8}, ("radius_m", r"\bmm\b")),
 )  # fmt: skip
 
 
@@ -202,8 +182,8 @@ _CHANGED: dict[str, Study] = {
     **{name: row for item in _INJECTIONS.items() for name, row in _injected(*item).items()},
     **{f"material {name!a}": (_renamed("steel", name), ("material",), (REFUSED,), STUDY)
        for name in _MATERIALS},
-    **{f"study name {name!a}": (put(), ("name|study",), (REFUSED,), name) for name in _NAMES},
-    **{f"study folder {name[:20]!a}": (put(), ("name|study|usage",), (REFUSED,), name)
+    **{f"study name {name!a}": ({}, ("name|study",), (REFUSED,), name) for name in _NAMES},
+    **{f"study folder {name[:20]!a}": ({}, ("name|study|usage",), (REFUSED,), name)
        for name in _FOLDERS},
     **{what: (change, named, (REFUSED,), STUDY) for what, change, named in _REFUSED_FIELDS},
     **{f"unit slip: {what}": (change, named, (REFUSED, WARNED), STUDY)
@@ -216,7 +196,10 @@ def test_a_hostile_study_is_refused(attack: Study, tmp_path: Path) -> None:
     change, named, wanted, name = attack
     project = new_project(tmp_path / "project")
     data = tiny_study()
-    change(data)
+    if callable(change):
+        change(data)
+    else:
+        put(data, change)
     write_study(project, data)
     if name not in ("", ".") and "/" not in name:
         (project / "studies" / STUDY).rename(project / "studies" / name)

@@ -8,9 +8,10 @@ import pyarrow.parquet as pq
 import pytest
 from attack.calls import Said, refused
 from attack.checked import commands
-from attack.fuzz import binary_frames, prefix, text_frames
+from attack.fuzz import prefix
 from attack.ground import differences
 from made_run import Raw
+from plain_dumps import binary_frames, text_frames
 
 _VALUES = {"step": [1, 2, 3], "force_n": [0.1, np.nan, None], "ids": [[1], [2, 3], []]}
 

@@ -1,17 +1,17 @@
 """Commands and examples run as the pages print them."""
 
-import os
 import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 import yaml
 from doc_pages import PAGES, fences, name_of
+from entry import write_entry
 from paths import PROJECT, ROOT
+from preloaded import environment, programs
 
 from dragdeck.project import Project
 
@@ -41,51 +41,48 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
         if not (folder / name).exists():
             (folder / name).symlink_to(ROOT / name)
     shutil.copytree(ROOT / "studies", folder / "studies")
-    for name in ("run", "pyproject.toml", "constraints.txt"):
-        shutil.copy(ROOT / name, folder / name)
-    (folder / ".venv").mkdir()
-    (folder / ".venv/bin").symlink_to(Path(sys.executable).parent)
-    wanted = "printf '%s\\n' \"$PWD\" && cat pyproject.toml constraints.txt | cksum"
-    stamp = subprocess.run(["sh", "-c", wanted], cwd=folder, capture_output=True, check=True)
-    extras = "".join(f"{extra}\n" for extra in ("cad", "crate", "docs", "notebook", "test"))
-    (folder / ".venv/dragdeck-stamp").write_bytes(stamp.stdout + extras.encode())
+    own = write_entry(folder, ("cad", "crate", "docs", "notebook", "test"))
+    for tool in Path(sys.executable).parent.iterdir():
+        (own / tool.name).symlink_to(tool)
     return folder
 
 
 @pytest.fixture(scope="module")
 def clone(project: Path) -> Path:
-    """The project with the results of its first study."""
+    """The project with the results of its first study; from then on it has preloaded programs."""
     runs(f"./run all --cores 2 --config study={STUDY}", project)
+    for program in programs()[0].glob("[ds]*"):
+        tool = project / ".venv/bin" / program.name
+        tool.unlink(missing_ok=True)
+        tool.symlink_to(program)
     return project
 
 
 def runs(text: str, folder: Path) -> None:
     """The commands end without an error."""
     words = ["bash", "-euo", "pipefail", "-c", text]
-    environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
-    environment["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{environment['PATH']}"
-    environment.pop("DISPLAY", None)
-    ran = subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True)
+    seen = environment()
+    del seen["PYTHONPATH"]
+    ran = subprocess.run(words, cwd=folder, env=seen, capture_output=True, text=True)
     assert ran.returncode == 0, f"{text}\n{ran.stdout[-2000:]}\n{ran.stderr[-2000:]}"
 
 
-@pytest.mark.parametrize(("page", "text"), SHELL, ids=numbered(SHELL))
-def test_a_command_runs(clone: Path, page: Path, text: str) -> None:
-    runs(text, clone)
+def calls(blocks: list[tuple[Path, str]]) -> list[str]:
+    """Each line once, without comments."""
+    text = re.sub(r"\\\n\s*", " ", "\n".join(text for _, text in blocks))
+    lines = (re.sub(r"(^|\s)#.*", "", line).strip() for line in text.splitlines())
+    return list(dict.fromkeys(line for line in lines if line))
 
 
-def calls(text: str) -> Iterator[list[str]]:
-    """The words of each line, without comments."""
-    for line in re.sub(r"\\\n\s*", " ", text).splitlines():
-        if words := re.sub(r"(^|\s)#.*", "", line).split():
-            yield words
+@pytest.mark.parametrize("call", calls(SHELL))
+def test_a_command_runs(clone: Path, call: str) -> None:
+    runs(call, clone)
 
 
 NOT_SNAKEMAKE = ("dragdeck", "dragchain", "setup", "test", "docs", "web", "status", "open")
-CALLS = sorted({" ".join(words) for _, text in LONG for words in calls(text)})
 
 
-@pytest.mark.parametrize("call", CALLS)
+@pytest.mark.parametrize("call", calls(LONG))
 def test_a_long_command_would_run(clone: Path, call: str, pytestconfig: pytest.Config) -> None:
     """Targets of Snakemake run dry; of other programs the help must know the command.
 

@@ -30,7 +30,6 @@ def test_peaks_of_the_resistance_are_minima_of_the_drag() -> None:
     assert peaks.index.tolist() == [10, 30]
     np.testing.assert_allclose(peaks.time_s, [1.0, 3.0])
     assert peaks.drag_n.tolist() == [-4, -5]
-    assert peaks.prominence_n.tolist() == [3, 4]
 
 
 def test_the_lower_of_two_close_peaks_is_dropped() -> None:

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from figure_files import DRAG_START, LAST, STEP_S, write_process_run
+from figure_files import DRAG_START, STEP_S, write_process_run
 from matplotlib import pyplot
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -83,18 +83,6 @@ def test_the_drag_is_drawn_with_its_peaks(run: FinishedRun) -> None:
     assert axes.get_legend() is not None
     assert len(lines(plot.drag(run, peaks=False))) == len(lines(axes)) - 1
     assert len(lines(plot.bottleneck(run, peaks=False))) == len(lines(plot.bottleneck(run))) - 1
-
-
-def test_bottlenecks_are_at_their_process_times(run: FinishedRun) -> None:
-    x, y = np.array(lines(plot.bottleneck(run, peaks=False))[0]).T
-    dominant = run.chains[run.chains["dominant"]]
-    assert y.tolist() == dominant["bottleneck_n"].tolist()
-    assert x[-1] == pytest.approx((LAST - DRAG_START) * STEP_S)
-
-
-def test_only_polar_axes_go_around_the_workpiece(run: FinishedRun) -> None:
-    with pytest.raises(ValueError, match="polar"):
-        plot.force_around(run, Figure().add_subplot())
 
 
 def test_chain_lengths_are_fractions_of_each_definition(run: FinishedRun) -> None:

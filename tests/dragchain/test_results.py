@@ -5,7 +5,6 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 import pytest
 from finished_runs import write_finished_run
@@ -17,7 +16,6 @@ import dragchain
 from dragchain import (
     DocumentError,
     RejectedRunError,
-    SeriesError,
     TableError,
     UnknownNameError,
     load,
@@ -89,14 +87,6 @@ def test_runs_are_found_by_case_and_by_run_id(project: Path) -> None:
         study.run("depe")
     with pytest.raises(UnknownNameError, match=r"3 runs: name one.*\n.*two_workpiece-1"):
         study.run()
-
-
-def test_a_case_with_two_runs_is_named_by_its_run_id(project: Path) -> None:
-    _edit(project / "results/small/process/two-2/case.json", {"case": "deep"})
-    study = load("small")
-    with pytest.raises(UnknownNameError, match=r"2 runs of case 'deep': name one.*\n.*deep-1, two"):
-        study.run("deep")
-    assert study.run("two-2").name == "deep"
 
 
 def test_an_unfinished_run_is_no_result(project: Path) -> None:
@@ -192,13 +182,6 @@ def test_a_study_has_the_summary_of_its_report(project: Path) -> None:
         study.describe("drag_mean")
 
 
-def test_an_input_that_is_a_list_is_text_in_the_summary(project: Path) -> None:
-    write_summary(project)
-    table = pd.DataFrame({"case": ["deep"], "input_motion_plunge_at_m": ["[0.02, 0]"]})
-    table.to_parquet(project / "results/small/report/summary.parquet")
-    assert load("small").summary["input_motion_plunge_at_m"].tolist() == ["[0.02, 0]"]
-
-
 def test_filling_and_drop_test_of_a_run(project: Path) -> None:
     run = load("small").run("deep")
     with pytest.raises(DocumentError, match=r"filling-00000000.case\.json"):
@@ -231,23 +214,6 @@ def test_findings_are_those_of_the_report(project: Path, monkeypatch: pytest.Mon
 
 def _never(run: object) -> None:
     raise AssertionError("figures.json was there")
-
-
-def test_findings_of_a_run_that_is_too_short_are_refused(project: Path) -> None:
-    run = load("small").run("deep")
-    force = run.force.assign(in_statistics=np.arange(len(run.force)) == len(run.force) - 1)
-    force.to_parquet(run.folder / "tables/workpiece_force.parquet")
-    with pytest.raises(SeriesError):
-        _ = load("small").run("deep").findings
-
-
-def test_what_is_there_shows_in_a_session(project: Path) -> None:
-    study = load("small")
-    assert repr(study).startswith("<study tiny:\n  <process run deep: workpiece_force, ")
-    assert repr(study.run("deep")).endswith("chains, thermo>")
-    assert {"load", "plot", "read_dump"} <= set(dir(dragchain))
-    with pytest.raises(AttributeError, match="no attribute 'lod'"):
-        _ = dragchain.lod
 
 
 def test_every_public_name_is_there() -> None:

@@ -11,8 +11,6 @@ from figure_files import DRAG_START, LAST, PERIOD, STEP_S, case_json
 from made_run import output, particles_kept, run_json, save, write_documents
 from networks import RADIUS_M, random_frame
 
-from dragchain.figures.style import drawing
-from dragchain.figures.style import save as save_figure
 from dragchain.network.frame import KINDS, PARTICLE
 from dragchain.network.write import write_chains
 
@@ -48,15 +46,6 @@ def accept(folder: Path, **changes: Any) -> None:
     check = particles_kept(1422) | {"seen": "216", "limit": "216"} | changes
     record = run_json(checks=[check], ranks=1)
     (folder / "run.json").write_text(json.dumps(record))
-
-
-def draw(folder: Path) -> None:
-    """Draw the two figures that stand for scene and curve."""
-    from dragchain.figures.panels import new_panels
-
-    with drawing():
-        for name in ("network_xz", "forces"):
-            save_figure(new_panels(2.0)[0], folder / "figures" / f"{name}.png")
 
 
 def _frame(step: int) -> tuple[pd.DataFrame, pd.DataFrame]:

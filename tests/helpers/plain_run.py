@@ -1,4 +1,4 @@
-"""The main tables of a process run computed once more from its raw dumps, in plain Python.
+"""The main tables of a process run computed once more from its raw dumps, contact by contact.
 
 It shares no code with the packages: it reads ``case.json``, ``columns.json`` and the raw outputs by
 itself, and loops over contacts. The rules are those of docs/reference/results.md. It knows a circle
@@ -7,108 +7,34 @@ whose orientation follows the path, without superposed motions, in a bowl of pri
 
 import json
 import math
-import struct
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-Vector = tuple[float, float, float]
+import numpy as np
+import pandas as pd
+from plain_dumps import binary_frames, text_frames
+
+Vector = np.ndarray
 Row = dict[str, float]
-
-
-def dot(a: Vector, b: Vector) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def plus(a: Vector, b: Vector, factor: float = 1.0) -> Vector:
-    return (a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2])
-
-
-def cross(a: Vector, b: Vector) -> Vector:
-    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
-
-
-def norm(a: Vector) -> float:
-    return math.sqrt(dot(a, a))
+Contact = tuple[str, int, int, float]
+"""Kind, a, b and normal force."""
 
 
 def unit(a: Vector) -> Vector:
-    length = norm(a)
-    return (a[0] / length, a[1] / length, a[2] / length)
+    return a / np.linalg.norm(a)
 
 
-def total(vectors: list[Vector]) -> Vector:
-    return (
-        math.fsum(v[0] for v in vectors),
-        math.fsum(v[1] for v in vectors),
-        math.fsum(v[2] for v in vectors),
-    )
-
-
-def of(row: Row, *names: str) -> Vector:
-    x, y, z = (row[name] for name in names)
-    return x, y, z
-
-
-FORCE = ("force_x_n", "force_y_n", "force_z_n")
-POINT = ("point_x_m", "point_y_m", "point_z_m")
-CENTRE = ("x_m", "y_m", "z_m")
-VELOCITY = ("vx_m_s", "vy_m_s", "vz_m_s")
-SPIN = ("wx_rad_s", "wy_rad_s", "wz_rad_s")
-REFERENCE = ("ref_x_m", "ref_y_m", "ref_z_m")
-FLOOR = ("floor_force_x_n", "floor_force_y_n", "floor_force_z_n")
-SIDE = ("side_force_x_n", "side_force_y_n", "side_force_z_n")
-
-
-# --- raw outputs -------------------------------------------------------------------------------
+def vector(row: Row, what: str) -> Vector:
+    """The three columns of this name, whose axis is the asterisk."""
+    return np.array([row[what.replace("*", axis)] for axis in "xyz"])
 
 
 def print_rows(file: Path, names: list[str]) -> Iterator[Row]:
     for line in file.read_text().splitlines()[1:]:
         yield dict(zip(names, map(float, line.split()), strict=True))
-
-
-def text_frames(file: Path, names: list[str]) -> Iterator[tuple[int, list[Row]]]:
-    lines = iter(file.read_text().splitlines())
-    for line in lines:
-        assert line == "ITEM: TIMESTEP", line
-        step = int(next(lines))
-        next(lines)
-        count = int(next(lines))
-        for _ in range(5):
-            next(lines)
-        rows = (next(lines).split() for _ in range(count))
-        yield step, [dict(zip(names, map(float, row), strict=True)) for row in rows]
-
-
-def binary_frames(file: Path, names: list[str]) -> Iterator[tuple[int, list[Row]]]:
-    data, at = file.read_bytes(), 0
-
-    def take(form: str) -> tuple[Any, ...]:
-        nonlocal at
-        values = struct.unpack_from(form, data, at)
-        at += struct.calcsize(form)
-        return values
-
-    while at < len(data):
-        step, count, tilted = take("<qqi")
-        take("<6i" + ("9d" if tilted else "6d"))
-        width, chunks = take("<ii")
-        assert width == len(names)
-        rows: list[Row] = []
-        for _ in range(chunks):
-            (size,) = take("<i")
-            values = take(f"<{size}d")
-            rows += [
-                dict(zip(names, values[k : k + width], strict=True)) for k in range(0, size, width)
-            ]
-        assert len(rows) == count
-        yield step, rows
-
-
-# --- the run -----------------------------------------------------------------------------------
 
 
 @dataclass
@@ -120,7 +46,6 @@ class OnWorkpiece:
     point: Vector
     force: Vector
     normal: Vector
-    overlap: float
     surface: Vector
 
 
@@ -147,11 +72,22 @@ class PlainRun:
     def friction(self, body: str) -> float:
         return float(self.case["contact_moduli"][body]["friction"])
 
-    def frames(self, name: str) -> Iterator[tuple[int, list[Row]]]:
+    def file(self, name: str) -> tuple[Path, list[str]]:
         output = self.outputs[name]
-        file = self.folder / output["pattern"].format(part=1)
-        read = binary_frames if output["binary"] else text_frames
-        return read(file, output["columns"])
+        return self.folder / output["pattern"].format(part=1), output["columns"]
+
+    def frames(self, name: str) -> Iterator[tuple[int, list[Row]]]:
+        file, names = self.file(name)
+        binary, content = self.outputs[name]["binary"], file.read_bytes()
+        for step, columns in binary_frames(content, names) if binary else text_frames(content):
+            rows = zip(*columns.values(), strict=True)
+            yield step, [dict(zip(names, row, strict=True)) for row in rows]
+
+    def pairs(self, one: str, other: str) -> Iterator[tuple[int, list[Row], list[Row]]]:
+        """Step and rows of two outputs that are written together."""
+        for (step, rows), (same, others) in zip(self.frames(one), self.frames(other), strict=True):
+            assert step == same
+            yield step, rows, others
 
     def counted(self, step: int) -> bool:
         first = self.start + self.case["statistics"]["transient_s"] / self.dt
@@ -159,10 +95,8 @@ class PlainRun:
 
     def forces(self) -> list[Row]:
         """Raw samples with direction of motion, drag, lateral and vertical force."""
-        output = self.outputs["workpiece_force"]
-        file = self.folder / output["pattern"].format(part=1)
         found = []
-        for row in print_rows(file, output["columns"]):
+        for row in print_rows(*self.file("workpiece_force")):
             angle = self.case["motion"]["start_direction_rad"]
             if row["step"] > self.start:
                 angle = math.atan2(row["ref_y_m"], row["ref_x_m"]) + self.sense * math.pi / 2
@@ -175,141 +109,99 @@ class PlainRun:
 
     def on_workpiece(self) -> Iterator[tuple[int, list[OnWorkpiece]]]:
         """The contacts with force of each sample: cut, merged over edges, and shared out."""
-        pairs = zip(
-            self.frames("workpiece_particles"), self.frames("workpiece_contacts"), strict=True
-        )
         mu = self.friction("workpiece")
-        for (step, particles), (other, contacts) in pairs:
-            assert step == other
-            rows = {int(row["particle_id"]): row for row in particles if any(of(row, *FORCE))}
-            touching: dict[int, list[Row]] = defaultdict(list)
+        for step, particles, contacts in self.pairs("workpiece_particles", "workpiece_contacts"):
+            touching: dict[float, list[Row]] = defaultdict(list)
             for contact in contacts:
-                if int(contact["particle_id"]) in rows:
-                    touching[int(contact["particle_id"])].append(contact)
+                touching[contact["particle_id"]].append(contact)
             found = []
-            for particle, several in touching.items():
-                found += _of_particle(particle, rows[particle], several, mu)
+            for row in particles:
+                if vector(row, "force_*_n").any():
+                    found += _of_particle(row, touching[row["particle_id"]], mu)
             yield step, sorted(found, key=lambda one: (one.particle, one.facet))
 
     def slip(self, contact: OnWorkpiece) -> tuple[Vector, float]:
         """Tangential relative velocity, and the speed of approach."""
         x, y, _ = contact.point
-        own = (-self.turning * y, self.turning * x, 0.0)
-        relative = plus(contact.surface, own, -1.0)
-        apart = dot(relative, contact.normal)
-        return plus(relative, contact.normal, -apart), -apart
+        relative = contact.surface - np.array([-self.turning * y, self.turning * x, 0.0])
+        apart = relative @ contact.normal
+        return relative - apart * contact.normal, -apart
 
-    def networks(self) -> Iterator[tuple[int, int, list[tuple[str, int, int, float]]]]:
-        """Step, particles and contacts with force (kind, a, b, normal force) of each frame."""
+    def networks(self) -> Iterator[tuple[int, int, list[Contact]]]:
+        """Step, number of particles and contacts with force of each frame."""
         workpiece = dict(self.on_workpiece())
-        pairs = zip(self.frames("particles"), self.frames("contacts"), strict=True)
-        for (step, particles), (other, contacts) in pairs:
-            assert step == other
-            centre = {int(row["particle_id"]): of(row, *CENTRE) for row in particles}
-            found = []
+        for step, particles, contacts in self.pairs("particles", "contacts"):
+            centre = {row["particle_id"]: vector(row, "*_m") for row in particles}
+            found: list[Contact] = []
             for contact in contacts:
-                force = of(contact, *FORCE)
-                if not any(force):
-                    continue
-                a, b = int(contact["particle1_id"]), int(contact["particle2_id"])
-                found.append(("particle", a, b, dot(force, unit(plus(centre[a], centre[b], -1)))))
+                if (force := vector(contact, "force_*_n")).any():
+                    a, b = contact["particle1_id"], contact["particle2_id"]
+                    normal = unit(centre[a] - centre[b])
+                    found.append(("particle", int(a), int(b), force @ normal))
             for one in workpiece[step]:
-                found.append(("workpiece", one.particle, 0, dot(one.force, one.normal)))
+                found.append(("workpiece", one.particle, 0, one.force @ one.normal))
             for row in particles:
-                particle, (x, y, _) = int(row["particle_id"]), of(row, *CENTRE)
-                if any(of(row, *FLOOR)):
+                particle, (x, y, _) = int(row["particle_id"]), vector(row, "*_m")
+                if vector(row, "floor_force_*_n").any():
                     found.append(("floor", particle, -1, row["floor_force_z_n"]))
-                if any(of(row, *SIDE)):
-                    inward = unit((-x, -y, 0.0))
-                    found.append(("side", particle, -2, dot(of(row, *SIDE), inward)))
+                if (force := vector(row, "side_force_*_n")).any():
+                    found.append(("side", particle, -2, force @ unit(np.array([-x, -y, 0.0]))))
             yield step, len(particles), found
 
 
-def _of_particle(
-    particle: int, row: Row, contacts: list[Row], friction: float
-) -> list[OnWorkpiece]:
-    centre, applied = of(row, *CENTRE), of(row, *FORCE)
-    cut = []
-    for contact in sorted(contacts, key=lambda each: -each["overlap_m"]):
-        point, force = of(contact, *POINT), of(contact, *FORCE)
-        normal = unit(plus(centre, point, -1.0))
-        along = dot(force, normal)
-        sideways = plus(force, normal, -along)
-        limit = friction * abs(along)
-        if norm(sideways) > limit:
-            shorter = limit / norm(sideways)
-            force = plus(
-                (along * normal[0], along * normal[1], along * normal[2]), sideways, shorter
-            )
-        cut.append((contact, point, force, normal))
+def _of_particle(row: Row, contacts: list[Row], friction: float) -> Iterator[OnWorkpiece]:
+    """The contacts of a particle, whose forces add up to the one that the engine applied."""
+    centre, applied = vector(row, "*_m"), vector(row, "force_*_n")
     heads: list[list[tuple[Row, Vector, Vector, Vector]]] = []
-    for one in cut:
+    for contact in sorted(contacts, key=lambda each: -each["overlap_m"]):
+        point, force = vector(contact, "point_*_m"), vector(contact, "force_*_n")
+        normal = unit(centre - point)
+        along = force @ normal
+        sideways = force - along * normal
+        if (tangential := np.linalg.norm(sideways)) > friction * abs(along):
+            force = along * normal + sideways * friction * abs(along) / tangential
         for head in heads:
-            deepest, place = head[0][0], head[0][1]
-            apart = plus(one[1], place, -1.0)
-            if dot(apart, apart) <= 2.0 * row["radius_m"] * max(deepest["overlap_m"], 0.0):
-                head.append(one)
+            (deepest, place, *_), *_ = head
+            reach = 2.0 * row["radius_m"] * max(deepest["overlap_m"], 0.0)
+            if (point - place) @ (point - place) <= reach:
+                head.append((contact, point, force, normal))
                 break
         else:
-            heads.append([one])
-    evaluated = [total([force for _, _, force, _ in head]) for head in heads]
-    missing = plus(applied, total(evaluated), -1.0)
-    found = []
+            heads.append([(contact, point, force, normal)])
+    evaluated = [sum(force for _, _, force, _ in head) for head in heads]
+    missing = applied - sum(evaluated)
     for head, force in zip(heads, evaluated, strict=True):
         contact, point, _, normal = head[0]
         if len(head) > 1:
-            weighted = [
-                (w * n[0], w * n[1], w * n[2])
-                for each, _, _, n in head
-                for w in [max(each["overlap_m"], 0.0) ** 1.5]
-            ]
-            normal = unit(total(weighted))
-        share = applied if len(heads) == 1 else plus(force, missing, 1.0 / len(heads))
-        turning = cross(of(row, *SPIN), plus(point, centre, -1.0))
-        found.append(
-            OnWorkpiece(
-                particle,
-                int(contact["facet_id"]),
-                point,
-                share,
-                normal,
-                contact["overlap_m"],
-                plus(of(row, *VELOCITY), turning),
-            )
-        )
-    return found
+            normal = unit(sum(max(one["overlap_m"], 0.0) ** 1.5 * n for one, _, _, n in head))
+        share = applied if len(heads) == 1 else force + missing / len(heads)
+        surface = vector(row, "v*_m_s") + np.cross(vector(row, "w*_rad_s"), point - centre)
+        particle, facet = int(row["particle_id"]), int(contact["facet_id"])
+        yield OnWorkpiece(particle, facet, point, share, normal, surface)
 
 
-# --- what follows from them --------------------------------------------------------------------
-
-
-def coordination(particles: int, contacts: list[tuple[str, int, int, float]]) -> dict[str, float]:
+def coordination(particles: int, contacts: list[Contact]) -> dict[str, float]:
     """The quantities of a row of ``network.parquet`` that need no chains."""
-    count: dict[int, int] = defaultdict(int)
-    kinds: dict[str, int] = defaultdict(int)
-    for kind, a, b, _ in contacts:
-        kinds[kind] += 1
-        count[a] += 1
-        if kind == "particle":
-            count[b] += 1
+    kinds = Counter(kind for kind, *_ in contacts)
+    count = Counter(a for _, a, _, _ in contacts)
+    count.update(b for kind, _, b, _ in contacts if kind == "particle")
     loaded = [number for number in count.values() if number >= 4]
-    forces = [force for *_, force in contacts]
-    mean = math.fsum(forces) / len(forces)
+    forces = np.array([force for *_, force in contacts])
     return {
         "n_particles": particles,
         "n_contacts": len(contacts),
         **{f"n_particle_{kind}_contacts": kinds[kind] for kind in ("workpiece", "floor", "side")},
         "n_particle_particle_contacts": kinds["particle"],
-        "coordination_number": sum(count.values()) / particles,
+        "coordination_number": count.total() / particles,
         "mechanical_coordination_number": sum(loaded) / len(loaded),
         "rattler_fraction": 1.0 - len(loaded) / particles,
-        "normal_force_mean_n": mean,
-        "normal_force_max_n": max(forces),
-        "above_mean_fraction": sum(force > mean for force in forces) / len(forces),
+        "normal_force_mean_n": forces.mean(),
+        "normal_force_max_n": forces.max(),
+        "above_mean_fraction": (forces > forces.mean()).mean(),
     }
 
 
-def bottlenecks(contacts: list[tuple[str, int, int, float]]) -> list[float]:
+def bottlenecks(contacts: list[Contact]) -> list[float]:
     """Bottleneck force of the widest path to the bowl from each loaded contact on the workpiece.
 
     Contacts above the mean are added in the order of falling force (Kruskal): a contact on the
@@ -342,47 +234,35 @@ def bottlenecks(contacts: list[tuple[str, int, int, float]]) -> list[float]:
     return sorted(found.get(number, 0.0) for number in starts)
 
 
-def loads(run: PlainRun) -> tuple[dict[str, float], dict[int, dict[str, float]], list[Row]]:
+def loads(run: PlainRun) -> tuple[pd.Series, pd.DataFrame, pd.DataFrame]:
     """Totals, sums of each facet, and contact events of the counted samples."""
     interval = run.outputs["workpiece_contacts"]["period_steps"] * run.dt
-    facets: dict[int, dict[str, float]] = defaultdict(lambda: defaultdict(float))
-    open_: dict[int, Row] = {}
-    events: list[Row] = []
-    for step, contacts in run.on_workpiece():
-        if not run.counted(step):
-            continue
-        seen: dict[int, float] = defaultdict(float)
+    samples = [(step, contacts) for step, contacts in run.on_workpiece() if run.counted(step)]
+    rows = []
+    for number, (_, contacts) in enumerate(samples):
         for one in contacts:
-            along = dot(one.force, one.normal)
-            sideways = norm(plus(one.force, one.normal, -along))
+            along = one.force @ one.normal
+            sideways = np.linalg.norm(one.force - along * one.normal)
             slip, _ = run.slip(one)
             most = run.friction("workpiece") * along
             slides = sideways >= 0.99 * most if most > 0.0 else True
-            path = norm(slip) * interval
+            path = np.linalg.norm(slip) * interval
             amounts = {
                 "normal_impulse_n_s": along * interval,
                 "tangential_impulse_n_s": sideways * interval,
                 "relative_path_m": path,
                 "sliding_m": path * slides,
                 "force_slide_n_m": along * path * slides,
-                "friction_work_j": -dot(one.force, slip) * interval,
-                "samples": 1.0,
+                "friction_work_j": -(one.force @ slip) * interval,
             }
-            event = open_.setdefault(
-                one.particle, defaultdict(float, start=step, particle=one.particle)
-            )
-            for name, amount in amounts.items():
-                facets[one.facet][name] += amount
-                event[name] += amount
-            seen[one.particle] += along
-        for particle, force in seen.items():
-            event = open_[particle]
-            event["peak_normal_force_n"] = max(event["peak_normal_force_n"], force)
-            event["frames"] += 1.0
-        for particle in [each for each in open_ if each not in seen]:
-            events.append(open_.pop(particle))
-    events += open_.values()
-    names = next(iter(facets.values())).keys()
-    totals = {name: math.fsum(each[name] for each in facets.values()) for name in names}
-    events.sort(key=lambda each: (each["start"], each["particle"]))
-    return totals, facets, events
+            rows.append({"particle": one.particle, "sample": number, "facet": one.facet, **amounts})
+    table = pd.DataFrame(rows).sort_values(["particle", "sample"])
+    begins = (table["particle"].diff() != 0) | (table["sample"].diff() > 1)
+    table["event"] = begins.cumsum()
+    names = list(amounts)
+    events = table.groupby("event")[names].sum()
+    first = table.groupby("event")[["particle", "sample"]].first()
+    together = table.groupby(["event", "sample"])["normal_impulse_n_s"].sum() / interval
+    events["peak_normal_force_n"] = together.groupby("event").max()
+    events = first.join(events).sort_values(["sample", "particle"])
+    return table[names].sum(), table.groupby("facet")[names].sum(), events

@@ -1,13 +1,12 @@
 """Snakemake started on a copy of the project."""
 
-import os
 import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import yaml
 from paths import DATA, PROJECT, ROOT
+from preloaded import environment
 
 
 def copy_of_project(folder: Path, study: dict[str, Any] | None = None, name: str = "small") -> Path:
@@ -21,19 +20,9 @@ def copy_of_project(folder: Path, study: dict[str, Any] | None = None, name: str
     return folder
 
 
-def call_of(*arguments: str) -> tuple[list[str], dict[str, str]]:
-    """Command line and environment of a call."""
-    words = [sys.executable, "-m", "snakemake", "--cores", "2", *arguments]
-    paths = os.pathsep.join([str(ROOT / "workflow"), str(ROOT / "analysis"), str(ROOT)])
-    scripts = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
-    environment = {**os.environ, "PYTHONPATH": paths, "PATH": scripts}
-    environment.pop("DISPLAY", None)
-    return words, environment
-
-
 def snakemake(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    words, environment = call_of(*arguments)
-    return subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True)
+    words = ["snakemake", "--cores", "2", *arguments]
+    return subprocess.run(words, cwd=folder, env=environment(), capture_output=True, text=True)
 
 
 def jobs(folder: Path, *arguments: str) -> set[str]:

@@ -12,7 +12,8 @@ from typing import Any
 import pandas as pd
 import pytest
 import yaml
-from snakemake_calls import call_of, copy_of_project, snakemake
+from preloaded import environment
+from snakemake_calls import copy_of_project, snakemake
 
 from dragdeck.cli import main
 
@@ -116,9 +117,9 @@ def test_a_dry_run_lists_its_jobs(project: Path, piped: str) -> None:
 def on_a_terminal(project: Path, *arguments: str) -> tuple[int, str]:
     """Status of a call whose output is a terminal, and all that it wrote to that."""
     ours, its = pty.openpty()
-    words, environment = call_of(*arguments)
-    environment |= {"TERM": "xterm", "COLUMNS": "100", "LINES": "24"}
-    with subprocess.Popen(words, cwd=project, env=environment, stdout=its, stderr=its) as process:
+    words = ["snakemake", "--cores", "2", *arguments]
+    seen = environment() | {"TERM": "xterm", "COLUMNS": "100", "LINES": "24"}
+    with subprocess.Popen(words, cwd=project, env=seen, stdout=its, stderr=its) as process:
         os.close(its)
         found = b""
         while True:

@@ -39,26 +39,10 @@ def test_the_drag_grows_with_the_depth(project: Path) -> None:
     assert jobs(project, *SCALING) - {"scaling"} == set()
 
 
-def test_a_study_without_the_block_says_so(project: Path) -> None:
-    study = project / "studies/plain/study.yaml"
-    study.parent.mkdir()
-    study.write_text(SMALL_STUDY.read_text())
-    done = snakemake(project, "scaling", "--dry-run", "--config", "study=plain")
-    assert done.returncode != 0
-    assert "scaling: a required key is missing" in done.stdout + done.stderr
-
-
-@pytest.mark.parametrize(
-    ("setting", "words"),
-    [
-        ("studdy=small", "did you mean 'study'?"),
-        ("study=a b;touch hacked", "not a name"),
-        ("plan=defult", "did you mean 'default'?"),
-    ],
-)
-def test_a_wrong_setting_is_refused(project: Path, setting: str, words: str) -> None:
-    done = snakemake(project, "scaling", "--dry-run", "--config", setting)
-    assert done.returncode != 0
-    assert words in done.stdout + done.stderr
-    assert "Traceback" not in done.stdout + done.stderr
-    assert not list(project.glob("hacked*"))
+def test_a_broken_file_of_settings_is_named_with_its_line(project: Path) -> None:
+    (project / "config").unlink()
+    (project / "config").mkdir()
+    (project / "config/config.yaml").write_text("study: small\nplan: [a\n")
+    done = snakemake(project, "--dry-run", "filling")
+    assert done.returncode == 1
+    assert "config/config.yaml: line 3: not YAML" in done.stdout + done.stderr

@@ -81,17 +81,14 @@ def test_the_report_has_a_row_a_case(finished: Path) -> None:
     assert page.images and set(networks) <= set(page.references)
 
 
-def test_cases_share_their_filling_and_drop(finished: Path) -> None:
+def test_cases_share_their_filling_and_drop_and_the_forces_on_the_workpiece_close(
+    finished: Path,
+) -> None:
     results = finished / "results/small"
-    assert len(list((results / "filling").iterdir())) == 1
-    assert len(list((results / "drop_test").iterdir())) == 1
-    assert len(list((results / "process").iterdir())) == 2
-
-
-def test_the_forces_on_the_workpiece_close(finished: Path) -> None:
-    for run in (finished / "results/small/process").iterdir():
-        closure = yaml.safe_load((run / "tables/closure.json").read_text())
-        assert closure["verdict"] == "pass"
+    for place, count in (("filling", 1), ("drop_test", 1), ("process", 2)):
+        assert len(list((results / place).iterdir())) == count
+    for file in results.glob("process/*/tables/closure.json"):
+        assert json.loads(file.read_text())["verdict"] == "pass"
 
 
 def test_the_workpiece_goes_where_it_should(finished: Path) -> None:
@@ -189,32 +186,22 @@ def test_a_notebook_runs(finished: Path, file: Path) -> None:
     assert any(run.rsplit("-", 1)[0] in shown for run in runs)
 
 
-def test_every_column_of_the_tables_has_a_unit_and_a_description(finished: Path) -> None:
+def test_every_column_has_a_unit_a_description_and_the_type_that_the_reference_states(
+    finished: Path,
+) -> None:
+    rows = pd.read_csv(ROOT / "analysis/dragchain/tables/columns.csv", dtype=str)
     files = list((finished / "results/small").rglob("*.parquet"))
     assert {file.stem for file in files} >= {"thermo", "impacts", "facets", "chains", "summary"}
-    bare = {
-        f"{file.stem}.{field.name}"
-        for file in files
-        for field in pq.read_schema(file)
-        if not {b"unit", b"description"} <= set(field.metadata or {})
-    }
-    assert not bare
-
-
-def test_every_column_has_the_type_that_the_reference_states(finished: Path) -> None:
-    rows = pd.read_csv(ROOT / "analysis/dragchain/tables/columns.csv", dtype=str)
-
-    def column_type(column: str, table: str) -> str:
-        of_table = rows[[table in tables.split() for tables in rows["tables"]]]
-        kinds = zip(of_table["column"], of_table["type"], strict=True)
-        return next(kind for name, kind in kinds if fnmatchcase(column, name))
-
-    wrong = {
-        f"{file.stem}.{field.name}: {field.type}"
-        for file in (finished / "results/small").rglob("*.parquet")
-        for field in pq.read_schema(file)
-        if not str(field.type).startswith(TYPES[column_type(field.name, file.stem)])
-    }
+    wrong = set()
+    for file in files:
+        of_table = rows[[file.stem in tables.split() for tables in rows["tables"]]]
+        for field in pq.read_schema(file):
+            named = [fnmatchcase(field.name, column) for column in of_table["column"]]
+            kind = of_table["type"][named].iloc[0]
+            if not {b"unit", b"description"} <= set(field.metadata or {}):
+                wrong.add(f"{file.stem}.{field.name}: no unit or description")
+            if not str(field.type).startswith(TYPES[kind]):
+                wrong.add(f"{file.stem}.{field.name}: {field.type}")
     assert not wrong
 
 
@@ -241,8 +228,6 @@ def test_frames_are_exported_when_asked_for(finished: Path) -> None:
     for run in (finished / "results/small/process").iterdir():
         times = set(pd.read_parquet(run / "tables/particles.parquet", columns=["time_s"])["time_s"])
         assert pv.PVDReader(run / "export/paraview/run.pvd").time_values == sorted(times)
-        assert json.loads((run / "export/paraview/view.json").read_text())["chains"]
-        assert (run / "export/paraview/view.py").is_file()
     assert jobs(finished, *export) == set()
     again = snakemake(finished, *export, "--forcerun", "export_paraview")
     assert again.returncode == 0, again.stderr
@@ -318,10 +303,3 @@ def test_a_failed_case_is_listed_and_the_others_are_reported(finished: Path) -> 
     data["sweep"]["motion.immersion_depth_m"] = [0.012, 0.016]
     file.write_text(yaml.safe_dump(data))
     assert "write_report" in jobs(finished, *STUDY)
-
-
-def test_an_unknown_study_stops_before_anything_runs(finished: Path) -> None:
-    done = snakemake(finished, "all", "--config", "study=large")
-    assert done.returncode != 0
-    assert "unknown study 'large'" in done.stdout + done.stderr
-    assert not (finished / "results/large").exists()

@@ -1,18 +1,16 @@
 // What a user chooses: a particle by its number, a contact by the two bodies that it is between, or a
 // facet of the workpiece: { particle }, { pair } or { facet }; its numbers, and how it is marked.
 import { BufferAttribute, BufferGeometry, Group, Mesh } from "three";
-import { CHOSEN, COLOURS, rgb } from "./colours.js";
+import { CHOSEN, rgb } from "./colours.js";
 import { CLASSES, DOMINANT, PATH, QUASI_LINEAR, vector } from "./data.js";
 import { Bodies } from "./bodies.js";
 import { digits, fixed, whole } from "./dom.js";
 import { facetMaterial } from "./shading.js";
 import { tinted } from "./workpiece.js";
 
-// Radii, that of a particle in its own and others in the mean particle radius.
+// Radii, that of a particle in its own and that of a contact in the mean particle radius.
 const PARTICLE = 0.6,
-  CONTACT = 0.12,
-  END = 0.2,
-  LINE = 0.05;
+  CONTACT = 0.12;
 
 /** What a ray through a point of the picture meets first; within `near` mm of thin contacts if it meets nothing. */
 export function underRay(caster, near, frame, { frames, media, contacts, workpiece }) {
@@ -36,11 +34,11 @@ export function named(text) {
   return names.length === 1 && /^\d+$/.test(names[0]) ? { particle: Number(names[0]) } : null;
 }
 
-/** What was chosen, drawn over everything else, and the line between the places whose distance is measured. */
+/** What was chosen, drawn over everything else. */
 export class Chosen {
   constructor(frames, workpiece) {
     Object.assign(this, { frames, workpiece });
-    this.body = new Bodies(4, { depthTest: false });
+    this.body = new Bodies(1, { depthTest: false });
     this.corners = new BufferAttribute(new Float32Array(9), 3);
     const normals = new BufferAttribute(new Float32Array([0, 0, 1, 0, 0, 1, 0, 0, 1]), 3),
       geometry = new BufferGeometry().setAttribute("position", this.corners).setAttribute("normal", normals);
@@ -49,23 +47,15 @@ export class Chosen {
     for (const mesh of this.group.children) Object.assign(mesh, { renderOrder: 1, frustumCulled: false });
   }
 
-  /** Mark what was chosen where it is in a frame, and the measured places; nothing if they are not there. */
-  update(frame, { pair, particle, facet }, places) {
+  /** Mark what was chosen where it is in a frame; nothing if it is not there. */
+  update(frame, { pair, particle, facet }) {
     const { media } = this.frames.head,
-      orange = rgb(CHOSEN),
-      ink = rgb(COLOURS.ink);
-    const mark = (ends, radius, tint) => this.body.add(0, ends[0], ends.at(-1), radius, tint);
+      mark = (start, end, radius) => this.body.add(0, start, end, radius, rgb(CHOSEN));
     const row = pair ? this.frames.find(frame, ...pair) : frame.id.indexOf(particle);
     this.body.clear();
-    if (row >= 0 && pair)
-      mark(
-        Object.values(this.frames.ends(frame)).map((ends) => vector(ends, row)),
-        CONTACT * media.radius,
-        orange,
-      );
-    else if (row >= 0) mark([vector(frame.centre, row)], PARTICLE * frame.radius[row], orange);
-    for (const place of places) mark([place], END * media.radius, ink);
-    if (places.length === 2) mark(places, LINE * media.radius, ink);
+    const { from, to } = pair ? this.frames.ends(frame) : { from: frame.centre, to: frame.centre },
+      radius = pair ? CONTACT * media.radius : PARTICLE * frame.radius[row];
+    if (row >= 0) mark(vector(from, row), vector(to, row), radius);
     this.body.show();
     this.facet.visible = facet !== undefined;
     if (this.facet.visible) this.markFacet(facet);

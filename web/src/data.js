@@ -108,18 +108,6 @@ export class Frames {
     return Uint8Array.from(frame.id, (_, k) => side * (frame.centre[3 * k + axis] - at) <= 0);
   }
 
-  /** Where the centre of a particle or the point of a contact is, mm; null if it is not in the frame.
-   *  That of two particles divides the line between their centres as their radii do. */
-  place(frame, { particle, pair }) {
-    const row = pair ? this.find(frame, ...pair) : frame.id.indexOf(particle);
-    if (row < 0) return null;
-    if (!pair) return vector(frame.centre, row);
-    const [from, to] = Object.values(this.ends(frame)).map((places) => vector(places, row)),
-      [own, other] = [frame.a, frame.b].map((bodies) => frame.radius[bodies[row]]);
-    const part = other ? own / (own + other) : 1;
-    return from.map((value, axis) => value + part * (to[axis] - value));
-  }
-
   /** The class of each contact: 0 between particles, 1 with the workpiece, 2 with the bowl. */
   classes(frame) {
     const ofBody = (b) => (this.head.bodies[b].startsWith("workpiece") ? 1 : 2);
@@ -143,7 +131,7 @@ export class Frames {
   }
 }
 
-export const distance = (one, other) => Math.hypot(...[0, 1, 2].map((axis) => other[axis] - one[axis]));
+const distance = (one, other) => Math.hypot(...[0, 1, 2].map((axis) => other[axis] - one[axis]));
 
 function starts(counts) {
   const sums = [0];

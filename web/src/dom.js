@@ -9,15 +9,10 @@ export function make(tag, properties, ...parts) {
   return element;
 }
 
-const RAISED = "⁰¹²³⁴⁵⁶⁷⁸⁹";
+const RAISED = "⁰¹²³⁴⁵⁶⁷⁸⁹",
+  tenTo = (power) => `10${power < 0 ? "⁻" : ""}${[...String(Math.abs(power))].map((digit) => RAISED[digit]).join("")}`;
 
 export const minus = (text) => text.replaceAll("-", "−");
-
-/** A round number, without needless digits. */
-export const plain = (value) => minus(String(Number(value.toPrecision(6))));
-
-export const tenTo = (power) =>
-  `10${power < 0 ? "⁻" : ""}${[...String(Math.abs(power))].map((digit) => RAISED[digit]).join("")}`;
 
 /** A number with four significant digits; the data have a little more. */
 export function digits(value, count = 4) {

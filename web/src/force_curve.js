@@ -1,12 +1,30 @@
 // The force against the motion over process time: raw and filtered, with zoom, cursor and peaks.
-import { axis, Chart, line } from "./chart.js";
+import uPlot from "uplot";
+import style from "uplot/dist/uPlot.min.css";
 import { COLOURS } from "./colours.js";
-import { digits, seconds } from "./dom.js";
+import { digits, make, minus, seconds } from "./dom.js";
+
+document.head.prepend(make("style", {}, style));
 
 const LEAST_SPAN = 0.02; // shortest stretch to zoom into, as a fraction of the whole
 const NEAR = 4; // pixels: a shorter drag is a click
 
-export class ForceCurve extends Chart {
+const axis = (label, space) => ({
+  label,
+  space,
+  stroke: "#3d4955",
+  font: "11px system-ui, sans-serif",
+  labelFont: "12px system-ui, sans-serif",
+  lineGap: 1.1,
+  size: (plot, _, number) => (plot.axes[number].side % 2 ? 30 : 20),
+  labelSize: 15,
+  grid: { stroke: "#e3e6ea", width: 0.7 },
+  ticks: { show: false },
+  values: (_, splits) => splits.map((value) => minus(String(Number(value.toPrecision(6))))),
+});
+const line = (options) => ({ points: { show: false }, pxAlign: 0, ...options });
+
+export class ForceCurve {
   /** `curve` and `peaks`: entries of the page's data; `go(time)`, `goToPeak(rank)`: what clicks do;
    *  `told(text)`: told the values under the mouse. */
   constructor(element, { curve, peaks, values, end }, { go, goToPeak, told }) {
@@ -14,24 +32,25 @@ export class ForceCurve extends Chart {
       smooth = movingMean(values, Math.max(1, Math.round(curve.window / curve.interval))),
       whole = [curve.first, Math.max(end, times.at(-1))];
     const words = (k) => `${seconds(times[k])}: raw ${digits(values[k])} N, filtered ${digits(smooth[k])} N`;
-    super(
-      element,
-      {
-        padding: [8, 10, 0, 0],
-        scales: { x: { time: false, range: (_, from, to) => stretch(whole, from, to) }, y: { range: upright } },
-        axes: [axis("Process time (s)", { space: 60 }), axis("Drag force, magnitude (N)", { space: 40 })],
-        series: [{}, line({ stroke: `${COLOURS.drag}59` }), line({ stroke: COLOURS.drag, width: 1.6 })],
-        cursor: { y: false, drag: { dist: NEAR }, bind: { dblclick: () => () => this.zoom(whole) } },
-        hooks: { setCursor: [({ cursor: { idx } }) => told(idx === null ? "" : words(idx))] },
-      },
-      [times, values, smooth],
-    );
-    Object.assign(this, { whole, time: curve.first });
-    this.mark("transient", () => ({ x: [curve.first, curve.counted] }), {}, this.plot.under);
-    this.mark("cursor", () => ({ x: [this.time, this.time] }));
+    const size = () => ({ width: element.clientWidth || 300, height: element.clientHeight || 200 });
+    Object.assign(this, { whole, time: curve.first, marks: [] });
+    const options = {
+      ...size(),
+      padding: [8, 10, 0, 0],
+      legend: { show: false },
+      scales: { x: { time: false, range: (_, from, to) => stretch(whole, from, to) }, y: { range: upright } },
+      axes: [axis("Process time (s)", 60), axis("Drag force, magnitude (N)", 40)],
+      series: [{}, line({ stroke: `${COLOURS.drag}59` }), line({ stroke: COLOURS.drag, width: 1.6 })],
+      cursor: { y: false, drag: { dist: NEAR }, bind: { dblclick: () => () => this.zoom(whole) } },
+      hooks: { setCursor: [({ cursor: { idx } }) => told(idx === null ? "" : words(idx))], draw: [() => this.layMarks()] },
+    };
+    this.plot = new uPlot(options, [times, values, smooth], element);
+    new ResizeObserver(() => this.plot.setSize(size())).observe(element);
+    this.mark("transient", () => [curve.first, curve.counted], null, {}, this.plot.under);
+    this.mark("cursor", () => [this.time, this.time]);
     this.peaks = peaks.map(({ time, force }, rank) => ({
       time,
-      element: this.mark("peak", () => ({ x: [time, time], y: [force, force] }), {
+      element: this.mark("peak", () => [time, time], force, {
         title: `Peak ${rank + 1}: ${digits(force)} N at ${seconds(time)}`,
         onclick: () => goToPeak(rank),
       }),
@@ -66,6 +85,23 @@ export class ForceCurve extends Chart {
     const { min, max } = this.plot.scales.x,
       half = (max - min) / 2;
     if (time < min || time > max) this.zoom([time - half, time + half]);
+  }
+
+  /** Mark a stretch of time, at a force or from top to bottom. */
+  mark(className, times, force, more, layer = this.plot.over) {
+    const element = make("i", { className, ...more });
+    layer.append(element);
+    this.marks.push({ element, times, force });
+    return element;
+  }
+
+  layMarks() {
+    const { plot } = this;
+    for (const { element, times, force } of this.marks) {
+      const [left, right] = times().map((time) => plot.valToPos(time, "x")),
+        [top, height] = force == null ? [0, plot.over.clientHeight] : [plot.valToPos(force, "y"), 0];
+      element.style.cssText = `left: ${left}px; width: ${right - left}px; top: ${top}px; height: ${height}px`;
+    }
   }
 
   moveCursor(time) {

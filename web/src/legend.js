@@ -20,14 +20,9 @@ export function showLegend(element, { colours, scales }, look, load) {
 
 function scale(title, top, colours) {
   const words = ["0", digits(top / 2, 3), `≥ ${digits(top, 3)}`].map((text) => make("span", {}, text));
-  return make("div", {}, title, colourBar(colours), make("div", { className: "ends" }, ...words));
-}
-
-/** A bar with all colours of a map. */
-export function colourBar(colours) {
   const bar = make("div", { className: "bar" });
   bar.style.background = `linear-gradient(to right, ${colours.join(", ")})`;
-  return bar;
+  return make("div", {}, title, bar, make("div", { className: "ends" }, ...words));
 }
 
 function classes() {

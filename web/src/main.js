@@ -2,13 +2,12 @@
 import { Vector3 } from "three";
 import { Chosen, named, underRay } from "./chosen.js";
 import { CLASS_COLOURS, COLOURS, colourMap } from "./colours.js";
-import { Frames, distance, readColumns } from "./data.js";
+import { Frames, readColumns } from "./data.js";
 import { byId, digits, fixed, make, seconds, whole } from "./dom.js";
 import { ForceCurve } from "./force_curve.js";
 import { showLegend, showScale } from "./legend.js";
 import { Contacts, Media } from "./bodies.js";
 import { Player } from "./player.js";
-import { ProfilePlots } from "./profile_plots.js";
 import { PRESETS, View } from "./view.js";
 import { Workpiece, outline } from "./workpiece.js";
 
@@ -25,7 +24,6 @@ class Page {
     this.number = head.peaks[0]?.frame ?? 0;
     this.look = {};
     this.chosen = null;
-    this.measured = null; // the particles or contacts whose distance is measured
     const classes = CLASS_COLOURS.map((colour, kind) => [`class-${kind}`, colour]);
     for (const [name, colour] of [...Object.entries(COLOURS), ...classes])
       document.documentElement.style.setProperty(`--${name}`, colour); // network.css takes them by name
@@ -35,7 +33,7 @@ class Page {
     else this.show(0);
   }
 
-  // --- curve and profiles --------------------------------------------------------------------
+  // --- curve -----------------------------------------------------------------------------------
 
   startCurve({ resistance }) {
     document.documentElement.classList.add("with-curve");
@@ -57,9 +55,6 @@ class Page {
     byId("whole").onclick = () => this.curve.zoom(this.curve.whole);
     byId("peaks").append(...peaks.map((peak, rank) => this.peakButton(rank, peak)));
     if (!peaks.length) byId("peaks").append(make("li", {}, "none"));
-    const names = ["azimuth", "depth", "map", "size", "scale", "told"],
-      parts = Object.fromEntries(names.map((name) => [name, byId(`profile-${name}`)]));
-    this.profiles = new ProfilePlots(parts, this.frames, this.colourOf);
   }
 
   peakButton(rank, { time, force }) {
@@ -91,7 +86,7 @@ class Page {
       this.workpiece = new Workpiece(own, columns, head.bowl.height + 2 * head.media.radius);
       this.view = new View(byId("canvas"), { area: () => this.area(), pose: () => this.workpiece.pose(this.number) });
     } catch (error) {
-      tell("This browser cannot draw the scene (WebGL 2 is missing); the picture below shows one frame.", error);
+      tell("This browser cannot draw the scene (WebGL 2 is missing); the report has pictures of one frame.", error);
       return;
     }
     document.documentElement.classList.add("with-scene");
@@ -142,7 +137,6 @@ class Page {
     this.number = Math.min(Math.max(number, 0), count - 1);
     this.time = time ?? times[this.number];
     this.curve.moveCursor(this.time);
-    this.profiles.show(this.number);
     if (!this.view) return;
     const now = seconds(times[this.number]);
     byId("time").value = this.number;
@@ -216,7 +210,7 @@ class Page {
     this.readControls();
     for (const part of [this.media, this.contacts]) part.update(frame, look, this.colourOf);
     this.workpiece.update(look, this.colourOf);
-    this.marks.update(frame, this.chosen ?? {}, this.tellDistance(frame));
+    this.marks.update(frame, this.chosen ?? {});
     showLegend(byId("legend"), this.head, look, this.workpiece.load(look.load));
     this.tellNumbers(frame);
     if (this.chosen) this.tellChosen(frame);
@@ -255,16 +249,6 @@ class Page {
     byId("chosen").replaceChildren(make("h3", {}, title), make("table", {}, ...lines));
   }
 
-  /** Tell the distance between the measured places; returns those of them that are in the frame. */
-  tellDistance(frame) {
-    const { measured } = this,
-      places = (measured ?? []).map((one) => this.frames.place(frame, one)).filter(Boolean);
-    const known = places.length === 2 ? `${fixed(distance(...places), 2)} mm` : "not in this frame";
-    byId("distance").hidden = !measured;
-    byId("distance").textContent = `Distance: ${measured?.length === 2 ? known : "choose two particles or contacts"}`;
-    return places;
-  }
-
   // --- choosing ------------------------------------------------------------------------------
 
   startChoosing() {
@@ -279,11 +263,6 @@ class Page {
     canvas.addEventListener("keydown", (event) => this.key(event));
     byId("find-button").onclick = () => this.find(find.value);
     find.addEventListener("keydown", ({ key }) => key === "Enter" && this.find(find.value));
-    byId("measure").onclick = () => {
-      this.measured = this.measured ? null : [];
-      byId("measure").setAttribute("aria-pressed", Boolean(this.measured));
-      this.redraw();
-    };
     byId("highest-facet").onclick = () => this.showHighestFacet();
     byId("highest-facet").hidden = !this.workpiece.own.loads.length;
   }
@@ -296,7 +275,6 @@ class Page {
 
   choose(chosen) {
     this.chosen = chosen;
-    if (this.measured && chosen.facet === undefined) this.measured = [...this.measured, chosen].slice(-2);
     this.redraw();
   }
 
@@ -363,5 +341,5 @@ async function start() {
 }
 
 start().catch((error) =>
-  tell("This page could not be shown; the pictures below are static. Use a browser of 2023 or later.", error),
+  tell("This page could not be shown: use a browser of 2023 or later. The report has static pictures.", error),
 );

@@ -1,12 +1,11 @@
-// Plays the frames in process time, and saves what is seen as a picture or a film.
+// Plays the frames in process time.
 import { byId } from "./dom.js";
-import { Film, filmKind, savePicture } from "./save.js";
 
 export class Player {
   /** `page` shows frames; the buttons and the slider below the picture are for it. */
   constructor(page) {
     Object.assign(this, { page, times: page.frames.times, request: null });
-    const [speed, slider, video] = ["speed", "time", "save-video"].map(byId);
+    const [speed, slider] = ["speed", "time"].map(byId);
     slider.max = this.times.length - 1;
     slider.oninput = () => page.go(Number(slider.value));
     byId("previous").onclick = () => page.go(page.number - 1);
@@ -15,10 +14,7 @@ export class Player {
     speed.onchange = () => (this.speed = Number(speed.value));
     speed.onchange();
     byId("save-picture").onclick = () =>
-      savePicture(page.view, `${page.head.run}_${this.times[page.number].toFixed(3)}s`);
-    video.disabled = !filmKind();
-    if (video.disabled) video.title = "This browser cannot record a canvas.";
-    video.onclick = () => (this.film ? this.stop() : this.startFilm());
+      page.view.save(`${page.head.run}_${this.times[page.number].toFixed(3)}s.png`);
   }
 
   playOrPause() {
@@ -50,21 +46,10 @@ export class Player {
     cancelAnimationFrame(this.request);
     this.request = null;
     this.tell();
-    this.film?.end();
-    this.film = null;
-    byId("save-video").textContent = "Save video";
   }
 
   tell() {
     byId("play").textContent = this.request === null ? "Play" : "Pause";
     byId("play").setAttribute("aria-pressed", this.request !== null);
-  }
-
-  /** Play all frames and record them. */
-  startFilm() {
-    this.page.go(0);
-    this.page.view.draw(devicePixelRatio);
-    this.film = new Film(this.page.view, this.page.head.run, () => this.film && this.start(0));
-    byId("save-video").textContent = "End video";
   }
 }

@@ -10,6 +10,7 @@ import {
   WebGLRenderer,
 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import { make } from "./dom.js";
 
 ColorManagement.enabled = false; // colours are shown as they are given
 
@@ -80,6 +81,15 @@ export class View {
     if (this.renderer.getPixelRatio() !== ratio) this.renderer.setPixelRatio(ratio);
     this.renderer.render(this.scene, this.camera);
     this.after?.();
+  }
+
+  /** Save the scene as a PNG file with twice the pixels of the screen along each edge. */
+  save(name) {
+    this.draw(2 * devicePixelRatio);
+    this.renderer.domElement.toBlob((picture) =>
+      make("a", { href: URL.createObjectURL(picture), download: name }).click(),
+    );
+    this.wanted();
   }
 
   preset(name) {

@@ -55,8 +55,8 @@ COMMANDS = (
             "status:open_report", (STUDY,)),
     Command("preview", "draw the set-up of a study",
             "Draw bowl, packing, workpiece and path of one case, and print its clearances and "
-            "dimensionless numbers. It runs nothing and writes preview.png, preview.html and "
-            "set_up.png to results/STUDY.",
+            "dimensionless numbers. It runs nothing and writes preview.png and set_up.png to "
+            "results/STUDY.",
             "commands:preview", (
         STUDY, FIDELITY,
         Argument("--case", metavar="NAME",

@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import textwrap
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -31,7 +32,7 @@ from dragdeck.engine.batch import Batch
 from dragdeck.engine.process import LAUNCHER_VARIABLE, find_engine
 from dragdeck.engine.reports import say
 from dragdeck.errors import DragdeckError, InputError, choices, together
-from dragdeck.files import write_bytes, write_text
+from dragdeck.files import write_bytes
 from dragdeck.outlook.explain import expected_cost, explanation, measured_speeds, show
 from dragdeck.outlook.explain import scene_lines as page_of_scene
 from dragdeck.outlook.process import (
@@ -45,7 +46,7 @@ from dragdeck.outlook.runs import expected_runs, plan_in_words
 from dragdeck.outlook.timestep import stable_step_cautions, stable_step_note, timestep_notes
 from dragdeck.physics.packing import Bed
 from dragdeck.preview.layout import CaseLayout, layout
-from dragdeck.preview.page import Words, page, picture, small_picture
+from dragdeck.preview.picture import picture, small_picture
 from dragdeck.preview.swept import swept_volume
 from dragdeck.project import by_folder, by_run, find_project, study_templates
 from dragdeck.records.advice import AdviceFile
@@ -216,11 +217,14 @@ def preview(study: str, fidelity: str | None, case: str | None) -> None:
         found = layout(one)
     except InputError as error:
         raise together([*refused, located(error)]) from None
-    refusal = str(together(refused)) if refused else ""
-    words = Words(one.study.title, study, one.name, _numbers(one), warnings, refusal)
-    files = _drawn(found, words, project.results(study))
+    particles = ("particles", str(one.study.media.count))
+    numbers = [*workpiece_notes(one), particles, *dimensionless(one)]
+    title = [f"{study}, case {one.name}", *(f"{name}: {text}" for name, text in numbers[:2])]
+    if refused:
+        title.append(textwrap.fill(f"REFUSED: {str(together(refused)).splitlines()[0]}"))
+    files = _drawn(found, "\n".join(title), bool(refused), project.results(study))
     print(f"{study}: case {one.name}" + (f", one of {len(every)} (--case)" if every[1:] else ""))
-    for name, text in (row for rows in words.numbers.values() for row in rows):
+    for name, text in numbers:
         print(f"  {name}: {text}")
     for warning in warnings:
         print(f"warning: {warning}")
@@ -229,24 +233,14 @@ def preview(study: str, fidelity: str | None, case: str | None) -> None:
         raise together(refused)
 
 
-def _numbers(case: Case) -> dict[str, list[tuple[str, str]]]:
-    """The tables of a preview by their headings."""
-    count = ("particles", str(case.study.media.count))
-    return {
-        "Expected": [*workpiece_notes(case), count],
-        "Dimensionless numbers": dimensionless(case),
-    }
-
-
-def _drawn(found: CaseLayout, words: Words, folder: Path) -> list[Path]:
-    """Write pictures and page of a layout into a folder and return their files."""
+def _drawn(found: CaseLayout, title: str, refused: bool, folder: Path) -> list[Path]:
+    """Write the pictures of a layout into a folder and return their files."""
     swept = [swept_volume(body.mesh, body.drag.poses) for body in found.workpieces]
-    png = picture(found, swept, words.heading, refused=bool(words.refusal))
+    png = picture(found, swept, title, refused)
     folder.mkdir(parents=True, exist_ok=True)
-    files = [folder / name for name in ("preview.png", "preview.html", "set_up.png")]
+    files = [folder / name for name in ("preview.png", "set_up.png")]
     write_bytes(files[0], png)
-    write_text(files[1], page(found, swept, words, png))
-    write_bytes(files[2], small_picture(found, swept))
+    write_bytes(files[1], small_picture(found, swept))
     return files
 
 

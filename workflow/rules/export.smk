@@ -7,11 +7,8 @@ rule export_paraview:
         of_run("process", "tables/facets.parquet"),
         run=of_run("process", "run.json"),
     output:
-        [
-            of_run("process", f"export/paraview/{name}")
-            for name in ("run.pvd", "view.py", "view.json")
-        ],
+        of_run("process", "export/paraview/run.pvd"),
     params:
-        source=source_hash("dragchain.export.write", "dragchain.export.view"),
+        source=source_hash("dragchain.export.write"),
     shell:
         "dragchain export $(dirname {input.run}) --to paraview --replace > {log} 2>&1"

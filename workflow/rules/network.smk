@@ -5,7 +5,6 @@ rule write_network_page:
     input:
         tables_of("process", [*SCENES["process"].tables, *SCENES["process"].network]),
         of_run("process", "tables/facets.parquet"),
-        [of_run("process", f"figures/{name}.png") for name in ("network_xz", "forces")],
         WORK.files("analysis/dragchain/network_page/network.*"),
         run=of_run("process", "run.json"),
     output:

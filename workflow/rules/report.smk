@@ -11,7 +11,7 @@ rule draw_set_up:
         study=STUDY,
         case=SCENES["process"].digest(CASES[0]),
         fidelity=WORK.fidelity_option,
-        source=source_hash("dragdeck.preview.page", "dragdeck.preview.layout"),
+        source=source_hash("dragdeck.preview.picture"),
     shell:
         "dragdeck preview {params.study} {params.fidelity} > {log} 2>&1"
 

@@ -4,10 +4,9 @@
 # Processor times side by side: no other job may run meanwhile.
 rule measure_costs:
     input:
-        WORK.templates_of("drop_test"),
         WORK.templates_of("filling"),
         WORK.templates_of("process"),
-        script=WORK.files("benchmarks/costs/*.*"),
+        script=WORK.files("benchmarks/costs.*"),
     output:
         WORK.of_tradeoff("costs.json"),
     threads: workflow.cores
@@ -20,7 +19,7 @@ rule measure_costs:
         cases=[scene.digest(CASES[0]) for scene in SCENES.values()],
         source=source_hash("dragdeck.engine.batch", "dragdeck.project", "dragchain.tables.write"),
     shell:
-        "python benchmarks/costs {params.study} {params.fidelity} --rounds {params.rounds}"
+        "python benchmarks/costs.py {params.study} {params.fidelity} --rounds {params.rounds}"
         " --out {output} 2>&1 | tee -i {log}"
 
 

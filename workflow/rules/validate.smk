@@ -6,10 +6,8 @@ rule write_validation:
         measures=lambda wildcards: WORK.every_point("measures.json", VALIDATION),
         loads=lambda wildcards: WORK.every_packing("tables/loading.json"),
         templates=WORK.page_templates(
-            *(f"validation/{name}.html.j2" for name in ("validation", "peaks", "scaling", "load")),
-            package="evidence",
+            "validation/validation.html.j2", "validation/load.html.j2", package="evidence"
         ),
-        words="analysis/dragchain/scaling/words.html.j2",
     output:
         page=report(
             WORK.of_study("validation", "report.html"),

@@ -23,6 +23,7 @@ from dragdeck.study.drive import Rotation
 
 _BODY = {name: body for body, name in KINDS.items()}
 _PARTICLES = ("step", *KINEMATICS)
+MEMBERSHIPS = ("peters_chain", "widest_paths", "dominant")
 _CHAINS = ("step", "definition", "particle_ids", "reaches_bowl", "end_kind", "dominant")
 
 
@@ -32,20 +33,14 @@ class Membership:
 
     Attributes
     ----------
-    particle_peters, contact_peters : (N,) and (M,) int
-        Number of the chain by Peters et al. within the frame, from 1; 0: in none.
-    particle_paths, contact_paths : (N,) and (M,) int
-        Through how many workpiece paths to the bowl a particle or contact carries load.
-    particle_dominant, contact_dominant : (N,) and (M,) int
-        1 on the frame's dominant workpiece path, else 0.
+    particles, contacts : dict of (N,) and of (M,) int
+        ``peters_chain``: number of the chain by Peters et al. within the frame, from 1; 0: in
+        none. ``widest_paths``: through how many workpiece paths to the bowl it carries load.
+        ``dominant``: 1 on the frame's dominant workpiece path, else 0.
     """
 
-    particle_peters: Ints
-    contact_peters: Ints
-    particle_paths: Ints
-    contact_paths: Ints
-    particle_dominant: Ints
-    contact_dominant: Ints
+    particles: dict[str, Ints]
+    contacts: dict[str, Ints]
 
 
 def chain_membership(frame: NetworkFrame, chains: pd.DataFrame) -> Membership:
@@ -69,7 +64,9 @@ def chain_membership(frame: NetworkFrame, chains: pd.DataFrame) -> Membership:
         If a chain names a particle or a contact that the frame does not have.
     """
     sizes = (frame.particle_id.size, frame.normal_force.size)
-    found = Membership(*(np.zeros(size, np.int64) for size in 3 * sizes))
+    found = Membership(
+        *({name: np.zeros(size, np.int64) for name in MEMBERSHIPS} for size in sizes)
+    )
     row = {number: k for k, number in enumerate(frame.particle_id.tolist())}
     between = _contacts(frame)
 
@@ -84,18 +81,17 @@ def chain_membership(frame: NetworkFrame, chains: pd.DataFrame) -> Membership:
             particles = [row[number] for number in ids]
             if definition == "peters":
                 peters += 1
-                found.particle_peters[particles] = peters
-                found.contact_peters[links(particles)] = peters
+                found.particles["peters_chain"][particles] = peters
+                found.contacts["peters_chain"][links(particles)] = peters
                 continue
             first, last = particles[0], particles[-1]
             begun[first] += 1
             if reaches_bowl:
                 start = between[WORKPIECE, -1, first][begun[first] - 1]
                 contacts = [start, *links(particles), between[_BODY[end_kind], -1, last][0]]
-                found.particle_paths[particles] += 1
-                found.contact_paths[contacts] += 1
-                found.particle_dominant[particles] |= bool(dominant)
-                found.contact_dominant[contacts] |= bool(dominant)
+                for of, rows in ((found.particles, particles), (found.contacts, contacts)):
+                    of["widest_paths"][rows] += 1
+                    of["dominant"][rows] |= bool(dominant)
     except (KeyError, IndexError):
         raise TableError(
             f"a chain of step {frame.step} has a particle or a contact that is missing in"

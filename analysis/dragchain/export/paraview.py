@@ -12,62 +12,28 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from dragchain.arrays import Floats
-from dragchain.export.frames import FrameData, FrameSeries
+from dragchain.arrays import Floats, Ints
+from dragchain.export.frames import MEMBERSHIPS, FrameData, FrameSeries
 from dragchain.figures.network_picture import segments
 from dragchain.network.chains import major_stress, particle_stress
 from dragchain.network.frame import PARTICLE, NetworkFrame
 from dragchain.network.statistics import contact_counts
 from dragchain.run.workpiece import placed, read_workpiece_mesh
 from dragchain.tables.run_folder import Run
-from dragdeck.documents import Document
 from dragdeck.files import write_text, write_vtp
-
-SCRIPT = "view.py"
-DATA = "view.json"
-
-SCALED = {
-    "v": 0.99, "max_normal_force_n": 0.99, "normal_force_n": 0.999, "mean_pressure_pa": 0.99
-}  # fmt: skip
-"""Arrays that colour a view, and the fraction of a frame that the scale of each covers."""
-
-
-class View(Document):
-    """What the view of an export shows: flags and numbers only.
-
-    Attributes
-    ----------
-    chains : bool
-        Whether particles and contacts have the arrays of chains.
-    bowl_radius_m, bowl_height_m, particle_radius_m : float
-        Inner sizes of the bowl and mean radius of the particles, m.
-    upper : mapping of str to float
-        Upper end of the colour scale of each array that there is, in the array's unit.
-    """
-
-    remedy = "make it with: dragchain export"
-
-    chains: bool
-    bowl_radius_m: float
-    bowl_height_m: float
-    particle_radius_m: float
-    upper: Mapping[str, float]
-
 
 MAIN = "run.pvd"
 """The file to open: all there is."""
 
 _FRAMES = "frames"
 _LOADING = ("mean_pressure_pa", "friction_work_pa", "peak_normal_force_n")
-_CHAIN_ARRAYS = {"peters_chain": "peters", "widest_paths": "paths", "dominant": "dominant"}
 
 
 def write_paraview(folder: Path, series: FrameSeries, frames: Iterable[FrameData]) -> None:
-    """Write the frames of a series into an empty folder, the lists of them, and the view."""
+    """Write the frames of a series into an empty folder, and the lists of them."""
     workpiece = None if series.run.case.workpiece is None else _loaded_workpiece(series.run)
-    listed, upper = defaultdict[str, list[str]](list), defaultdict[str, list[float]](list)
+    listed = defaultdict[str, list[str]](list)
     (folder / _FRAMES).mkdir()
     for frame_data in frames:
         parts = _parts(frame_data, workpiece, with_chains=series.has_chains)
@@ -75,12 +41,8 @@ def write_paraview(folder: Path, series: FrameSeries, frames: Iterable[FrameData
         for part, file in _write_frame(folder / _FRAMES, name, parts).items():
             time, path = f'timestep="{frame_data.time_s!r}" part="0"', f"{_FRAMES}/{file}"
             listed[part].append(f"{time} file={quoteattr(path)}")
-        for mesh in parts.values():
-            for array in (array for array in mesh.array_names if array in SCALED and mesh.n_points):
-                upper[array].append(_upper_end(mesh[array], SCALED[array]))
     for part, rows in listed.items():
         write_text(folder / f"{part}.pvd", _data_sets("Collection", "0.1", rows))
-    _write_view(folder, series, {name: float(np.median(found)) for name, found in upper.items()})
 
 
 def _parts(frame_data: FrameData, workpiece: Any, *, with_chains: bool) -> dict[str, Any]:
@@ -101,26 +63,6 @@ def _write_frame(folder: Path, name: str, parts: Mapping[str, Any]) -> dict[str,
         rows.append(f'index="{number}" name="{part}" file="{file}"')
     write_text(folder / f"{name}.vtm", _data_sets("vtkMultiBlockDataSet", "1.0", rows))
     return {**files, "run": f"{name}.vtm"}
-
-
-def _upper_end(values: NDArray[Any], part: float) -> float:
-    """The upper end of the scale that covers a fraction of the values of an array."""
-    sizes = np.linalg.norm(values, axis=1) if values.ndim > 1 else values
-    return float(np.quantile(sizes, part))
-
-
-def _write_view(folder: Path, series: FrameSeries, upper: Mapping[str, float]) -> None:
-    """Write ``view.py`` and ``view.json``; a scale ends at the median over the frames."""
-    case = series.run.case
-    bowl, height_m = case.bowl, case.inputs.get("bowl.height_m")
-    View(
-        chains=series.has_chains,
-        bowl_radius_m=bowl.radius_m,
-        bowl_height_m=height_m if isinstance(height_m, int | float) else 2 * bowl.radius_m,
-        particle_radius_m=case.media.radius_mean_m,
-        upper=upper,
-    ).write(folder / DATA)
-    (folder / SCRIPT).write_bytes(Path(__file__).with_name(SCRIPT).read_bytes())
 
 
 def _data_sets(kind: str, version: str, rows: list[str]) -> str:
@@ -159,7 +101,7 @@ def _particles_mesh(frame_data: FrameData, *, with_chains: bool) -> Any:
     """
     import pyvista as pv
 
-    particles = frame_data.particles
+    particles, found = frame_data.particles, frame_data.membership
     mesh = pv.PolyData(particles[["x_m", "y_m", "z_m"]].to_numpy(np.float64))
     data = mesh.point_data
     data["id"] = particles["particle_id"].to_numpy(np.int64)
@@ -171,7 +113,7 @@ def _particles_mesh(frame_data: FrameData, *, with_chains: bool) -> Any:
         data["major_stress_pa"] = major_stress(particle_stress(frame_data.network))[0]
         data["max_normal_force_n"] = _max_normal_force(frame_data.network)
     if with_chains:
-        _chains(data, frame_data, "particle", len(particles))
+        _chains(data, found.particles if found else None, len(particles))
     return mesh
 
 
@@ -196,6 +138,7 @@ def _contacts_mesh(frame_data: FrameData, *, with_chains: bool) -> Any:
     import pyvista as pv
 
     contacts, frame = frame_data.contacts, frame_data.network
+    found = frame_data.membership
     assert contacts is not None and frame is not None
     if contacts.empty:
         return pv.PolyData()
@@ -210,16 +153,12 @@ def _contacts_mesh(frame_data: FrameData, *, with_chains: bool) -> Any:
     for name in ("normal_force_n", "tangential_force_n", "overlap_m"):
         data[name] = contacts[name].to_numpy(np.float64)
     if with_chains:
-        _chains(data, frame_data, "contact", len(contacts))
+        _chains(data, found.contacts if found else None, len(contacts))
     return mesh
 
 
-def _chains(data: Any, frame_data: FrameData, what: str, size: int) -> None:
-    """Add number of the chain, number of workpiece paths, and dominance.
-
-    0 none, -1 not searched.
-    """
-    found = frame_data.membership
-    for name, field in _CHAIN_ARRAYS.items():
-        values = np.full(size, -1) if found is None else getattr(found, f"{what}_{field}")
+def _chains(data: Any, found: Mapping[str, Ints] | None, size: int) -> None:
+    """Add number of the chain, number of workpiece paths, and dominance; -1 if not searched."""
+    for name in MEMBERSHIPS:
+        values = np.full(size, -1) if found is None else found[name]
         data[name] = values.astype(np.int32)

@@ -108,19 +108,6 @@ def true_minus(drawn: Artist) -> None:
         text.set_text(_HYPHEN.sub("\N{MINUS SIGN}", text.get_text()))
 
 
-def few_colours(picture: Image.Image) -> Image.Image:
-    """A picture of 256 colours, 96 of them those of forces: a third of the bytes."""
-    own = picture.quantize(159, dither=Image.Dither.NONE).getpalette() or []
-    forces = np.rint(255.0 * force_map()(np.linspace(0.0, 1.0, 96))[:, :3]).astype(int)
-    palette = Image.new("P", (1, 1))
-    palette.putpalette([255, 255, 255, *own, *forces.ravel().tolist()])
-    few = picture.quantize(palette=palette, dither=Image.Dither.NONE)
-    white = (np.asarray(picture) == 255).all(axis=2)
-    shown = Image.fromarray(np.where(white, 0, np.asarray(few)).astype(np.uint8), mode="P")
-    shown.putpalette(palette.getpalette() or [])
-    return shown
-
-
 def png(figure: Figure) -> bytes:
     """A figure as PNG without transparency."""
     true_minus(figure)

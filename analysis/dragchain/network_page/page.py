@@ -4,7 +4,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from dragchain.network_page.scene import ROUNDING, PageScene, page_scene
-from dragchain.report.page import NETWORK_PAGE, file_uri, page_environment
+from dragchain.report.page import NETWORK_PAGE, page_environment
 from dragchain.run.basis import changed_settings, effects
 from dragchain.tables.run_folder import Run
 from dragdeck.errors import RejectedRunError
@@ -12,15 +12,11 @@ from dragdeck.files import write_text
 from dragdeck.records.case import CaseOfRun
 from dragdeck.records.run import read_accepted
 
-_PICTURES = ("network_xz", "forces")
-"""Figures of a run that stand for scene and curve where these cannot be drawn."""
-
 
 def write_page(run_dir: Path) -> str:
     """Write ``network.html`` into the folder of a process run; what to say at the end.
 
-    The run needs its tables and chains. Without ``dragchain loading`` the page has no load map,
-    without ``dragchain figures`` no pictures for browsers that cannot draw the scene.
+    The run needs its tables and chains. Without ``dragchain loading`` the page has no load map.
 
     Raises
     ------
@@ -30,23 +26,19 @@ def write_page(run_dir: Path) -> str:
         If the run is too short to have peaks.
     """
     run = Run.open(run_dir)
-    page = page_html(run.case, page_scene(run), _pictures(run_dir), _rejection(run_dir))
+    page = page_html(run.case, page_scene(run), _rejection(run_dir))
     file = run_dir / NETWORK_PAGE
     write_text(file, page)
     return f"{len(page.encode()) / 1e6:.1f} MB: {file}"
 
 
-def page_html(
-    case: CaseOfRun, scene: PageScene, pictures: dict[str, str | None], rejection: str
-) -> str:
+def page_html(case: CaseOfRun, scene: PageScene, rejection: str) -> str:
     """The page as HTML.
 
     Parameters
     ----------
     case : CaseOfRun
     scene : PageScene
-    pictures : dict of str to str or None
-        Data URIs of the static pictures.
     rejection : str
         Why the run is no result; empty if it is one.
     """
@@ -55,7 +47,6 @@ def page_html(
         case=case,
         head=scene.head,
         data=scene.columns.text(),
-        pictures=pictures,
         rejection=rejection,
         settings=list(changed_settings(case.fidelity)),
         effects=effects(case.fidelity),
@@ -69,10 +60,6 @@ def page_html(
 def _own(name: str) -> str:
     """A file of this package."""
     return (files("dragchain.network_page") / name).read_text(encoding="utf-8")
-
-
-def _pictures(run_dir: Path) -> dict[str, str | None]:
-    return {name: file_uri(run_dir / "figures" / f"{name}.png") for name in _PICTURES}
 
 
 def _rejection(run_dir: Path) -> str:

@@ -17,14 +17,7 @@ from pydantic import JsonValue
 from scipy.spatial.transform import Rotation as Quaternion
 
 from dragchain.arrays import Floats, Ints
-from dragchain.drag import (
-    AZIMUTH_BINS,
-    circumference,
-    drag_peaks,
-    parts,
-    peak_separation_s,
-    read_counted,
-)
+from dragchain.drag import drag_peaks, peak_separation_s, read_counted
 from dragchain.errors import TableError
 from dragchain.export.frames import FrameSeries
 from dragchain.figures.style import force_map
@@ -175,19 +168,19 @@ def read_shown(series: FrameSeries) -> Shown:
     """Read the frames of a series; errors are those of its iterator."""
     particles, contacts, poses, most = [], [], [], 0
     for number, data in enumerate(series):
-        network, chain = data.network, data.membership
-        assert network is not None and chain is not None
+        network, membership = data.network, data.membership
+        assert network is not None and membership is not None
         assert data.contacts is not None and data.workpiece is not None
-        kept = _near(network, data.workpiece[0])
+        kept, chain = _near(network, data.workpiece[0]), membership.contacts
         place = np.where(kept, np.cumsum(kept) - 1, -1)
         bodies = BODIES + data.contacts["b_id"].to_numpy(np.int64)
         found = data.contacts.assign(
             frame=number,
             a=place[network.a],
             b=np.where(network.between_particles(), place[network.b], bodies),
-            flags=QUASI_LINEAR * (chain.contact_peters > 0)
-            + PATH * (chain.contact_paths > 0)
-            + DOMINANT * chain.contact_dominant,
+            flags=QUASI_LINEAR * (chain["peters_chain"] > 0)
+            + PATH * (chain["widest_paths"] > 0)
+            + DOMINANT * chain["dominant"],
         )
         particles.append(data.particles[kept].assign(frame=number))
         contacts.append(found[(found["a"] >= 0) & (found["b"] >= 0)])
@@ -224,18 +217,6 @@ _SMOOTHED_DIAMETERS = 0.1
 _TOP = 0.999
 """Quantile of all speeds, and of all displacements, at the top of their colour scale."""
 
-_MOST_LEVELS = 20
-"""Levels of depth of a profile, at most."""
-
-_ON_LIMIT_MM = 1e-6
-"""A contact nearer to the limit of a level than this is on it; points have nine digits."""
-
-_PER_DECADE = 8
-"""Bins of the size of forces."""
-
-_LEFT_OUT = 0.005
-"""Fraction of all contacts that may be weaker than the first of these bins."""
-
 
 @dataclass(frozen=True)
 class PageScene:
@@ -259,7 +240,6 @@ def page_scene(run: Run) -> PageScene:
     series = shown_frames(run, peaks["time_s"].to_numpy())
     shown = read_shown(series)
     times_s = process_time(series.times_s, case)
-    headings = _headings(run, series.steps)
     bowl, surface = case.bowl, 1e3 * needed(case.surface_m, "surface_m")
     head = {
         "run": case.run,
@@ -277,8 +257,7 @@ def page_scene(run: Run) -> PageScene:
             "most": MOST_PARTICLES,
             "reach": 1e3 * shown.reach_m(),
         },
-        "workpieces": [_workpiece(columns, run, shown) | {"headings": headings.tolist()}],
-        "profiles": profiles(columns, shown, headings, surface),
+        "workpieces": [_workpiece(columns, run, shown, series.steps)],
         "curve": _curve(columns, run),
         "peaks": _peaks(peaks, times_s, case),
         "colours": _colours(),
@@ -367,82 +346,10 @@ def _path(row: Mapping[Any, Any] | None) -> dict[str, JsonValue] | None:
     }
 
 
-# --- profiles ----------------------------------------------------------------------------------
-
-
-def profiles(
-    columns: PackedColumns, shown: Shown, headings: Floats, surface: float
-) -> dict[str, dict[str, JsonValue]]:
-    """Add the profiles of the normal forces, frame by frame; limits and means of their bins.
-
-    On the workpiece ``azimuth`` (limits in degrees; N), ``depth`` (mm; N/mm) and their ``map`` (N,
-    mean of all frames); of all contacts ``size`` (decadic logarithm of N; number).
-    """
-    frames = len(shown.poses)
-    touching = shown.contacts[shown.contacts["b"] == BODIES]
-    frame, force = touching["frame"].to_numpy(), touching["normal_force_n"].to_numpy()
-    x, y, z = touching[list(POINT)].to_numpy().T
-    azimuth = np.arctan2(y - shown.poses[frame, 1], x - shown.poses[frame, 0]) - headings[frame]
-    depth = surface - 1e3 * z
-    limits = _levels(depth)
-    # The end face may lie on a limit: what is no deeper than it is above it.
-    level = (np.searchsorted(limits, depth - _ON_LIMIT_MM) - 1).clip(0, len(limits) - 2)
-    cells = np.zeros((frames, len(limits) - 1, AZIMUTH_BINS))
-    for sector in parts(azimuth, AZIMUTH_BINS):
-        np.add.at(cells, (frame, level, sector), 0.5 * force)
-
-    def profile(name: str, limits: Floats, values: Floats) -> dict[str, JsonValue]:
-        columns.add(f"{name}_profile", "f24", values)
-        mean = values.mean(axis=0)
-        return {"limits": limits.tolist(), "mean": mean.tolist(), "top": float(values.max()) or 1.0}
-
-    rows, sums = (
-        np.bincount(shown.contacts["frame"], weights=weights, minlength=frames)
-        for weights in (None, shown.contacts["normal_force_n"])
-    )
-    mean = cells.mean(axis=0)
-    return {
-        "azimuth": profile("azimuth", np.degrees(circumference(AZIMUTH_BINS)), cells.sum(axis=1)),
-        "depth": profile("depth", limits, cells.sum(axis=2) / np.diff(limits)),
-        "size": profile("size", *_sizes(shown.contacts, frames))
-        | {"means": (sums / np.maximum(rows, 1)).tolist()},
-        "map": {"mean": mean.ravel().tolist(), "top": float(mean.max()) or 1.0},
-    }
-
-
-def _levels(depth: Floats) -> Floats:
-    """Limits of levels of depth, mm: round ones from the surface or above to the deepest contact.
-
-    A thin last level is part of the one above it.
-    """
-    least = min(depth.min(initial=0.0), 0.0)
-    most = max(np.ceil(100 * (depth.max(initial=0.0) - _ON_LIMIT_MM)) / 100, 0.0) or 1.0
-    rough = (most - least) / (_MOST_LEVELS - 2)
-    power = 10.0 ** np.floor(np.log10(rough))
-    step = power * next(factor for factor in (1, 2, 5, 10) if factor * power >= rough)
-    first = int(np.floor(least / step))
-    last = max(round(most / step), first + 1)
-    return np.append(step * np.arange(first, last), most)
-
-
-def _sizes(contacts: pd.DataFrame, frames: int) -> tuple[Floats, Floats]:
-    """Limits of the bins of size, decadic logarithm of N, and the number of contacts in each."""
-    loaded = contacts[contacts["normal_force_n"] > 0.0]
-    bins = np.floor(_PER_DECADE * np.log10(loaded["normal_force_n"].to_numpy())).astype(np.int64)
-    lowest = bins.min() if bins.size else 0
-    width = bins.max() - lowest + 1 if bins.size else 1
-    counts = np.zeros((frames, width + _PER_DECADE))
-    np.add.at(counts, (loaded["frame"].to_numpy(), bins - lowest), 1.0)
-    weaker = np.cumsum(counts.sum(axis=0))
-    first = int(np.searchsorted(weaker[:width], _LEFT_OUT * weaker[-1], side="right"))
-    last = max(width, first + _PER_DECADE)
-    return (lowest + np.arange(first, last + 1)) / _PER_DECADE, counts[:, first:last]
-
-
 # --- workpiece and force -----------------------------------------------------------------------
 
 
-def _workpiece(columns: PackedColumns, run: Run, shown: Shown) -> dict[str, JsonValue]:
+def _workpiece(columns: PackedColumns, run: Run, shown: Shown, steps: Ints) -> dict[str, JsonValue]:
     """Add the workpiece's facets in its own frame and their loads; its poses, frame by frame."""
     case = run.case
     surface = read_surface(run.folder, case)
@@ -452,6 +359,7 @@ def _workpiece(columns: PackedColumns, run: Run, shown: Shown) -> dict[str, Json
         "poses": (shown.poses * [1e3, 1e3, 1e3, 1.0, 1.0, 1.0, 1.0]).tolist(),
         "radius": 1e3 * own.radius_m,
         "immersion": 1e3 * own.immersion_depth_m,
+        "headings": _headings(run, steps).tolist(),
         "loads": _loads(columns, run),
     }
 

@@ -66,4 +66,5 @@ def write_report(
         drawn = {key: png(figure) for key, figure in draw().items()} | dict(pictures or {})
     uris = {key: data_uri(picture) for key, picture in drawn.items()}
     page = render_page(template, filters, package, pictures=uris, **content)
-    write_bundle(out_dir, tables=tables, figures=drawn, documents=documents, pages={name: page})
+    files = {f"figures/{key}.png": picture for key, picture in drawn.items()}
+    write_bundle(out_dir, tables=tables, files=files, documents=documents, pages={name: page})

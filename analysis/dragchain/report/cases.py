@@ -194,23 +194,19 @@ def read_study_runs(run_dir: Path) -> StudyRuns:
     DocumentError
         If a document of one of them is missing or cannot be used.
     """
-    process = _read(run_dir, ProcessFindings)
+    process = read_reported(run_dir, ProcessFindings)
     upstream = upstream_folders(run_dir, process.case)
     filling = drop_test = None
     if "filling" in upstream:
-        filling = _read(upstream["filling"], FillingFindings)
+        filling = read_reported(upstream["filling"], FillingFindings)
     with suppress(RejectedRunError, DocumentError):
         if "drop_test" in upstream:
-            drop_test = _read(upstream["drop_test"], DropFindings)
+            drop_test = read_reported(upstream["drop_test"], DropFindings)
     return StudyRuns(process, filling, drop_test, *read_optional(run_dir))
 
 
-def read_upstream(run_dir: Path) -> ReportedRun[Findings]:
-    """Read a filling or a drop test; errors are those of `read_study_runs`."""
-    return _read(run_dir, Findings)
-
-
-def _read(run_dir: Path, findings: type[F]) -> ReportedRun[F]:
+def read_reported(run_dir: Path, findings: type[F]) -> ReportedRun[F]:
+    """Read a run with findings of this type; errors are those of `read_study_runs`."""
     record = read_accepted(run_dir)
     return ReportedRun(run_dir, load_case(run_dir), findings.read(run_dir / FILE), record)
 

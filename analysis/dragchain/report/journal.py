@@ -1,20 +1,16 @@
 """The figures of a process run for a publication: SVG, PDF and PNG at the widths of columns."""
 
-import base64
-import re
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import matplotlib
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from matplotlib.typing import RcKeyType
-from PIL import Image
 
-from dragchain.figures.style import PAPER_COLOURS, drawing, few_colours, true_minus
+from dragchain.figures.style import PAPER_COLOURS, drawing, true_minus
 from dragchain.loading.contact_events import Thresholds
 from dragchain.loading.write import compute_loading, figure_of
 from dragchain.report.findings import FILE, ProcessFindings
@@ -109,26 +105,7 @@ def _is_panel(axes: Axes) -> bool:
 def _encoded(figure: Figure, ending: str) -> bytes:
     true_minus(figure)
     for shown in figure.findobj(AxesImage):
-        shown.set_data(
-            np.asarray(few_colours(Image.fromarray(np.asarray(shown.get_array()))).convert("RGB"))
-        )
         shown.set_interpolation("antialiased" if ending == "png" else "none")
     content = BytesIO()
     figure.savefig(content, format=ending, dpi=_DPI)
-    if ending == "png":
-        return _png(few_colours(Image.open(content).convert("RGB")))
-    if ending == "svg":
-        return re.sub(rb"(?<=image/png;base64,)[^\"]+", _embedded, content.getvalue())
-    return content.getvalue()
-
-
-def _embedded(picture: re.Match[bytes]) -> bytes:
-    """A picture in an SVG file, of few colours."""
-    pixels = Image.open(BytesIO(base64.b64decode(picture.group()))).convert("RGB")
-    return base64.b64encode(_png(few_colours(pixels)))
-
-
-def _png(picture: Image.Image) -> bytes:
-    content = BytesIO()
-    picture.save(content, format="png", dpi=(_DPI, _DPI), optimize=True)
     return content.getvalue()

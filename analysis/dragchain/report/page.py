@@ -64,14 +64,9 @@ def fixed(value: float | None, decimals: int, sign: bool = False) -> str:
     return _typeset(f"{value:{'+' if sign else ''}.{decimals}f}")
 
 
-def percent(value: float | None) -> str:
-    """A signed percentage with one decimal, a dash for none."""
-    return DASH if value is None else f"{fixed(value, 1, sign=True)} %"
-
-
 def fraction(value: float | None) -> str:
     """A fraction of 1 as a signed percentage, a dash for none."""
-    return percent(None if value is None else 100 * value)
+    return DASH if value is None else f"{fixed(100 * value, 1, sign=True)} %"
 
 
 def in_percent(value: float | None, digits: int = 3) -> str:
@@ -167,7 +162,7 @@ def page_environment(
         lstrip_blocks=True,
     )
     shared = (
-        *(number, measured, fixed, percent, fraction, interval, with_interval, ends),
+        *(number, measured, fixed, fraction, interval, with_interval, ends),
         *(in_percent, heading_key, sections, cell),
     )
     environment.filters |= {one.__name__: one for one in shared} | dict(filters or {})
@@ -227,11 +222,10 @@ def write_bundle(
     out_dir: Path,
     *,
     tables: Mapping[str, pd.DataFrame] | None = None,
-    workbooks: Mapping[str, bytes] | None = None,
-    figures: Mapping[str, bytes] | None = None,
+    files: Mapping[str, bytes] | None = None,
     documents: Mapping[str, Document] | None = None,
     pages: Mapping[str, str] | None = None,
-) -> list[Path]:
+) -> None:
     """Write a report.
 
     Parameters
@@ -240,35 +234,19 @@ def write_bundle(
         Made if need be.
     tables : mapping of str to DataFrame, optional
         Written as ``<name>.parquet`` and ``<name>.csv``.
-    workbooks : mapping of str to bytes, optional
-        Spreadsheets, written as ``<name>.xlsx``.
-    figures : mapping of str to bytes, optional
-        PNG pictures, written as ``figures/<name>.png``.
+    files : mapping of str to bytes, optional
+        Figures and spreadsheets, by the names of their files.
     documents : mapping of str to Document, optional
         Written as ``<name>.json``.
     pages : mapping of str to str, optional
         HTML, written as ``<name>.html``, after all that they show.
-
-    Returns
-    -------
-    list of Path
-        The files.
     """
-    files = []
     for name, table in (tables or {}).items():
         write_parquet(table, out_dir / f"{name}.parquet")
         write_text(out_dir / f"{name}.csv", table.to_csv(index=False, lineterminator="\n"))
-        files += [out_dir / f"{name}.parquet", out_dir / f"{name}.csv"]
-    for name, book in (workbooks or {}).items():
-        files.append(out_dir / f"{name}.xlsx")
-        write_bytes(files[-1], book)
-    for name, picture in (figures or {}).items():
-        files.append(out_dir / "figures" / f"{name}.png")
-        write_bytes(files[-1], picture)
+    for name, content in (files or {}).items():
+        write_bytes(out_dir / name, content)
     for name, document in (documents or {}).items():
-        files.append(out_dir / f"{name}.json")
-        document.write(files[-1])
+        document.write(out_dir / f"{name}.json")
     for name, page in (pages or {}).items():
-        files.append(out_dir / f"{name}.html")
-        write_text(files[-1], page)
-    return files
+        write_text(out_dir / f"{name}.html", page)

@@ -5,7 +5,6 @@ import math
 from collections.abc import Mapping, Sequence
 from io import BytesIO
 from itertools import chain
-from typing import TYPE_CHECKING
 
 import pandas as pd
 import pyarrow as pa
@@ -14,10 +13,6 @@ from dragchain.report.cases import ReportedCase
 from dragchain.run.basis import Standing
 from dragchain.tables.columns import descriptions, unit_end, unit_of
 from dragdeck.records.case import AssumptionOfRun
-
-if TYPE_CHECKING:
-    from xlsxwriter.format import Format
-    from xlsxwriter.worksheet import Worksheet
 
 _WORDS = {
     "ci95 low": "95 % CI lower end", "ci95 high": "95 % CI upper end", "youngs": "Young's",
@@ -133,7 +128,7 @@ def workbook(sheets: Mapping[str, pd.DataFrame]) -> bytes:
     from xlsxwriter import Workbook
 
     content = BytesIO()
-    with Workbook(content, {"in_memory": True}) as book:
+    with Workbook(content, _OPTIONS) as book:
         bold = book.add_format({"bold": True, "text_wrap": True, "valign": "top"})
         formats = {code: book.add_format({"num_format": code}) for code in _NUMBERS.values()}
         for name, table in sheets.items():
@@ -141,26 +136,16 @@ def workbook(sheets: Mapping[str, pd.DataFrame]) -> bytes:
             for column, (heading, values) in enumerate(table.items()):
                 sheet.write_string(0, column, str(heading), bold)
                 for row, value in enumerate(values.tolist(), start=1):
-                    _write(sheet, row, column, value, formats)
+                    if not isinstance(value, float) or value == 0.0:
+                        sheet.write(row, column, value)
+                    elif math.isfinite(value):
+                        size = next(least for least in _NUMBERS if abs(value) >= least)
+                        sheet.write(row, column, value, formats[_NUMBERS[size]])
             sheet.freeze_panes(1, 0)
             sheet.autofit(300)
     return content.getvalue()
 
 
+_OPTIONS = {"in_memory": True, "strings_to_formulas": False, "strings_to_urls": False}
 _NUMBERS = {1000.0: "#,##0", 10.0: "0.0", 0.01: "0.000", 0.0: "0.00E+00"}
 """Formats of numbers from these sizes on."""
-
-
-def _write(
-    sheet: "Worksheet", row: int, column: int, value: object, formats: Mapping[str, "Format"]
-) -> None:
-    """Write a cell by the type of its value; a number that there is none of stays blank."""
-    if isinstance(value, bool):
-        sheet.write_boolean(row, column, value)
-    elif isinstance(value, int | float):
-        if math.isfinite(value):
-            size = next(least for least in _NUMBERS if abs(value) >= least)
-            plain = isinstance(value, int) or value == 0.0
-            sheet.write_number(row, column, value, None if plain else formats[_NUMBERS[size]])
-    elif value is not None:
-        sheet.write_string(row, column, str(value))

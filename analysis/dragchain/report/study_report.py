@@ -1,7 +1,7 @@
 """The report on a study's runs, and on those without a result: a table and one page."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,16 +14,15 @@ from dragchain.report.cases import (
     ReportedRun,
     StudyRuns,
     cases_of,
+    read_reported,
     read_study_runs,
-    read_upstream,
 )
 from dragchain.report.cost_check import CostRow, answers, cost_rows, prediction_for, read_advice
-from dragchain.report.findings import FIGURES, FillingFindings, Findings, ProcessFindings
+from dragchain.report.findings import FIGURES, Findings
 from dragchain.report.page import (
     NETWORK_PAGE,
     data_uri,
     file_uri,
-    number,
     render_page,
     write_bundle,
 )
@@ -163,21 +162,16 @@ _FROM_LOADING = "workpiece"
 
 
 @dataclass(frozen=True)
-class ShownFigure:
-    """A figure of a run as a data URI; the page has its caption."""
-
-    name: str
-    uri: str
-    alt: str
-
-
-@dataclass(frozen=True)
 class RunSection:
-    """What the page shows of one process run; `network` is its page on the contact network."""
+    """What the page shows of one process run.
+
+    `pictures`: data URIs by the names of the figures, of which the page has the captions;
+    `network`: page on the contact network.
+    """
 
     study: StudyRuns
     assumptions: list[AssumptionOfRun]
-    pictures: list[ShownFigure]
+    pictures: dict[str, str]
     network: Path | None
     corrections: Corrections | None
     costs: list[CostRow]
@@ -232,7 +226,7 @@ def write_study_report(
         write_bundle(
             out_dir,
             tables={"summary": table},
-            workbooks={"summary": summary_workbook(table, assumed, cases)},
+            files={"summary.xlsx": summary_workbook(table, assumed, cases)},
             pages={"report": page},
         )
     elif not any(run.scene == "process" for run in missing):
@@ -262,7 +256,7 @@ def _read(
             if scene_of(folder) == "process":
                 sections.append(_section(read_study_runs(folder), options))
             else:
-                read_upstream(folder)
+                read_reported(folder, Findings)
         except DragdeckError as error:
             missing.append(missing_run(folder, error))
     return sections, missing
@@ -277,7 +271,7 @@ def _section(study: StudyRuns, options: Sequence[OptionEntry]) -> RunSection:
     return RunSection(
         study=study,
         assumptions=_assumptions(study),
-        pictures=[picture for run in study.runs for picture in _pictures(run)],
+        pictures=dict(picture for run in study.runs for picture in _pictures(run)),
         network=network if network.is_file() else None,
         corrections=Corrections.read(corrections) if corrections.is_file() else None,
         costs=list(cost_rows(expected, records)) if expected else [],
@@ -293,48 +287,18 @@ def _assumptions(study: StudyRuns) -> list[AssumptionOfRun]:
     return [known[field] for field in sorted(known)]
 
 
-def _pictures(run: ReportedRun[Findings]) -> list[ShownFigure]:
-    """The figures of a run, that of the loading first.
+def _pictures(run: ReportedRun[Findings]) -> Iterator[tuple[str, str]]:
+    """Name and data URI of the figures of a run, that of the loading first.
 
     Only a filling may lack one of the others, as it may have no thermo table.
     """
     scene = run.case.scene
-    found = []
     for name in (*([_FROM_LOADING] if scene == "process" else []), *FIGURES[scene]):
         file = run.folder / "figures" / f"{name}.png"
         if (uri := file_uri(file)) is not None:
-            found.append(ShownFigure(name, uri, _alt(name, run)))
+            yield name, uri
         elif scene != "filling" and name != _FROM_LOADING:
             raise TableError(f"{file}: there is no such file; run `dragchain figures` first")
-    return found
-
-
-def _alt(name: str, run: ReportedRun[Findings]) -> str:
-    """What is seen in a figure, for those who do not see it."""
-    found = run.findings
-    if isinstance(found, ProcessFindings):
-        drag, sums, chains = found.forces["drag_n"], found.ahead_behind, found.chains
-        return {
-            "forces": f"Curves of drag and lateral force over process time. The drag varies "
-            f"about {number(drag.mean)} N with a standard deviation of {number(drag.std)} N.",
-            "network_xy": "Contact network from above: cylinders between particles in contact, "
-            "thicker and darker where the normal force is larger, around the workpiece.",
-            "network_xz": "Contact network from the side: cylinders between particles in contact, "
-            "thicker and darker where the normal force is larger, from workpiece to bowl.",
-            "force_around_workpiece": f"Polar bars of the normal force around the workpiece: "
-            f"{number(sums.ahead_n.value)} N ahead, {number(sums.behind_n.value)} N behind.",
-            "force_depth": "Bars of the normal force per contact and of the total normal force "
-            "against depth below the settled surface; slope per contact "
-            f"{number(found.depth.slope_n_per_m.value)} N/m.",
-            "chains_peaks": f"Above, the drag magnitude over process time with {found.peaks.count} "
-            "marked peaks; below, the bottleneck force of the dominant path, on average "
-            f"{number(chains.dominant_bottleneck_mean_n)} N.",
-            _FROM_LOADING: "Map of normal force times sliding distance on the unrolled or "
-            "three-dimensional surface of the workpiece, with its profiles.",
-        }[name]
-    if isinstance(found, FillingFindings):
-        return "Falling curve of the mean kinetic energy per particle while the packing settles."
-    return "Force and upward velocity of the particle over time in each impact of the drop test."
 
 
 def _render(

@@ -12,7 +12,6 @@ from dragchain.loading.document import Loading
 from dragchain.report.findings import ProcessFindings
 from dragchain.run.basis import QUANTITIES, Basis, Correction, Standing, judge, notes
 from dragchain.run.reference import ReferenceDrag, reference_drags
-from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import Estimate, mean_of
 from dragdeck.documents import Document, Part
 from dragdeck.records.case import CaseOfRun
@@ -287,7 +286,7 @@ def _own(
     for one in extrapolated.quantities if extrapolated else ():
         yield one.name, one.measured
     for name, force in _FORCES.items():
-        yield name, of_mean(found.forces[force])
+        yield name, found.forces[force].estimate
     yield "ahead_behind", found.ahead_behind.ratio
     if loading is not None:
         yield "workpiece_contacts", loading.mean_contacts
@@ -304,11 +303,6 @@ def _correction(name: str, extrapolated: Extrapolated | None) -> Correction | No
     if not windows or one is None or one.value is None:
         return None
     return Correction(one.value.over(one.measured.value), windows)
-
-
-def of_mean(mean: MeanEstimate) -> Estimate:
-    """The mean of a series with its interval."""
-    return Estimate(mean.mean, mean.ci95_low, mean.ci95_high)
 
 
 def values_over_packings(several: Sequence[Values]) -> Values:

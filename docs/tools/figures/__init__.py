@@ -11,12 +11,12 @@ import matplotlib
 from dragchain.figures.style import drawing, true_minus
 from dragdeck.errors import DragdeckError
 from figures.charts import CHARTS
-from figures.drawings import draw_geometry, draw_workflow
+from figures.drawings import draw_geometry
 from figures.pictures import PICTURES, drawn_picture, run_of_study
 
 IMAGES = Path(__file__).resolve().parents[2] / "images"
 
-FIGURES = {**CHARTS, "geometry": draw_geometry, "workflow": draw_workflow}
+FIGURES = {**CHARTS, "geometry": draw_geometry}
 """What draws a figure, by the name of its file."""
 
 

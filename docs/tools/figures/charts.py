@@ -3,11 +3,8 @@
 import matplotlib
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch
-from matplotlib.ticker import NullFormatter
-from records import chosen, document, record_table
+from records import chosen, record_table
 
 from dragchain.figures.panels import log_ticks
 from dragchain.figures.style import (
@@ -22,7 +19,8 @@ from dragchain.figures.style import (
     RED,
     force_map,
 )
-from evidence.stability.report import COLOURS as CLASSES
+from dragchain.scaling.fit import draw_scalings, read_scalings
+from evidence.stability.report import draw_regime
 
 
 def _figure(width: float, height: float) -> Figure:
@@ -113,29 +111,7 @@ def _draw_load_map() -> Figure:
 
 def _draw_scaling() -> Figure:
     """Mean drag over depth, diameter, friction and speed, with the fitted power laws."""
-    labels = {
-        "drag-depth": ("immersion depth (mm)", 1e3),
-        "drag-diameter": ("diameter of the workpiece (mm)", 2e3),
-        "drag-friction": ("friction of particle on workpiece", 1.0),
-        "drag-speed": ("speed of the workpiece (mm/s)", 1e3),
-    }
-    figure = _figure(7.6, 5.4)
-    for axes, (name, (label, factor)) in zip(
-        figure.subplots(2, 2).flat, labels.items(), strict=True
-    ):
-        found = document(f"scaling/{name}")
-        curve, runs = pd.DataFrame(found["fit"]["curve"]), pd.DataFrame(found["runs"])
-        x = factor * curve["x"]
-        axes.fill_between(x, curve["ci95_low"], curve["ci95_high"], color=LIGHT, lw=0)
-        axes.plot(x, curve["value"], color=GREY)
-        axes.plot(factor * runs["level"], runs["drag_n"].abs(), "o", color=COLOURS["drag"])
-        words = "exponent {value:.2f} ({ci95_low:.2f} to {ci95_high:.2f})"
-        words = words.format(**found["fit"]["exponent"])
-        axes.set(xscale="log", yscale="log", xlabel=label, ylabel="mean drag (N)", title=words)
-        for axis in (axes.xaxis, axes.yaxis):
-            log_ticks(axis, steps=(1.0, 1.5, 2.0, 3.0, 5.0, 7.0))
-            axis.set_minor_formatter(NullFormatter())
-    return figure
+    return draw_scalings(read_scalings())
 
 
 def _draw_spin() -> Figure:
@@ -155,42 +131,20 @@ def _draw_spin() -> Figure:
     return figure
 
 
-def _draw_stability() -> Figure:
-    """Stable and unstable time steps: a panel per regime, a row per condition."""
-    titles = {"impact": "Single impacts", "column": "Packing at rest under a load"}
-    points = chosen("stability/points", "not reference").rename(columns={"class": "kind"})
-    figure = _figure(9.2, 6.2)
-    panels = figure.subplots(1, len(titles))
-    rows = points.groupby("regime")["condition"].nunique()[list(titles)].max()
-    for axes, (regime, title) in zip(panels, titles.items(), strict=True):
-        _regime(axes, points[points["regime"] == regime])
-        axes.set(title=title, ylim=(rows - 0.5, -0.5))
-    handles = [
-        Patch(color=colour, label=name.replace("engine", "LIGGGHTS"))
-        for name, colour in CLASSES.items()
-    ]
-    handles.append(Patch(fill=False, ec=INK, label="line: critical time step of the contacts"))
-    panels[-1].legend(handles=handles, loc="lower left")
-    return figure
+def _draw_stability_impact() -> Figure:
+    """Classes of single impacts by condition and time step."""
+    return _regime("impact", "Single impacts")
 
 
-def _regime(axes: Axes, points: pd.DataFrame) -> None:
-    steps = np.sort(points["fraction"].unique())
-    rows = list(dict.fromkeys(points["condition"]))
-    for point in points.itertuples():
-        column, row = int(np.searchsorted(steps, point.fraction)), rows.index(point.condition)
-        axes.barh(row, 0.94, 0.86, column - 0.47, color=CLASSES[point.kind])
-    for row, condition in enumerate(rows):
-        own = points[points["condition"] == condition]
-        critical = (own["critical_step_s"] / own["rayleigh_time_s"]).median()
-        if steps[0] <= critical <= steps[-1]:
-            x = np.interp(np.log(critical), np.log(steps), np.arange(len(steps)))
-            axes.plot([x, x], [row - 0.45, row + 0.45], color=INK, lw=1.8)
-    names = points.drop_duplicates("condition").set_index("condition")["label"]
-    axes.set_yticks(range(len(rows)), [names[condition] for condition in rows], fontsize=7.5)
-    axes.set_xticks(range(len(steps)), [f"{100 * step:g}" for step in steps], fontsize=7)
-    axes.set_xlabel("time step (% of the Rayleigh time)")
-    axes.grid(visible=False)
+def _draw_stability_column() -> Figure:
+    """Classes of packings at rest by condition and time step."""
+    return _regime("column", "Packing at rest under a load")
+
+
+def _regime(regime: str, title: str) -> Figure:
+    points = chosen("stability/points", f"not reference and regime == {regime!r}")
+    points["critical_over_rayleigh"] = points["critical_step_s"] / points["rayleigh_time_s"]
+    return draw_regime(points, points.drop_duplicates("condition"), title)
 
 
 def _draw_tradeoff(tolerance: float = 0.1) -> Figure:

@@ -1,25 +1,18 @@
-"""Figures without numbers: the geometry of the paper's study, and the jobs of a study."""
+"""A figure without numbers: the geometry of the paper's study."""
 
-import re
-import subprocess
-import sys
-from collections import defaultdict
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Arc, Circle, Rectangle
-from records import ROOT, record_table
+from records import record_table
 
-from dragchain.figures.style import BLUE, COLOURS, GREEN, GREY, INK, ORANGE, RED
+from dragchain.figures.style import BLUE, COLOURS, GREEN, GREY, INK, RED
 
 BED, STEEL, DRAG, LATERAL = (COLOURS[name] for name in ("bed", "workpiece", "drag", "lateral"))
 BED_HEIGHT = 70.0
 """mm, drawn; the paper fills to this height."""
-
-
-# --- geometry ----------------------------------------------------------------------------
 
 
 def draw_geometry() -> Figure:
@@ -111,64 +104,3 @@ def _top(axes: Axes, bowl: float, height: float, rod: float, path: float, depth:
     _size(axes, (0, 0), end, "path radius", (-15, -5), 54)
     _label(axes, (0, -bowl + 5), "bed", ha="center", va="baseline")
     axes.set(xlim=(-bowl - 3, bowl + 3), ylim=(-bowl - 3, bowl + 3), title="Top view")
-
-
-# --- jobs --------------------------------------------------------------------------------
-
-SCENES = ("drop_test", "filling", "process")
-"""One row each."""
-
-
-def draw_workflow() -> Figure:
-    """The jobs of `snakemake all` and what each needs, from Snakemake's own rule graph."""
-    words = [sys.executable, "-m", "snakemake", "--rulegraph", "dot", "all", "--cores", "1"]
-    words += ["--config", "study=quickstart", "--forceall"]
-    said = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True).stdout
-    labels = dict(re.findall(r'(\d+)\[label = "(\w+)"', said))
-    after = _shortest(re.findall(r"(\d+) -> (\d+)", said))
-    places = _places(labels, after)
-    figure = Figure(figsize=(11.0, 4.2), layout="constrained")
-    axes = figure.subplots()
-    look = {"arrowstyle": "-|>", "color": GREY, "lw": 0.9, "shrinkA": 26, "shrinkB": 28}
-    for start, ends in sorted(after.items()):
-        for end in sorted(ends):
-            axes.annotate("", places[end], places[start], arrowprops=look)
-    colours = {"render": BLUE, "run": ORANGE, "tabulate": GREEN}
-    for one, place in places.items():
-        colour = colours.get(labels[one].partition("_")[0], GREY)
-        text = labels[one].removesuffix("_of_process").replace("_", "\n", 1)
-        box = {"boxstyle": "round,pad=0.35", "fc": "white", "lw": 1.3, "ec": colour}
-        axes.text(*place, text, ha="center", va="center", fontsize=8, bbox=box)
-    columns, rows = zip(*places.values(), strict=True)
-    axes.set(xlim=(min(columns) - 0.5, 0.5), ylim=(min(rows) - 0.4, 0.4))
-    axes.axis("off")
-    return figure
-
-
-def _shortest(edges: list[Point]) -> dict[str, set[str]]:
-    """What follows each job, without edges that a longer way replaces."""
-    after: dict[str, set[str]] = defaultdict(set)
-    for start, end in edges:
-        after[start].add(end)
-
-    def reached(start: str) -> set[str]:
-        return {one for end in after.get(start, ()) for one in ({end} | reached(end))}
-
-    return {start: ends - {one for end in ends for one in reached(end)}
-            for start, ends in list(after.items())}  # fmt: skip
-
-
-def _places(labels: dict[str, str], after: dict[str, set[str]]) -> dict[str, Point]:
-    """Column by the longest way to the last job, row by the scene, the next row if taken."""
-
-    def late(one: str) -> int:
-        return max((1 + late(end) for end in after.get(one, ())), default=0)
-
-    places: dict[str, Point] = {}
-    for one in sorted(labels, key=lambda one: labels[one]):
-        row = next((row for row, scene in enumerate(SCENES) if labels[one].endswith(scene)), 2)
-        place = (-late(one), -float(row))
-        while place in places.values():
-            place = (place[0], place[1] - 1.0)
-        places[one] = place
-    return places

@@ -12,9 +12,6 @@ from tempfile import TemporaryDirectory
 from PIL import Image
 from records import ROOT
 
-from dragchain.export.frames import Selection
-from dragchain.export.write import write_export
-from dragchain.figures.style import few_colours
 from dragdeck.errors import DragdeckError
 
 STUDY = "half_minute"
@@ -40,15 +37,6 @@ def _carousel(run: Path) -> bytes:
     return (ROOT / "results/carousel/preview.png").read_bytes()
 
 
-def _paraview(run: Path) -> bytes:
-    with TemporaryDirectory() as folder:
-        write_export(run, "paraview", Path(folder) / "out", Selection(every=50))
-        file = Path(folder) / "view.png"
-        words = [_program("pvpython"), "--force-offscreen-rendering", Path(folder) / "out/view.py"]
-        subprocess.run([*words, "--picture", file, "--frame", "1"], check=True)
-        return file.read_bytes()
-
-
 def _program(name: str) -> str:
     path = shutil.which(name)
     if path is None:
@@ -59,7 +47,6 @@ def _program(name: str) -> str:
 PICTURES: Mapping[str, Callable[[Path], bytes]] = {
     "carousel": _carousel,
     "network_page": _network_page,
-    "paraview": _paraview,
 }
 """What draws a picture from the folder of a process run, by the name of its file."""
 
@@ -68,7 +55,7 @@ def drawn_picture(name: str, run: Path) -> bytes:
     """A picture as PNG of few colours."""
     content = BytesIO()
     with Image.open(BytesIO(PICTURES[name](run))) as drawn:
-        few_colours(drawn.convert("RGB")).save(content, format="png", optimize=True)
+        drawn.convert("RGB").quantize(dither=Image.Dither.NONE).save(content, "png", optimize=True)
     return content.getvalue()
 
 

@@ -8,11 +8,8 @@ from dragchain.figures.panels import (
     compass_bars,
     depth_bars,
     legend_below,
-    log_ticks,
     new_figure,
     new_panels,
-    row,
-    row_names,
 )
 from dragchain.figures.style import WIDTH_IN, drawing
 from dragchain.statistics.estimate import Estimate, EstimateColumns
@@ -51,26 +48,6 @@ def axes() -> Axes:
     return panel
 
 
-def test_the_first_row_is_at_the_top(axes: Axes) -> None:
-    row(axes, 0, 1.0, Estimate(1.0, 0.5, 1.5), "black")
-    row(axes, 1, 2.0, Estimate(2.0, 1.5, 4.0), "black")
-    row_names(axes, ["first", "second"])
-    assert axes.get_ylim() == (1.5, -0.5)
-    assert [tick.get_text() for tick in axes.get_yticklabels()] == ["first", "second"]
-    spans = [line.get_xdata() for line in axes.get_lines()[::2]]
-    np.testing.assert_equal(spans, [[0.5, 1.5], [1.5, 4.0]])
-
-
-def test_bars_of_depth_point_down_in_mm(axes: Axes) -> None:
-    columns = EstimateColumns.of([Estimate.around(1.0, 0.1), Estimate.around(2.0, 0.2)])
-    depth_bars(axes, [0.0, 0.001, 0.002], columns, 10.0)
-    assert axes.get_ylim() == (2.0, 0.0)
-    assert [bar.get_width() for bar in axes.patches] == [10.0, 20.0]
-    (reach,) = axes.collections
-    ends = [segment[:, 0].tolist() for segment in reach.get_segments()]
-    assert ends == [pytest.approx([9.0, 11.0]), pytest.approx([18.0, 22.0])]
-
-
 def test_an_interval_that_excludes_its_value_reaches_up_to_it(axes: Axes) -> None:
     depth_bars(axes, [0.0, 0.001], EstimateColumns.of([Estimate(1.0, 1.5, 2.0)]))
     (reach,) = axes.collections
@@ -84,11 +61,3 @@ def test_ahead_and_behind_differ_in_colour() -> None:
     behind, ahead, also_ahead, also_behind = (bar.get_facecolor() for bar in axes.patches)
     assert ahead == also_ahead and behind == also_behind and ahead != behind
     assert axes.get_rmin() == 0.0  # an interval beyond zero ends there
-
-
-def test_percent_ticks_are_plain_numbers(axes: Axes) -> None:
-    axes.set(yscale="log", ylim=(1e-3, 1.0))
-    log_ticks(axes.yaxis, 100.0)
-    axes.figure.draw_without_rendering()
-    labels = [tick.get_text() for tick in axes.get_yticklabels()]
-    assert {"0.1", "1", "10", "100"} <= set(labels)

@@ -1,13 +1,9 @@
-"""What all figures have in common: minus signs and pictures of few colours."""
+"""What all figures have in common: minus signs."""
 
-from io import BytesIO
-
-import numpy as np
 import pytest
-from PIL import Image
 
 from dragchain.figures.panels import head, new_panels
-from dragchain.figures.style import few_colours, png
+from dragchain.figures.style import png
 
 
 @pytest.mark.parametrize(
@@ -27,15 +23,3 @@ def test_a_hyphen_before_a_number_becomes_a_minus_sign(written: str, shown: str)
     texts = [figure.get_suptitle(), axes.get_title("left"), axes.get_title()]
     assert shown in texts and (written == shown or written not in texts)
     assert legend.get_texts()[0].get_text() == shown
-
-
-def test_a_picture_of_few_colours_is_smaller() -> None:
-    pixels = np.random.default_rng(1).integers(0, 256, (200, 200, 3), dtype=np.uint8)
-    whole, few = Image.fromarray(pixels), few_colours(Image.fromarray(pixels))
-    sizes = []
-    for picture in (whole, few):
-        content = BytesIO()
-        picture.save(content, format="png")
-        sizes.append(len(content.getvalue()))
-    assert len(whole.getcolors(100_000) or ()) > 256 >= len(few.getcolors(100_000) or ())
-    assert sizes[1] < sizes[0]

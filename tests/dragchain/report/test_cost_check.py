@@ -6,13 +6,11 @@ import re
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
 import pytest
 from made_run import run_json
 from report_files import (
     ASKED,
     PICTURES,
-    REACHED,
     case_json,
     make_run,
     page_of,
@@ -162,28 +160,3 @@ def test_a_missing_or_foreign_advice_is_refused(tmp_path: Path) -> None:
         read_advice(tmp_path / "advice.json")
     with pytest.raises(DocumentError, match=r"schema: .*another version"):
         read_advice(advice_file(tmp_path, schema=1))
-
-
-def test_an_answer_from_windows_stands_beside_the_value_of_the_run(tmp_path: Path) -> None:
-    asked = {**ASKED, "quantities": ["workpiece_contacts"]}
-    folder = make_run(
-        tmp_path / "results", case_json("process", "workpiece-1", asked=asked),
-        process_findings(), PICTURES,
-    )  # fmt: skip
-    contacts = ExtrapolatedQuantity(
-        name="workpiece_contacts", label="contacts on the workpiece", unit="",
-        measured=Estimate(32.1, math.nan, math.nan), value=Estimate(25.6, 24.0, 27.2),
-    )  # fmt: skip
-    Extrapolated(quantities=(contacts,), tolerance=REACHED).write(folder / EXTRAPOLATED)
-    write_study_report(tmp_path, [folder])
-    words = " ".join(page_of(tmp_path).words.split())
-    assert "Values at the physical Young's modulus" in words
-    assert "contacts on the workpiece at a time 25.6 (24.0 to 27.2) 32.1 from 3 windows" in words
-    assert "through 25.6 contacts at a time" in words
-    assert "as simulated: 32.1" in words
-    assert "25.6 (24.0 to 27.2) 6.3 % no" in spaced(tmp_path)  # in the table of tolerances
-    row = pd.read_csv(tmp_path / "summary.csv").iloc[0]
-    assert row["extrapolated_workpiece_contacts"] == pytest.approx(25.6)
-    assert row["extrapolated_workpiece_contacts_ci95_high"] == pytest.approx(27.2)
-    assert row["workpiece_contacts"] == 32.1
-    assert (row["asked_quantities"], row["windows"]) == ("workpiece_contacts", 3)

@@ -43,7 +43,7 @@ def test_a_single_panel_has_no_letter() -> None:
     assert not axes.texts
 
 
-def test_pictures_in_a_figure_have_few_colours_and_their_own_pixels() -> None:
+def test_pictures_in_a_figure_keep_their_own_pixels() -> None:
     pixels = np.random.default_rng(1).integers(0, 256, (120, 100, 3), dtype=np.uint8)
     figure, (axes,) = new_panels(3.0)
     axes.imshow(pixels)
@@ -51,6 +51,3 @@ def test_pictures_in_a_figure_have_few_colours_and_their_own_pixels() -> None:
     (embedded,) = re.findall(rb'image/png;base64,([^"]+)', _encoded(figure, "svg"))
     with Image.open(BytesIO(base64.b64decode(embedded))) as picture:
         assert picture.size == (100, 120)
-        assert len(picture.getcolors(100_000) or ()) <= 256
-    with Image.open(BytesIO(_encoded(figure, "png"))) as picture:
-        assert picture.mode == "P"

@@ -18,15 +18,10 @@ from dragchain.report.page import (
     MINUS,
     data_uri,
     file_uri,
-    fixed,
     fraction,
-    heading_key,
-    interval,
     measured,
     number,
     page_environment,
-    percent,
-    sections,
     with_interval,
 )
 from dragchain.statistics.estimate import Estimate
@@ -120,23 +115,6 @@ def test_every_page_packings_the_frame(name: str) -> None:
     assert source.startswith('{% extends "report/page.html.j2" %}')
 
 
-FRAMES = ("report/page.html.j2", "network_page/network.html.j2")
-"""The frame of all pages, and the page that is an application of its own."""
-
-
-@pytest.mark.parametrize("name", [name for name in TEMPLATES if name not in FRAMES])
-def test_one_style_sheet_is_enough(name: str) -> None:
-    source = TEMPLATES[name].read_text(encoding="utf-8")
-    for word in ("<style", "<script", "<link", "<html", "http://", "https://"):
-        assert word not in source
-
-
-def test_names_of_sections() -> None:
-    assert heading_key("Do chains explain the peaks?") == "do-chains-explain-the-peaks"
-    body = '<h2 id="a">Load &amp; wear</h2><h2>no name</h2>\n<h2 id="b">B</h2>'
-    assert sections(body) == [("a", "Load &amp; wear"), ("b", "B")]
-
-
 def test_a_file_that_is_not_there_is_no_picture(tmp_path: Path) -> None:
     assert file_uri(tmp_path / "film.gif") is None
     (tmp_path / "film.gif").write_bytes(b"film")
@@ -202,18 +180,5 @@ def test_a_value_has_the_decimals_of_its_interval(
 
 
 def test_percent_carries_its_sign() -> None:
-    assert percent(1.26) == "+1.3 %"
-    assert percent(-23.17) == "\N{MINUS SIGN}23.2 %"
-    assert percent(None) == "\N{EN DASH}"
-    assert fraction(-0.034) == "\N{MINUS SIGN}3.4 %"
-
-
-def test_fixed_decimals_may_carry_their_sign() -> None:
-    assert fixed(-0.25, 1) == "\N{MINUS SIGN}0.2"
-    assert fixed(0.0146, 4) == "0.0146" and fixed(0.5, 2, sign=True) == "+0.50"
-    assert fixed(None, 2) == "\N{EN DASH}"
-
-
-def test_an_estimate_shows_its_interval() -> None:
-    estimate = {"value": 2.0, "ci95_low": 1.5, "ci95_high": None}
-    assert interval(estimate, 2) == "2.0 (1.5 to \N{EN DASH})"
+    assert fraction(0.0126) == "+1.3 %" and fraction(-0.034) == "\N{MINUS SIGN}3.4 %"
+    assert fraction(None) == "\N{EN DASH}"

@@ -19,13 +19,11 @@ from figure_files import (
     write_process_run,
 )
 from made_run import line, output, save, with_motion, write_documents
-from matplotlib.figure import Figure
 from PIL import Image
 
-from dragchain.errors import SeriesError, TableError
+from dragchain.errors import TableError
 from dragchain.figures import network_picture as scene
 from dragchain.figures.rendering import RenderError, check_rendering
-from dragchain.figures.style import COLOURS, drawing
 from dragchain.network.frame import NetworkFrame
 from dragchain.report.findings import (
     FIGURES,
@@ -36,10 +34,7 @@ from dragchain.report.findings import (
 )
 from dragchain.report.run_data import RunData, dominant_bottlenecks, process_findings
 from dragchain.report.run_figures import (
-    DRAW_PROCESS,
-    drag_of_cases,
     energy_ratio,
-    forces,
     write_figures,
 )
 from dragchain.run.reference import reference_drags
@@ -135,14 +130,6 @@ def test_a_run_without_chains_names_the_missing_table(process: Path, tmp_path: P
         write_figures(tmp_path)
 
 
-def test_a_short_drag_has_no_statistics(process: Path, tmp_path: Path) -> None:
-    (tmp_path / "case.json").write_bytes((process / "case.json").read_bytes())
-    table = workpiece_force_table()
-    save(table.assign(in_statistics=table["step"] > LAST - 10), tmp_path, "workpiece_force")
-    with pytest.raises(SeriesError):
-        write_figures(tmp_path)
-
-
 # --- the network's pictures ------------------------------------------------------------------
 
 
@@ -196,16 +183,6 @@ def test_times_of_a_faster_run_are_those_of_the_process(process: Path) -> None:
     trace, own = RunData(process, fast).drag, RunData(process, case).drag
     np.testing.assert_allclose(trace.process_time_s, 5 * own.process_time_s)
     assert scene.load_scene(process, fast).process_time_s == pytest.approx(5 * 0.4)
-
-
-def test_the_workpiece_moves_by_its_reference_point(process: Path) -> None:
-    shown = scene.load_scene(process, load_case(process))
-    assert shown.frame.step == LAST
-    np.testing.assert_allclose(shown.rotation.matrices[0], np.eye(3), atol=1e-15)
-    assert shown.workpiece_m == pytest.approx([0.01, 0.0, 0.01])
-    assert shown.process_time_s == pytest.approx(0.4)
-    assert shown.dominant is not None
-    assert shown.dominant.particles == (0, 1)
 
 
 def pixel(image: Any, extent: Any, across_mm: float, up_mm: float) -> Any:
@@ -270,22 +247,6 @@ def test_a_wide_bowl_is_cut_to_the_surroundings_of_the_workpiece(process: Path) 
     assert f"{scene.WINDOW_DIAMETERS:g} particle diameters" in scene.cut_words(case, "xy")
 
 
-def test_a_picture_of_a_wide_bowl_has_no_more_pixels_than_vtk_takes(process: Path) -> None:
-    case = widened(load_case(process), 2.0)
-    frame = network_frame([2.0, 0.5])
-    shown = scene.NetworkScene(frame, np.array([0.015, 0.012, 0.01]), UPRIGHT, None, 0.2)
-    image, extent = scene.render_view(process, case, shown, "xy", 40.0)
-    assert max(image.shape[:2]) <= 1401
-    assert is_strongest(pixel(image, extent, 0.0, 0.0))
-
-
-def test_a_missing_workpiece_mesh_is_named(process: Path, tmp_path: Path) -> None:
-    case = load_case(process)
-    shown = scene.NetworkScene(network_frame([1.0, 1.0]), np.zeros(3), UPRIGHT, None, 0.2)
-    with pytest.raises(TableError, match=r"workpiece\.stl"):
-        scene.render_view(tmp_path, case, shown, "xy")
-
-
 def test_a_machine_that_cannot_render_is_told_what_to_install(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -303,16 +264,9 @@ def filling(tmp_path: Path) -> Path:
     settle = [{"name": "settle", "start_step": 0, "end_step": LAST}]
     case = case_json("filling", phases=settle, settled={"energy_ratio": 1e-5, "highest_m": 0.1})
     write_documents(tmp_path, case)
-    bed = {
-        "schema": 2,
-        "bed_height_m": 0.07,
-        "top_m": 0.075,
-        "solid_fraction": 0.59,
-        "n_particles": 3,
-        "radius_mean_m": 0.003,
-        "radius_std_m": 0.0,
-        "kinetic_energy_ratio": 1e-7,
-    }
+    lengths = {"bed_height_m": 0.07, "top_m": 0.075, "radius_mean_m": R, "radius_std_m": 0.0}
+    numbers = {"solid_fraction": 0.59, "n_particles": 3, "kinetic_energy_ratio": 1e-7}
+    bed = {"schema": 2, **lengths, **numbers}
     (tmp_path / "tables" / "packing.json").write_text(json.dumps(bed))
     return tmp_path
 
@@ -361,44 +315,3 @@ def test_a_drop_is_drawn_with_its_restitution(tmp_path: Path) -> None:
     ratio = DropFindings.read(tmp_path / FILE).restitution
     assert ratio.mean == pytest.approx(0.72)
     assert ratio.input == 0.7
-
-
-HALF_PANEL_PX, LEAST_PX = 498, 9.0
-"""Of a figure that shares its row in a report at 1366 pixels: its width, and its axis texts."""
-
-
-@pytest.fixture(scope="module")
-def figures(process: Path, drawn: list[Path]) -> dict[str, Figure]:
-    run, found = RunData(process, load_case(process)), ProcessFindings.read(process / FILE)
-    with drawing():
-        return {draw.__name__: draw(run, found) for draw in DRAW_PROCESS}
-
-
-def test_axis_texts_of_figures_in_half_a_row_can_be_read(figures: dict[str, Figure]) -> None:
-    for name in figures.keys() - {"forces"}:
-        shown = HALF_PANEL_PX / figures[name].get_figwidth()
-        axes = figures[name].axes[0]
-        labels = [axes.xaxis.label, axes.yaxis.label, *axes.get_xticklabels()]
-        assert min(label.get_fontsize() for label in labels) / 72.0 * shown >= LEAST_PX, name
-
-
-def test_the_polar_plot_names_its_axis(figures: dict[str, Figure]) -> None:
-    (axes,) = figures["force_around_workpiece"].axes
-    assert axes.get_xlabel() == "mean normal force (N per 15°)"
-
-
-def test_the_experiment_lies_over_the_mean_in_its_own_colour(process: Path) -> None:
-    run, found = RunData(process, load_case(process)), ProcessFindings.read(process / FILE)
-    ours = found.forces["drag_n"].mean
-    published = reference_drags(reference(drag_mean_n=ours, drag_std_n=0.66))
-    (axes,) = forces(run, changed(found, comparison=published)).axes
-    at_mean = [line for line in axes.get_lines() if set(line.get_ydata()) == {ours}]
-    assert [line.get_color() for line in at_mean] == ["black", COLOURS["experiment"]]
-    assert at_mean[1].get_zorder() >= at_mean[0].get_zorder() and at_mean[1].is_dashed()
-
-
-def test_overview_has_a_row_a_case() -> None:
-    force = Estimate(-2.0, -2.2, -1.8)
-    figure = drag_of_cases(["a", "b"], [force, force], [("experiment", -2.59)])
-    axes = figure.axes[0]
-    assert [label.get_text() for label in axes.get_yticklabels()] == ["a", "b"]

@@ -38,7 +38,7 @@ def test_cells_keep_their_values_and_types() -> None:
     )
     found = list(read(workbook({"Sheet": table}))["Sheet"].iter_rows(min_row=2, values_only=True))
     assert found == [
-        (1.5, 0, True, "a"), (None, 1, False, ""), (None, 2, True, None), (None, 3, False, "1")
+        (1.5, 0, True, "a"), (None, 1, False, None), (None, 2, True, None), (None, 3, False, "1")
     ]  # fmt: skip
     assert isinstance(found[0][2], bool)
 
@@ -78,7 +78,7 @@ def test_the_sheets_say_what_there_is(tmp_path: Path) -> None:
     rows = [list(sheet.iter_rows(values_only=True)) for sheet in book][1:]
     assert rows[0] == [("Case", "Drag mean (N)"), ("=a", -2.5), ("b", None)]
     assert [row[:3] for row in rows[1][1:]] == [
-        ("Case", "case", ""), ("Drag mean (N)", "drag_mean_n", "N")
+        ("Case", "case", None), ("Drag mean (N)", "drag_mean_n", "N")
     ]  # fmt: skip
     assert rows[2] == [
         ("run", "field", "value", "reason"), ("run-1", "bowl.radius_m", "0.04", "+plausible")

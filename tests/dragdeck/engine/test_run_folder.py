@@ -32,12 +32,17 @@ from dragdeck.scenes.filling import FILLING, filling_scene
 pytestmark = pytest.mark.engine
 
 
-@pytest.fixture
-def filling(case: Case, project: Project) -> Path:
-    """A rendered fill, not yet run."""
+def rendered(made: Made, project: Project, **fidelity: Any) -> Path:
+    """A rendered fill of 150 particles, not yet run."""
+    case = made({"media.count": 150, **{f"fidelities.quick.{k}": v for k, v in fidelity.items()}})
     folder = project.run_folder(case, FILLING)
     write_run(filling_scene(case), folder, environment(project.templates))
     return folder
+
+
+@pytest.fixture
+def filling(made: Made, project: Project) -> Path:
+    return rendered(made, project)
 
 
 def state(folder: Path) -> RunRecord:
@@ -103,12 +108,7 @@ def test_a_changed_deck_moves_the_old_run_aside(filling: Path) -> None:
 
 def slow_filling(made: Made, project: Project, ranks: int = 1) -> Path:
     """A rendered fill of a few seconds, not yet run."""
-    quick = {"ranks": ranks, "filling_timestep_fraction": 0.1}
-    changes = {f"fidelities.quick.{name}": value for name, value in quick.items()}
-    case = made({"media.count": 150, **changes})
-    folder = project.run_folder(case, FILLING)
-    write_run(filling_scene(case), folder, environment(project.templates))
-    return folder
+    return rendered(made, project, ranks=ranks, filling_timestep_fraction=0.1)
 
 
 def start(folder: Path) -> subprocess.Popen[bytes]:
@@ -262,7 +262,7 @@ def test_a_lost_particle_fails(filling: Path) -> None:
     lines[first] = "1 0 0 50.0 0 0 0"  # straight up and out
     rewrite(data, "\n".join(lines) + "\n")
     # whoever sees it first: the engine, or the watcher of the run's limits
-    with pytest.raises(RejectedRunError, match=r"Lost atoms|299 particles at step"):
+    with pytest.raises(RejectedRunError, match=r"Lost atoms|149 particles at step"):
         run(filling, silent)
 
 

@@ -5,8 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from dragdeck.physics.contact_mechanics import ContactConstants, Floats, stability_number
-from evidence.stability.measures import hertz_stiffness, largest_frequency
+from dragdeck.physics.contact_mechanics import ContactConstants, stability_number
 
 RADIUS, DENSITY, BOWL, OVERLAP = 3e-3, 2500.0, 0.05, 1e-5
 MASS = 4 / 3 * math.pi * RADIUS**3 * DENSITY
@@ -49,33 +48,6 @@ def test_two_particles() -> None:
 def test_nothing_that_touches_limits_no_step() -> None:
     assert number([[0.0, 0.0, 0.1]], ELASTIC) == 0.0
     assert number([[0.0, 0.0, 0.1], [0.0, 0.0, 0.2]], ELASTIC) == 0.0
-
-
-def test_without_damping_it_is_the_largest_frequency_of_a_bed() -> None:
-    """As dragchain computes it, which has its own test in closed form."""
-    centre, radius = some_packing()
-    first, second = np.triu_indices(len(radius), k=1)
-    away = centre[second] - centre[first]
-    distance = np.linalg.norm(away, axis=1)
-    overlap = radius[first] + radius[second] - distance
-    hit = overlap > 0
-    a, b = first[hit], second[hit]
-    assert len(a) > 100
-    effective = radius[a] * radius[b] / (radius[a] + radius[b])
-    moduli = (np.full(len(a), value) for value in (ELASTIC.modulus_pa, ELASTIC.shear_pa))
-    stiff = hertz_stiffness(overlap[hit], effective, *moduli)
-    mass = 4 / 3 * np.pi * radius**3 * DENSITY
-    omega = largest_frequency(mass, a, b, away[hit] / distance[hit, None], stiff)
-    found = stability_number(centre, radius, DENSITY, 1.0, [ELASTIC] * 2, STEP)
-    assert found == pytest.approx(omega * STEP / 2, rel=1e-3)
-
-
-def some_packing() -> tuple[Floats, Floats]:
-    """Particles of unlike size that overlap, away from floor and side."""
-    random = np.random.default_rng(3)
-    places = np.stack(np.meshgrid(*3 * [np.arange(5.0)]), axis=-1).reshape(-1, 3)
-    centre = 2 * RADIUS * (0.97 * places + 0.02 * random.normal(size=places.shape)) + 0.1
-    return centre, RADIUS * (1 + 0.03 * random.normal(size=len(centre)))
 
 
 def test_it_is_one_where_a_damped_particle_begins_to_gain_energy() -> None:

@@ -12,8 +12,6 @@ from changed import changed
 from scipy import stats
 
 from dragchain.errors import SeriesError
-from dragchain.report.page import MINUS, page_environment
-from dragchain.scaling.fit import read_scalings
 from dragchain.statistics.estimate import Estimate
 from dragchain.tradeoff.measures import Measures, RunCost
 from dragdeck.errors import DocumentError
@@ -146,19 +144,6 @@ def test_packings_that_differ_are_seen(tiny_run: Path, tmp_path: Path) -> None:
     assert force.force_of_packings(packings).alike.p_value < 1e-6
 
 
-def test_half_of_a_sine_of_variance_lies_at_its_wave(tiny_run: Path, tmp_path: Path) -> None:
-    count = 4000
-    path = np.linspace(0.0, 20.0, count, endpoint=False)  # particle diameters
-    packings = [
-        made_run(tiny_run, tmp_path / f"sine-{seed}", seed, np.sin(2 * np.pi * path / 2.0))
-        for seed in (1, 2)
-    ]
-    found = force.spectrum(packings)
-    assert found.half_wave.value == pytest.approx(2.0, rel=0.1)
-    peak = int(np.argmax(found.density.mean))
-    assert found.waves_per_diameter[peak] == pytest.approx(0.5)
-
-
 def test_the_comparison_has_the_sign_of_more_drag(runs: RunsByBed) -> None:
     drag = force.Together(mean=Estimate(-2.75, -3.0, -2.5), std=Estimate(0.6, 0.5, 0.7))
     measured, published = force.compare_drag(drag, runs.packings[0].case)
@@ -281,15 +266,3 @@ def test_the_reach_lies_where_half_of_the_excess_is_left() -> None:
 def test_a_reference_that_is_not_measured_is_named(tmp_path: Path) -> None:
     with pytest.raises(DocumentError, match=r"measures.json: there is no such file"):
         read_validation_runs([tmp_path])
-
-
-def test_the_section_of_the_validation_page_shows_every_scaling() -> None:
-    scalings = read_scalings()
-    template = page_environment(package="evidence").get_template("validation/scaling.html.j2")
-    page = template.render(found=scalings, pictures={"scaling": "data:image/png;base64,scaling"})
-    assert 'src="data:image/png;base64,scaling"' in page
-    for found in scalings:
-        exponent = found.judged.exponent
-        ends = (exponent.value, exponent.ci95_low, exponent.ci95_high)
-        value, low, high = (f"{n:.2f}".replace("-", MINUS) for n in ends)
-        assert f"{found.verdict}: exponent {value} ({low} to {high})" in page

@@ -116,19 +116,6 @@ def test_every_published_point_is_a_number_of_a_test() -> None:
     assert set(table["test"]) <= {*QUANTITIES, "elastic_pair", "elastic_plane"}
 
 
-def test_the_page_quotes_the_published_spins_of_two_tests() -> None:
-    """Both at a scaled patch velocity of 4: tan(angle) = 4 x 0.092 in test 4, at 3.9 m/s."""
-    own = np.interp(
-        4.0, *published_curve("oblique_tangential", "steel_fem on rigid", "scaled_spin")
-    )
-    angle = math.atan(4 * 0.092)
-    curve = published_curve("oblique_angle", "aluminium_oxide on rigid", "spin_rad_s")
-    scale = 0.0025 / (0.092 * 3.9 * math.cos(angle))
-    other = scale * np.interp(math.degrees(angle), *curve)
-    text = Path(checks.__file__).with_name("suite.yaml").read_text()
-    assert f"{own:.2f} here and" in text and f"{other:.2f} there" in " ".join(text.split())
-
-
 def test_the_summary_keeps_the_worst_point_and_a_failure_is_named(tmp_path: Path) -> None:
     rows = [(0.0, 2.0, 2.0), (7.0, 2.0, 2.2)]
     summary = worst_rows(

@@ -7,15 +7,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from dragdeck.physics.contact_mechanics import hertz_overlap
 from evidence.verification import law
-from evidence.verification.law import (
-    ContactPair,
-    HertzLaw,
-    Particle,
-    RelativeMotion,
-    integrated_impact,
-)
+from evidence.verification.law import ContactPair, Particle, RelativeMotion
 
 PARTICLE = Particle(1.74e-4, 0.0025)
 PLANE = ContactPair(PARTICLE, None, 6e10, 1.3e10, 0.7, 0.3, True)
@@ -32,17 +25,6 @@ def test_the_largest_overlap_stores_the_whole_energy() -> None:
     deepest = law.largest_overlap(PLANE, 0.5)
     work, _ = quad(lambda overlap: float(law.hertz_force(PLANE, overlap)), 0, deepest)
     assert work == pytest.approx(0.5 * PLANE.mass_kg * 0.5**2, rel=1e-9)
-
-
-def test_overlap_and_force_are_each_others_inverse() -> None:
-    force = float(law.hertz_force(PLANE, 3e-6))
-    assert hertz_overlap(force, PLANE.radius_m, PLANE.modulus_pa) == pytest.approx(3e-6)
-
-
-def test_effective_mass_and_radius_of_equal_particles_are_half() -> None:
-    pair = replace(PLANE, partner=PARTICLE)
-    assert pair.mass_kg == pytest.approx(PARTICLE.mass_kg / 2)
-    assert pair.radius_m == pytest.approx(PARTICLE.radius_m / 2)
 
 
 def linear_rebound(restitution: float) -> float:
@@ -85,96 +67,60 @@ def test_a_rigid_slide_ends_where_the_surfaces_stop() -> None:
     assert law.sliding_impact(PLANE, RelativeMotion(0.5, 0.999 * limit)) is None
 
 
-@pytest.mark.parametrize("contact", [ELASTIC, replace(PAIR, restitution=1.0)])
-def test_an_elastic_impact_is_hertzian(contact: ContactPair) -> None:
-    found = integrated_impact(contact, RelativeMotion(0.5))
-    deepest = law.largest_overlap(contact, 0.5)
-    assert found.overlap_m == pytest.approx(deepest, rel=1e-3)  # read at steps, not at the peak
-    assert found.duration_s == pytest.approx(law.elastic_time(contact, 0.5), rel=1e-4)
-    assert found.after.normal_m_s == pytest.approx(0.5, rel=1e-6)
+def integrated(contact: ContactPair, *before: RelativeMotion) -> list[RelativeMotion]:
+    return law.integrated_impacts([contact] * len(before), before)
 
 
-@pytest.mark.parametrize("restitution", [0.06, 0.3, 0.68, 0.98])
-@pytest.mark.parametrize("speed", [0.01, 4.0])
-@pytest.mark.parametrize("limit", [True, False])
-def test_the_integrated_rebound_is_the_exact_one(
-    restitution: float, speed: float, limit: bool
-) -> None:
-    contact = replace(PLANE, restitution=restitution, limit_force=limit)
-    found = integrated_impact(contact, RelativeMotion(speed)).after.normal_m_s / speed
-    assert found == pytest.approx(contact.rebound, rel=1e-5)
+@pytest.mark.parametrize("partner", [None, PAIR.partner])
+def test_the_integrated_rebound_is_the_exact_one(partner: Particle | None) -> None:
+    contacts = [
+        replace(PLANE, partner=partner, restitution=restitution, limit_force=limit)
+        for restitution in (0.06, 0.3, 0.68, 1.0)
+        for limit in (True, False)
+    ]
+    found = law.integrated_impacts(contacts, [RelativeMotion(0.5)] * len(contacts))
+    for contact, after in zip(contacts, found, strict=True):
+        assert after.normal_m_s / 0.5 == pytest.approx(contact.rebound, abs=2e-4)
 
 
-def test_the_rate_of_the_spring_limit_is_a_derivative() -> None:
-    model = HertzLaw(replace(PLANE, limit_force=False))
-    state = np.array([2e-6, 0.3, 0.0, 0.0, 0.0, 0.0])
-    rates = np.array(model.rates(1, 0.0, state))
-    ahead, behind = (model.spring_limit(state + way * 1e-9 * rates) for way in (1, -1))
-    assert model.spring_limit_rate(state) == pytest.approx((ahead - behind) / 2e-9, rel=1e-5)
-
-
-def test_an_elastic_slide_has_coulombs_impulse() -> None:
+def test_an_elastic_slide_has_coulombs_impulse_and_a_damped_one_more() -> None:
     before = RelativeMotion(0.5, 4.0)
-    after = integrated_impact(ELASTIC, before).after
-    rigid = law.sliding_impact(ELASTIC, before)
-    assert rigid is not None
-    assert after.tangential_m_s == pytest.approx(rigid.tangential_m_s, rel=1e-6)
-    arm = law.largest_overlap(ELASTIC, 0.5) / PARTICLE.radius_m
-    assert abs(after.spin_rad_s) == pytest.approx(abs(rigid.spin_rad_s), rel=arm)
-    assert abs(after.spin_rad_s) < abs(rigid.spin_rad_s)
+    for contact in (ELASTIC, PLANE):
+        (after,), rigid = integrated(contact, before), law.sliding_impact(contact, before)
+        assert rigid is not None
+        if contact is PLANE:
+            assert after.tangential_m_s < rigid.tangential_m_s - 1e-3
+            continue
+        assert after.tangential_m_s == pytest.approx(rigid.tangential_m_s, rel=1e-4)
+        arm = law.largest_overlap(ELASTIC, 0.5) / PARTICLE.radius_m
+        assert abs(after.spin_rad_s) == pytest.approx(abs(rigid.spin_rad_s), rel=arm)
+        assert abs(after.spin_rad_s) < abs(rigid.spin_rad_s)
 
 
-def test_a_damped_slide_exceeds_coulombs_impulse() -> None:
-    before = RelativeMotion(0.5, 4.0)
-    after = integrated_impact(PLANE, before).after
-    rigid = law.sliding_impact(PLANE, before)
-    assert rigid is not None
-    assert after.tangential_m_s < rigid.tangential_m_s - 1e-3
+def test_impacts_end_as_the_law_integrated_with_an_adaptive_step() -> None:
+    """Values of a solution whose steps end at each change of sticking and sliding (1912e1d)."""
+    contacts = [replace(PLANE, limit_force=limit) for limit in (True, False)]
+    before = [RelativeMotion(0.5, speed) for speed in (0.1, 0.6, 3.0)]
+    known = (
+        (
+            (0.359101, 0.081076, -18.920319),
+            (0.359101, 0.396251, -203.665061),
+            (0.3591, 2.736749, -263.147308),
+        ),
+        ((0.35, 0.078925, -21.071105), (0.35, 0.401915, -198.001456), (0.35, 2.73303, -266.866056)),
+    )
+    for contact, expected in zip(contacts, known, strict=True):
+        for after, (normal, along, spin) in zip(
+            integrated(contact, *before), expected, strict=True
+        ):
+            assert after.normal_m_s == pytest.approx(normal, abs=1e-4)
+            assert after.tangential_m_s == pytest.approx(along, abs=5e-4)
+            assert after.spin_rad_s == pytest.approx(spin, abs=0.15)
 
 
-@pytest.mark.parametrize("speed", [0.05, 0.3, 1.0, 4.0])
-@pytest.mark.parametrize("limit", [True, False])
-def test_a_mirrored_impact_is_the_mirror_image(speed: float, limit: bool) -> None:
-    contact = replace(PLANE, limit_force=limit)
-    one = integrated_impact(contact, RelativeMotion(0.5, speed)).after
-    other = integrated_impact(contact, RelativeMotion(0.5, -speed)).after
-    assert other.tangential_m_s == pytest.approx(-one.tangential_m_s, rel=1e-6)
-    assert other.spin_rad_s == pytest.approx(-one.spin_rad_s, rel=1e-6)
-
-
-def test_a_huge_partner_is_a_plane() -> None:
+def test_a_huge_partner_is_a_plane_and_a_mirrored_impact_the_mirror_image() -> None:
     huge = replace(PLANE, partner=Particle(1e6, 1e6))
-    before = RelativeMotion(0.5, 0.4)
-    on_plane, on_particle = (integrated_impact(c, before).after for c in (PLANE, huge))
-    assert on_particle.tangential_m_s == pytest.approx(on_plane.tangential_m_s, rel=1e-5)
-    assert on_particle.spin_rad_s == pytest.approx(on_plane.spin_rad_s, rel=1e-5)
-
-
-def explicit_impact(contact: ContactPair, before: RelativeMotion, steps: int) -> RelativeMotion:
-    """The law in the engine's own steps: small, explicit, with the spring cut back."""
-    model = HertzLaw(contact)
-    state = np.array([0.0, before.normal_m_s, 0.0, before.tangential_m_s, before.spin_rad_s, 0.0])
-    dt = law.elastic_time(contact, before.normal_m_s) / steps
-    while state[0] >= 0.0 and state[1] > -2 * before.normal_m_s:
-        state[0] += dt * state[1]
-        if state[0] <= 0.0:
-            break
-        patch = model.patch(state)
-        state[2] += dt * patch
-        limit = model.spring_limit(state)
-        way = int(math.copysign(1, state[2])) if abs(state[2]) > limit else 0
-        state[2] = way * limit if way else state[2]
-        rates = np.array(model.rates(way, 0.0, state))
-        state[[1, 3, 4]] += dt * rates[[1, 3, 4]]
-    return RelativeMotion(-float(state[1]), float(state[3]), float(state[4]))
-
-
-@pytest.mark.parametrize("tangential", [0.1, 0.6, 3.0])
-@pytest.mark.parametrize("limit", [True, False])
-def test_events_find_the_same_motion_as_small_steps(tangential: float, limit: bool) -> None:
-    contact, before = replace(PLANE, limit_force=limit), RelativeMotion(0.5, tangential)
-    exact = integrated_impact(contact, before).after
-    stepped = explicit_impact(contact, before, 20_000)
-    assert stepped.normal_m_s == pytest.approx(exact.normal_m_s, rel=1e-3)
-    assert stepped.tangential_m_s == pytest.approx(exact.tangential_m_s, rel=2e-3)
-    assert stepped.spin_rad_s == pytest.approx(exact.spin_rad_s, rel=1e-2)
+    before = RelativeMotion(0.5, 0.4), RelativeMotion(0.5, -0.4)
+    (one, other), (on_huge, _) = integrated(PLANE, *before), integrated(huge, *before)
+    assert on_huge.tangential_m_s == pytest.approx(one.tangential_m_s, rel=1e-5)
+    assert (other.tangential_m_s, other.spin_rad_s) == (-one.tangential_m_s, -one.spin_rad_s)

@@ -2,7 +2,6 @@
 
 import contextlib
 import math
-import multiprocessing
 import os
 import re
 import resource
@@ -12,11 +11,10 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 
 import psutil
-from paths import ROOT
+from preloaded import PACKAGES, USER, environment
 
 LARGEST_FILE = 64 * 2**20
 """No command that is attacked may write a file beyond this, bytes."""
@@ -30,7 +28,6 @@ PATIENCE_S = 240.0
 HUNG_S = 3600.0
 """After this time a command that uses no processor time has no answer either, s."""
 
-PACKAGES = os.pathsep.join([str(ROOT / "workflow"), str(ROOT / "analysis"), str(ROOT)])
 _POLL_S = 0.02
 
 
@@ -187,13 +184,7 @@ def gone_within(folder: Path, seconds: float) -> bool:
     return True
 
 
-# --- commands as functions, in a process that has imported them -------------------------
-
-_PRELOADED = (
-    *("attack.calls", "dragdeck.commands", "dragdeck.engine.run_folder", "dragchain.tables.write"),
-    *("dragchain.network.write", "dragchain.loading.write", "dragchain.report.run_figures"),
-    *("dragchain.report.study_report", "pyvista", "meshio", "trimesh", "hypothesis"),
-)
+# --- commands in a process that has imported them -----------------------------------------
 
 
 def main_of(
@@ -203,58 +194,27 @@ def main_of(
     patience_s: float = 60.0,
     user: int | None = None,
 ) -> Said:
-    """Call ``dragdeck`` or ``dragchain`` in a process that is forked for it, as another user.
-
-    An error that leaves ``main`` is a traceback, as it is on a terminal.
-    """
-    words = [str(word) for word in arguments]
-    return run_function(_main, (name, words, user), folder, patience_s)
-
-
-def run_function(
-    function: Callable[..., None], arguments: tuple[object, ...], folder: Path, patience_s: float
-) -> Said:
-    """Call a function in a process that is forked for it, its output kept.
+    """Call a program in a process that is forked for it, as another user.
 
     The patience is processor time: the machine may be shared.
     """
-    server = multiprocessing.get_context("forkserver")
-    server.set_forkserver_preload(list(_PRELOADED))
-    log = folder / f"said.{time.monotonic_ns()}.log"
-    process = server.Process(target=_inside, args=(log, folder, patience_s, function, arguments))
-    process.start()
-    process.join(HUNG_S)
-    status = None if process.exitcode == -signal.SIGXCPU else process.exitcode
-    if process.is_alive():
-        process.kill()
-        process.join()
-    text = log.read_text(encoding="utf-8", errors="replace") if log.is_file() else ""
-    log.unlink(missing_ok=True)
-    return Said(status, text)
 
+    def limit() -> None:
+        limit_files()
+        most = math.ceil(patience_s)
+        resource.setrlimit(resource.RLIMIT_CPU, (most, most + 5))
+        resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY))
 
-def _inside(
-    log: Path,
-    folder: Path,
-    patience_s: float,
-    function: Callable[..., None],
-    arguments: tuple[object, ...],
-) -> None:
-    limit_files()
-    most = math.ceil(patience_s)
-    resource.setrlimit(resource.RLIMIT_CPU, (most, most + 5))
-    resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY))
-    os.chdir(folder)
-    sink = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
-    for place in (1, 2):
-        os.dup2(sink, place)
-    sys.stdout, sys.stderr = os.fdopen(1, "w"), os.fdopen(2, "w")
-    function(*arguments)
-
-
-def _main(name: str, words: list[str], user: int | None) -> None:
-    if user is not None:
-        os.setgroups([])
-        os.setgid(user)
-        os.setuid(user)
-    sys.exit(import_module(f"{name}.cli").main(words))
+    done = subprocess.run(
+        [name, *map(str, arguments)],
+        cwd=folder,
+        env=environment() | ({} if user is None else {USER: str(user)}),
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        timeout=HUNG_S,
+        preexec_fn=limit,
+    )
+    status = done.returncode if done.returncode < 128 else 128 - done.returncode
+    text = done.stdout.decode("utf-8", errors="replace")
+    return Said(None if status == -signal.SIGXCPU else status, text)

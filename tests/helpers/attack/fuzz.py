@@ -12,6 +12,7 @@ import trimesh
 from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
 from made_run import Raw
+from plain_dumps import WholeFrame, binary_frames, text_frames
 
 from dragdeck.decks.outputs import OutputOfRun
 from dragdeck.dumps.reader import read_dump, read_prints
@@ -26,7 +27,6 @@ _TOKENS = [
     *(b"solid", b"endsolid", b"18446744073709551616", b"2147483648"),
 ]
 
-WholeFrame = tuple[int, dict[str, list[float]]]
 Frames = list[WholeFrame]
 
 
@@ -53,53 +53,7 @@ def spoilt(draw: st.DrawFn, wholes: list[bytes]) -> bytes:
     return content
 
 
-# --- what a file says, by a reader that knows no shortcut ----------------------------
-
-
-def text_frames(content: bytes) -> Iterator[WholeFrame]:
-    """Frames of a text dump, as far as they are whole; `ValueError` where they are not."""
-    lines = content.split(b"\n")
-    place = 0
-    while place < len(lines) and lines[place:] != [b""]:
-        if not lines[place].startswith(b"ITEM: TIMESTEP"):
-            raise ValueError(lines[place])
-        step, count = int(lines[place + 1]), int(lines[place + 3])
-        names = [name.decode("latin-1") for name in lines[place + 8].split()[2:]]
-        rows = [line.split() for line in lines[place + 9 : place + 9 + count]]
-        if len(rows) < count or any(len(row) != len(names) for row in rows):
-            raise ValueError("rows")
-        if place + 9 + count >= len(lines):
-            raise ValueError("no end of the last line")
-        values = {name: [_number(row[n]) for row in rows] for n, name in enumerate(names)}
-        place += 9 + count
-        yield step, values
-
-
-def _number(word: bytes) -> float:
-    value = float(word)
-    if b"_" in word or not np.isfinite(value):
-        raise ValueError(word)
-    return value
-
-
-def binary_frames(
-    content: bytes, names: tuple[str, ...]
-) -> Iterator[tuple[int, dict[str, list[float]]]]:
-    """Frames of a binary dump, as far as they are whole."""
-    place = 0
-    while place < len(content):
-        step, rows, triclinic, *_ = struct.unpack_from("<qqi", content, place)
-        head = "<qqi6i6d" + ("3d" if triclinic else "") + "ii"
-        *_, width, ranks = struct.unpack_from(head, content, place)
-        place += struct.calcsize(head)
-        numbers: list[float] = []
-        for _ in range(ranks):
-            (count,) = struct.unpack_from("<i", content, place)
-            numbers += struct.unpack_from(f"<{count}d", content, place + 4)
-            place += 4 + 8 * count
-        if width != len(names) or len(numbers) != rows * width:
-            raise ValueError("rows")
-        yield step, {name: numbers[n::width] for n, name in enumerate(names)}
+# --- what was read, and what a file says ------------------------------------------------
 
 
 def prefix(frames: Iterator[WholeFrame]) -> tuple[Frames, bool]:
@@ -260,3 +214,10 @@ def fuzzed(name: str, number: int, examples: int) -> None:
         for content in known:
             attempt(Path(folder), content)
     each()
+
+
+def main(arguments: list[str]) -> int:
+    """The program ``fuzz``: name, seed and number of examples."""
+    name, number, examples = arguments
+    fuzzed(name, int(number), int(examples))
+    return 0

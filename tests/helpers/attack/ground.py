@@ -177,14 +177,10 @@ def _render(root: Path, place: str, filling: str | None) -> str:
     return f"results/{STUDY}/{place}/{name}"
 
 
-_COMPILED = ("tables", "chains")
-"""Phases that compile code when they are called for the first time, and take longer then."""
-
-
 def _made(root: Path, phase: Phase) -> Phase:
     before = files_of(root)
     size = size_of(root)
-    if phase.name in _COMPILED:
+    if phase.name == "chains":  # it compiles code when it is called for the first time
         call(phase.words, root, root / "said.log")
     spent = _children_s()
     said = call(phase.words, root, root / "said.log")

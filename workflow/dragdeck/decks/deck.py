@@ -158,7 +158,7 @@ class LeftOut:
     ----------
     why : str
     cost : str, optional
-        The variant of ``benchmarks/costs`` that puts it back.
+        Entry of ``tradeoff.json`` that says what it costs to put it back.
     """
 
     why: str

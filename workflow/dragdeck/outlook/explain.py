@@ -70,7 +70,7 @@ def price_of(name: str, tradeoff: TradeoffRecord | None) -> str:
     Parameters
     ----------
     name : str
-        A variant of ``benchmarks/costs/variants.yaml``.
+        Name of an entry of the record.
     tradeoff : TradeoffRecord or None
         Its costs give for each variant the ratio of processor times, with a
         95 % interval if there were rounds enough for one.

@@ -270,7 +270,7 @@ def stability_number(
     ----------
     Otsubo, O'Sullivan and Shire (2017), Computers and Geotechnics 86, 67-79.
     """
-    bodies, normal, overlap = _touching(centre_m, radius_m, bowl_radius_m)
+    bodies, normal, overlap = touching(centre_m, radius_m, bowl_radius_m)
     if not overlap.size:
         return 0.0
     # the bowl is the last body: it has no curvature and never moves
@@ -328,7 +328,7 @@ def largest_eigenvalue(
     return float(eigsh(operator, k=1, v0=start, tol=tolerance, return_eigenvectors=False)[0])
 
 
-def _touching(centre: Floats, radius: Floats, bowl_radius: float) -> tuple[Ints, Floats, Floats]:
+def touching(centre: Floats, radius: Floats, bowl_radius: float) -> tuple[Ints, Floats, Floats]:
     """Contacts of particles with each other, the floor and the side.
 
     Returns

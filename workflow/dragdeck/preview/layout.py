@@ -1,6 +1,6 @@
 """The geometry of a case, bowl, bed and moving workpieces, and from where it is seen.
 
-Picture and page draw what stands here and know nothing of studies.
+The picture draws what stands here and knows nothing of studies.
 """
 
 import json
@@ -47,12 +47,10 @@ class Stage:
         ``plunge``, ``approach`` or ``drag``.
     poses : (N, 4, 4) array
         From the mesh to the bowl, in m, at equal intervals of time; N is at least 2.
-    duration_s : float
     """
 
     name: str
     poses: Floats
-    duration_s: float
 
 
 @dataclass(frozen=True)
@@ -61,7 +59,6 @@ class MovingWorkpiece:
 
     Attributes
     ----------
-    name : str
     mesh : Trimesh
         Its reference point in the origin, m.
     radius_m : float
@@ -74,7 +71,6 @@ class MovingWorkpiece:
         Its legs in their order.
     """
 
-    name: str
     mesh: "Trimesh"
     radius_m: float
     direction_rad: float
@@ -141,7 +137,6 @@ def _moving(case: Case) -> MovingWorkpiece:
     moving = way.driven.superposed.values()
     turn = sum(float(one.turn(way.drag, np.ones(1))[0]) for one in moving)
     return MovingWorkpiece(
-        name=f"workpiece {case.number or ''}".rstrip(),
         mesh=workpiece_mesh(case),
         radius_m=workpiece_radius(case),
         direction_rad=case.study.motion.path.direction_rad,
@@ -160,9 +155,9 @@ def _disc(radius_m: float, height_m: float) -> "Trimesh":
 
 
 def _stages(case: Case, way: Course) -> Iterator[Stage]:
-    """The legs as they are driven, with their times at the study's own speed."""
+    """The legs as they are driven."""
     study, radius = case.study, workpiece_radius(case)
-    factor, fastest = study.chosen_fidelity().speed_factor, driven_surface_speed(study, radius)
+    fastest = driven_surface_speed(study, radius)
     for leg in way.legs:
         speed = max(leg.speed_m_s, fastest if leg.name == "drag" else 0.0)
         _, rotation = way.poses(leg, np.linspace(0.0, leg.steps, _LOOKS))
@@ -172,7 +167,7 @@ def _stages(case: Case, way: Course) -> Iterator[Stage]:
         places, rotation = way.poses(leg, np.linspace(0.0, leg.steps, count))
         poses = np.tile(np.eye(4), (count, 1, 1))
         poses[:, :3, :3], poses[:, :3, 3] = rotation.matrices, places
-        yield Stage(leg.name, poses, factor * leg.duration_s)
+        yield Stage(leg.name, poses)
 
 
 # --- views ----------------------------------------------------------------------------------------

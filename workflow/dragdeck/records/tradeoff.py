@@ -134,7 +134,7 @@ class CostEntry(Part):
 class CostsFile(Document):
     """What is read of ``costs.json``."""
 
-    remedy = "make it with: python benchmarks/costs"
+    remedy = "make it with: python benchmarks/costs.py"
 
     fidelity: Fidelity | None = None
     costs: tuple[CostEntry, ...]

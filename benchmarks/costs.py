@@ -1,0 +1,374 @@
+"""The cost of options that a study's input scripts omit (docs/evidence/costs.md).
+
+    python benchmarks/costs.py STUDY --out FILE [--rounds 3] [--seconds 0.5] [--only NAME ...]
+
+Run it inside the project, on a machine that does nothing else. ``costs.yaml`` is the design: each
+of its options is the standard case with other values of study fields. The runs of all rounds are
+ordinary ones, in ``costs/`` beside the result; the same command resumes an interrupted measurement.
+"""
+
+import argparse
+import copy
+import os
+import shlex
+import sys
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from functools import partial
+from operator import attrgetter
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from dragchain.statistics.estimate import Estimate, finite, mean_of
+from dragchain.tables.write import write_tables
+from dragdeck import __version__
+from dragdeck.cases.case import Case
+from dragdeck.command_line import guarded
+from dragdeck.decks.templates import environment
+from dragdeck.documents import Part
+from dragdeck.engine.batch import Batch
+from dragdeck.engine.reports import Report, say
+from dragdeck.errors import InputError, choices
+from dragdeck.physics.packing import Bed
+from dragdeck.project import find_project, study_templates
+from dragdeck.records.run import RunRecord
+from dragdeck.records.tradeoff import CostEntry, CostsFile, Machine
+from dragdeck.scenes.filling import FILLING
+from dragdeck.scenes.process import process_scene
+from dragdeck.scenes.scene import read_bed
+from dragdeck.study.base import Json
+from dragdeck.study.model import Study
+from dragdeck.sweep.cases import Design, Settings, Variation, settle_case
+
+DESIGN = Path(__file__).with_suffix(".yaml")
+
+SECONDS = 0.5
+"""Drag of every run, s of process time at the speed of the study."""
+
+_QUIET = 0.3
+"""Load average above which the machine counts as busy: half a process and more."""
+
+_FIDELITY = "fidelity."
+_PARAMETERS = ("youngs_modulus_scale", "timestep_fraction", "speed_factor")
+
+
+# --- the design ------------------------------------------------------------------------------
+
+
+class Option(Variation):
+    """Points of the design with their name, in which ``{}`` stands for what varies, and words."""
+
+    name: str
+    what: str
+    unit: Literal["per_step", "per_second"] = "per_second"
+
+    def named(self) -> Mapping[str, tuple["Option", Settings]]:
+        """Each point by its name: itself with its words filled in, and the fields that it sets."""
+        found = {}
+        for _, values in self.points():
+            shown = [values[field] for field in self.vary]
+            own = {"name": self.name.format(*shown), "what": self.what.format(*shown)}
+            found[own["name"]] = (self.model_copy(update=own), values)
+        return found
+
+
+def options(only: Sequence[str] = ()) -> Mapping[str, tuple[Option, Settings]]:
+    """The options of the design by name, the reference first; of the others those of `only`.
+
+    Raises
+    ------
+    InputError
+        There is no such option.
+    """
+    design = Design[Option].read(DESIGN)
+    known = {name: one for block in design.points for name, one in block.named().items()}
+    for name in only:
+        if name not in known:
+            limit = choices(name, known)
+            raise InputError("no such option", field="--only", value=name, limit=limit)
+    chosen = {name: one for name, one in known.items() if name in only or not only}
+    return {
+        name: (option, {**design.base, **values})
+        for name, (option, values) in {**design.reference.named(), **chosen}.items()
+    }
+
+
+def option_case(case: Case, values: Settings, seconds: float) -> Case:
+    """The case of a study with an option's values, and so much of its drag.
+
+    It neither continues a softer run nor has windows.
+
+    Raises
+    ------
+    InputError
+        The study has no such field, or may not have the value.
+    """
+    data = copy.deepcopy(case.study.model_dump(mode="json", exclude_unset=True))
+    data["fidelity"] = case.study.chosen_fidelity().model_dump(
+        mode="json", exclude_unset=True, exclude={"soft_start", "windows"}
+    )
+    own = {field: _value(value, case.study) for field, value in values.items()}
+    study = settle_case(case.file, data, own).study
+    path, name = study.motion.path, study.motion.path.length_field
+    fraction = min(1.0, seconds * study.motion.axis_speed_m_s / study.motion.path_length_m)
+    length: Json = {
+        f"motion.path.{name}": fraction * getattr(path, name),
+        "motion.transient_m": 0.0,
+        "motion.counted_from_revolution": None,
+    }
+    return settle_case(case.file, data, {**own, **length}, {})
+
+
+def _value(value: Any, study: Study) -> Any:
+    """A value, or a number times a field of the study; also within an object of fields."""
+    if isinstance(value, Mapping):
+        return {name: _value(own, study) for name, own in value.items()}
+    factor, times, field = value.partition(" * ") if isinstance(value, str) else ("", "", "")
+    if not times:
+        return value
+    try:
+        own = attrgetter(field)(study)
+    except AttributeError:
+        raise InputError("the study has no such field", file=DESIGN, field=field) from None
+    return type(own)(float(factor) * own)
+
+
+def option_cases(
+    case: Case, values: Mapping[str, Settings], seconds: float, report: Report
+) -> dict[str, Case]:
+    """The case of every option that the study can have and does not have itself."""
+    found: dict[str, Case] = {}
+    standard: Study | None = None
+    for name, own in values.items():
+        try:
+            one = option_case(case, own, seconds)
+        except InputError as error:
+            if standard is None:
+                raise
+            report(f"{name} is left out: {error}")
+            continue
+        if one.study != standard:
+            found[name] = one
+        standard = standard or one.study
+    return found
+
+
+# --- the result ------------------------------------------------------------------------------
+
+
+class BaseCost(Part):
+    """How fast the standard case is."""
+
+    name: str
+    what: str
+    timestep_s: float
+    steps: int
+    cpu_us_per_step: float
+    steps_per_s: float
+
+
+class TimedCosts(CostsFile):
+    """``costs.json``: what each option costs, and how, when and where that was measured."""
+
+    study: str
+    particles: int
+    seconds: float
+    measured: str
+    command: str
+    versions: Mapping[str, str]
+    machine: Machine
+    load_average_before: float
+    base: BaseCost
+
+
+def geometric(ratios: Sequence[float]) -> Estimate:
+    """Geometric mean of ratios, one for each round, with its interval; NaN for one round."""
+    return mean_of(np.log(ratios)).exp()
+
+
+def cost(
+    option: Option,
+    values: Settings,
+    rounds: Sequence[tuple[RunRecord, RunRecord]],
+    steps_s: tuple[float, float],
+    against: str,
+) -> CostEntry:
+    """The cost of an option.
+
+    Parameters
+    ----------
+    option : Option
+    values : mapping
+        The fields that it sets.
+    rounds : sequence of (RunRecord, RunRecord)
+        Its run and that of the standard case in each round.
+    steps_s : float, float
+        Time step of both, s.
+    against : str
+        What the standard case is.
+    """
+    steps_per_second = steps_s[1] / steps_s[0]
+    factor = steps_per_second if option.unit == "per_second" else 1.0
+    cpu, wall = (
+        geometric([getattr(a, name) / a.steps / (getattr(b, name) / b.steps) for a, b in rounds])
+        for name in ("cpu_time_s", "wall_time_s")
+    )
+    alone = [name.removeprefix(_FIDELITY) for name in values]
+    parameter = alone[0] if len(alone) == 1 and alone[0] in _PARAMETERS else None
+    return CostEntry(
+        name=option.name,
+        scene="process",
+        what=option.what,
+        against=against,
+        unit=option.unit,
+        parameter=parameter,
+        level=float(values[_FIDELITY + parameter]) if parameter else None,
+        ratio=cpu.value * factor,
+        ci95_low=finite(cpu.ci95_low * factor),
+        ci95_high=finite(cpu.ci95_high * factor),
+        per_step=cpu.value,
+        per_second=cpu.value * steps_per_second,
+        wall_ratio=wall.value * factor,
+        rounds=len(rounds),
+        steps=rounds[0][0].steps,
+        timestep_s=steps_s[0],
+    )
+
+
+# --- the measurement -------------------------------------------------------------------------
+
+
+def time_options(
+    case: Case,
+    templates: Path,
+    out: Path,
+    report: Report,
+    *,
+    rounds: int = 3,
+    seconds: float = SECONDS,
+    only: Sequence[str] = (),
+) -> None:
+    """Run all options of the design and write their costs.
+
+    Parameters
+    ----------
+    case : Case
+        Its fidelity gives modulus and step of the standard case.
+    templates : Path
+        The project's templates.
+    out : Path
+        The result; runs go to ``costs/`` beside it.
+    report : callable
+        Gets lines.
+    rounds : int
+    seconds : float
+        Process time of every drag, s.
+    only : sequence of str
+        Names of options; none: all.
+
+    Raises
+    ------
+    InputError
+        The result is there already, there is no such option, or nothing to time.
+    EngineError, RejectedRunError
+        A packing or a run of the standard case failed, or a run was interrupted.
+    """
+    if out.exists():
+        remedy = "move it away, or give another --out"
+        raise InputError("this measurement is there already", file=out, remedy=remedy)
+    for name, value in (("--rounds", rounds), ("--seconds", seconds)):
+        if not value > 0:
+            raise InputError("nothing to time", field=name, value=value, limit="greater than 0")
+    load, chosen = os.getloadavg()[0], options(only)
+    if load > _QUIET:
+        report(f"warning: the machine is busy (load average {load:.2f}); CPU times will scatter")
+    cases = option_cases(case, {name: own for name, (_, own) in chosen.items()}, seconds, report)
+    first, *others = cases
+    folder = out.resolve().parent / "costs"
+    own_templates = environment(templates, study_templates(case))
+    beds = {name: _bed(Batch(folder / "filling", own_templates), one, report)
+            for name, one in cases.items()}  # fmt: skip
+    scenes = {name: partial(process_scene, one, beds[name]) for name, one in cases.items()}
+    records: dict[str, list[RunRecord]] = {name: [] for name in cases}
+    for number in range(1, rounds + 1):
+        batch = Batch(folder / f"round-{number}", own_templates)
+        standard = batch.result(first, scenes[first]())
+        refused = batch.each({name: scenes[name] for name in others}, report)
+        records[first].append(standard)
+        for name in others:
+            if name not in refused:
+                records[name].append(RunRecord.read(batch.folder / name / "state.json"))
+    steps_s = {name: make().deck.timestep_s for name, make in scenes.items() if records[name]}
+    base = records[first]
+    found = [
+        cost(chosen[name][0], _own(chosen, name, first), pairs, (steps_s[name], steps_s[first]),
+             chosen[first][0].what)
+        for name in others
+        if (pairs := [(a, b) for a, b in zip(records[name], base, strict=False) if a.complete])
+    ]  # fmt: skip
+    study = cases[first].study
+    TimedCosts(
+        study=case.study_name,
+        fidelity=study.chosen_fidelity(),
+        particles=study.media.count,
+        seconds=seconds,
+        measured=datetime.now(UTC).date().isoformat(),
+        command=shlex.join(["python", "benchmarks/costs.py", *sys.argv[1:]]),
+        versions={"dragdeck": __version__, "engine": base[0].engine_version},
+        machine=Machine.here(),
+        load_average_before=load,
+        base=BaseCost(
+            name=first,
+            what=chosen[first][0].what,
+            timestep_s=steps_s[first],
+            steps=base[0].steps,
+            cpu_us_per_step=1e6 * geometric([one.cpu_time_s / one.steps for one in base]).value,
+            steps_per_s=geometric([one.steps / one.wall_time_s for one in base]).value,
+        ),
+        costs=tuple(found),
+    ).write(out)
+
+
+def _own(chosen: Mapping[str, tuple[Option, Settings]], name: str, first: str) -> Settings:
+    """The fields in which an option differs from the standard case."""
+    base = chosen[first][1]
+    return {field: value for field, value in chosen[name][1].items() if base.get(field) != value}
+
+
+def _bed(batch: Batch, case: Case, report: Report) -> Bed:
+    """The settled packing of a case, made if it is not there yet."""
+    run = FILLING.run_id(case)
+    file = batch.folder / run / "tables" / "packing.json"
+    if not file.is_file():
+        report(f"packing {run}")
+        batch.result(run, FILLING.build(case, None))
+        write_tables(batch.folder / run)
+    return read_bed(file)
+
+
+def main() -> int:
+    """Measure and return the exit status; see `dragdeck.command_line.guarded`."""
+    parser = argparse.ArgumentParser(
+        prog="python benchmarks/costs.py", description="Time what each omitted option would cost."
+    )
+    add = parser.add_argument
+    add("study", help="name of a folder in studies/")
+    add("--fidelity", help="instead of the study's own")
+    add("--rounds", type=int, default=3, help="number of runs of each option")
+    add("--seconds", type=float, default=SECONDS, help="process time of the drag, s")
+    add("--only", nargs="+", default=[], metavar="NAME", help="time only these options")
+    add("--out", type=Path, required=True, metavar="FILE", help="costs.json")
+    return guarded("costs", partial(_measure, parser.parse_args()))
+
+
+def _measure(asked: argparse.Namespace) -> None:
+    project = find_project(Path.cwd())
+    case = project.cases(asked.study, asked.fidelity)[0]
+    how = {"rounds": asked.rounds, "seconds": asked.seconds, "only": asked.only}
+    time_options(case, project.templates, asked.out, say, **how)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
