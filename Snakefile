@@ -20,24 +20,8 @@ include: "workflow/rules/validate.smk"
 include: "workflow/rules/scaling.smk"
 
 
-# With a queue, these stay where snakemake runs: they take a second or two.
-localrules:
-    advise,
-    all,
-    calibrate,
-    crate,
-    drop_test,
-    export,
-    figures,
-    filling,
-    pass_verdict,
-    process,
-    report,
-    scaling,
-    stability,
-    tradeoff,
-    validate,
-    verify,
+# Logs, benchmarks and the environment: alike for all rules.
+add_records(workflow.rules)
 
 
 # The whole study: runs, tables, chains, figures and the report.

@@ -16,7 +16,8 @@ from PIL import Image
 from dragdeck.cases.case import Case
 from dragdeck.cli import main
 from dragdeck.errors import InputError
-from dragdeck.mesh import cylinder, prism, write_stl
+from dragdeck.mesh.files import stl_text
+from dragdeck.mesh.shapes import cylinder, prism
 from dragdeck.preview.layout import COLOURS, CaseLayout, layout
 from dragdeck.preview.swept import swept_volume
 from dragdeck.project import Project
@@ -45,7 +46,8 @@ def made(small: dict[str, Any], write_study: Callable[..., Path]) -> Made:
         if bar:
             small["workpiece"]["shape"] = {"kind": "mesh", "file": "bar.stl", "unit": "m"}
         file = write_study(small)
-        write_stl(prism(6, 0.004, 0.05, 0.004, 0.01), file.parent / "bar.stl")
+        bar = prism(6, 0.004, 0.05, 0.004, 0.01)
+        (file.parent / "bar.stl").write_text(stl_text(bar))
         return load_cases(file)[0]
 
     return make

@@ -23,6 +23,7 @@ from dragchain import read_dump, write_tables
 from dragchain.network.write import write_chains
 from dragchain.tables.network_contacts import contact_rows
 from dragchain.tables.run_folder import Run
+from dragdeck.physics.coulomb import FrictionLimit
 from dragdeck.scenes.process import SCENES
 
 pytestmark = [pytest.mark.engine, pytest.mark.slow]
@@ -135,7 +136,8 @@ def unbalanced(folder: Path, friction: float) -> np.ndarray:
             continue
         particles = particles.take(np.argsort(particles.ids("particle_id")))
         touching = beside[contacts.step].join()
-        rows = contact_rows(particles, contacts, touching.workpiece, touching.bowl, 0.025, friction)
+        limit = FrictionLimit(friction, wall=False)
+        rows = contact_rows(particles, contacts, touching.workpiece, touching.bowl, 0.025, limit)
         weight = 2656 * 4 / 3 * np.pi * particles.columns["radius_m"] ** 3 * 9.81
         force = np.column_stack([0 * weight, 0 * weight, -weight]) - moving[contacts.step]
         between = rows.b_id > 0

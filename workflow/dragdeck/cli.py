@@ -76,8 +76,8 @@ COMMANDS = (
             "commands:cases", (STUDY, FIDELITY, PLAN)),
     Command("advise", "find settings for a tolerance",
             "Find the cheapest settings that keep the error of a quantity within a tolerance, and "
-            "show the error and cost of each setting. It reads the measured trade-off, measures "
-            "the speed of LIGGGHTS on this machine, and writes results/STUDY/advice.json.",
+            "show the error and cost of each setting. It reads the measured trade-off and the "
+            "speeds of earlier runs, and writes results/STUDY/advice.json.",
             "commands:advise", (
         STUDY, FIDELITY,
         Argument("--tolerance", type=float, metavar="X",
@@ -86,9 +86,7 @@ COMMANDS = (
         Argument("--quantity", metavar="NAME",
                   help="quantity to which the tolerance applies, for example drag_mean, drag_std, "
                   "workpiece_contacts or restitution; docs/reference/study.md lists all (default: "
-                  "the study's, or drag_mean)"),
-        Argument("--quick", action="store_true",
-                  help="estimate costs from earlier runs instead of measuring the speed here")),
+                  "the study's, or drag_mean)")),
             "dragdeck advise uhlmann2015 --tolerance 0.05 --quantity drag_mean"),
     Command("run", "run or resume one input script",
             "Run the input script in.liggghts of a run folder with LIGGGHTS, or resume it from its "

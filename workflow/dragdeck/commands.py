@@ -2,7 +2,6 @@
 
 import os
 import shutil
-import tempfile
 import textwrap
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -15,15 +14,8 @@ import jinja2
 from pydantic import ValidationError
 from rich.table import Table
 
-from dragdeck.advice.advise import Advice, advised_settings, with_option
-from dragdeck.advice.forecast import (
-    advice_file,
-    advice_tables,
-    forecast,
-    question,
-    roles,
-)
-from dragdeck.campaigns.machine_speed import measure_machine_speed
+from dragdeck.advice.advise import advised_settings
+from dragdeck.advice.forecast import advice_file, advice_tables, advised_case, question
 from dragdeck.campaigns.restitution_drops import confirmation, run_drops, sweep
 from dragdeck.cases.case import Case
 from dragdeck.cases.ranks import check_ranks, cores_here
@@ -56,15 +48,14 @@ from dragdeck.physics.packing import Bed
 from dragdeck.preview.layout import CaseLayout, layout
 from dragdeck.preview.picture import picture, small_picture
 from dragdeck.preview.swept import swept_volume
-from dragdeck.project import Project, by_folder, by_run, find_project, study_templates
-from dragdeck.records.advice import AdviceFile, Speed
+from dragdeck.project import by_folder, by_run, find_project, study_templates
+from dragdeck.records.advice import AdviceFile
 from dragdeck.records.calibration import FitFile
 from dragdeck.records.tradeoff import TradeoffRecord, measured_tradeoff, tradeoff_if_measured
 from dragdeck.scenes.lead import with_leads
 from dragdeck.scenes.process import SCENES
 from dragdeck.scenes.scene import SceneType, StudyScene, read_bed
 from dragdeck.study.check import explained, warnings
-from dragdeck.study.model import RESTITUTION
 from dragdeck.study.yaml import located
 from dragdeck.sweep.cases import new_study
 
@@ -302,37 +293,22 @@ def advise(
     fidelity: str | None,
     tolerance: float | None,
     quantity: str | None,
-    quick: bool,
     tradeoff: TradeoffRecord | None = None,
 ) -> None:
     """Show the settings for a tolerance, with their cost, and keep them."""
     project = find_project(Path.cwd())
     tradeoff = tradeoff or measured_tradeoff()
     every = list(by_run(project.cases(study, fidelity, tradeoff), SCENES["process"]).values())
-    results = project.results(study)
+    results, found = project.results(study), []
     try:
         asked = [question(case, tolerance, quantity) for case in every]
     except ValidationError as error:
         raise explained(error, "command line") from None
-    advices = [
-        advised_settings(case, wanted, tradeoff) for case, wanted in zip(every, asked, strict=True)
-    ]
-    untimed = quick or all(RESTITUTION in wanted.quantities for wanted in asked)
-    speed = None if untimed else _machine_speed(project, every[0], advices[0])
-    rows = []
-    for case, advice in zip(every, advices, strict=True):
-        options = [forecast(case, *row, speed, results, tradeoff) for row in roles(advice)]
-        rows.append((advice, options))
-        show(advice_tables(case, advice, options))
-    _keep(results / "advice.json", advice_file(every[0], rows, speed))
-
-
-def _machine_speed(project: Project, case: Case, advice: Advice) -> Speed:
-    """The speed of this machine at the advised settings."""
-    chosen = replace(case, study=with_option(case.study, advice.chosen))
-    templates = environment(project.templates, study_templates(case))
-    with tempfile.TemporaryDirectory(prefix="dragdeck-") as folder:
-        return measure_machine_speed(chosen, Path(folder), templates, say)
+    for case, wanted in zip(every, asked, strict=True):
+        advice = advised_settings(case, wanted, tradeoff)
+        found.append(advised_case(case, advice, results))
+        show(advice_tables(case, advice, found[-1]))
+    _keep(results / "advice.json", advice_file(every[0], found))
 
 
 def _keep(file: Path, content: AdviceFile) -> None:

@@ -6,7 +6,7 @@ they pass as wildcards is anything with the attributes of `Wildcards`.
 
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import cache, cached_property
+from functools import cache, partial
 from pathlib import Path
 from shlex import quote
 from typing import Any, NoReturn, Protocol, TypeVar
@@ -35,7 +35,6 @@ from dragdeck.project import (
 from dragdeck.scenes.lead import FIRST_WINDOWS, led, windows_of, with_leads
 from dragdeck.scenes.process import SCENES
 from dragdeck.study.base import Json
-from dragdeck.sweep.plan import Points
 
 RECORD = {place: "outcome.json" if place in OUTCOMES else "run.json" for place in PLACES}
 """How a run in each folder of runs ended."""
@@ -64,20 +63,6 @@ class RoundOfRun(Wildcards, Protocol):
     """What a rule knows of a round of windows of a run."""
 
     round: str
-
-
-class RuleOfJob(Protocol):
-    """The rule of a job."""
-
-    name: str
-
-
-class Job(Protocol):
-    """A job of Snakemake."""
-
-    rule: RuleOfJob
-    output: list[str]
-    wildcards: Wildcards
 
 
 FromRun = Callable[[Wildcards], V]
@@ -134,6 +119,28 @@ def of_whole_run(place: str, file: str) -> FromRun[str]:
     )
 
 
+def add_records(rules: Iterable[Any]) -> None:
+    """Give each of Snakemake's rules that has a command a log, a benchmark and an environment.
+
+    They stand in ``logs/`` and ``benchmarks/`` of the folder of its run or study, and are called
+    like the rule, without the place of its runs.
+    """
+    for rule in rules:
+        if rule.norun:
+            continue
+        folders, name = str(next(iter(rule.output), "results")).split("/"), rule.name
+        depth = 2
+        if "run" in rule.wildcard_names:
+            depth, name = 4, name.removesuffix(f"_{folders[2]}").removesuffix("_of")
+        folder = "/".join(folders[:depth])
+        others = sorted(rule.wildcard_names - {"study", "run"})
+        name += "".join(f"-{{{wildcard}}}" for wildcard in others)
+        rule.log_modifier = rule.benchmark_modifier = rule.output_modifier
+        rule.set_log(f"{folder}/logs/{name}.log")
+        rule.benchmark = f"{folder}/benchmarks/{name}.tsv"
+        rule.conda_env = "../envs/python.yaml"
+
+
 class Workflow:
     """What a call of Snakemake works on.
 
@@ -164,6 +171,7 @@ class Workflow:
         self.project, self.study, self.fidelity = project, study, fidelity
         self.plan, self.validation, self.judged = plan, validation, judged
         self.cases: list[Case] = or_stop(project.cases, study, fidelity or None)
+        self.points_of = cache(partial(or_stop, project.points, study))
         self.points_by_run = cache(self._points_by_run)
         self.templates_of = cache(self._templates_of)
 
@@ -254,18 +262,9 @@ class Workflow:
 
     # --- cases and runs --------------------------------------------------------------------
 
-    @cached_property
-    def points(self) -> Points:
-        """The points of the trade-off's plan."""
-        return self._points(self.plan)
-
-    def _points(self, plan: str) -> Points:
-        return or_stop(self.project.points, self.study, plan)
-
     def _points_by_run(self, scene: str, plan: str, leads: bool = False) -> dict[str, Case]:
         """A case of a plan for each run of a scene; those that lead to others too, if asked."""
-        points = self.points if plan == self.plan else self._points(plan)
-        kind, cases = SCENES[scene], points.of(SCENES[scene])
+        kind, cases = SCENES[scene], self.points_of(plan).of(SCENES[scene])
         return by_run(with_leads(cases) if leads and kind.needs_bed else cases, kind)
 
     def _origins(self, place: str) -> Iterator[tuple[str, dict[str, Case]]]:
@@ -288,8 +287,8 @@ class Workflow:
         """A case that a run belongs to."""
         return self._origin(place, run)[1]
 
-    def planned_runs(self, jobs: Iterable[Job]) -> list[StudyRun]:
-        """The engine runs of jobs: what is expected of each, and how far it is."""
+    def planned_runs(self, jobs: Iterable[Any]) -> list[StudyRun]:
+        """The engine runs of Snakemake's jobs: what is expected of each, and how far it is."""
         places = {f"run_{place}": place for place in PLACES}
         found: dict[str, dict[Path, Case]] = {}
         for job in jobs:

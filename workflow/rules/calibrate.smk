@@ -7,12 +7,6 @@ rule read_drop_record:
         WORK.drop_record,
     output:
         WORK.of_study("calibration", "record.json"),
-    log:
-        WORK.of_study("calibration", "logs/record.log"),
-    benchmark:
-        WORK.of_study("calibration", "benchmarks/record.tsv")
-    conda:
-        "../envs/python.yaml"
     resources:
         prints=1,
     params:
@@ -28,12 +22,6 @@ rule sweep_drops:
         WORK.of_study("calibration", "record.json"),
     output:
         WORK.of_study("calibration", "sweep/drops.json"),
-    log:
-        WORK.of_study("calibration", "logs/sweep.log"),
-    benchmark:
-        WORK.of_study("calibration", "benchmarks/sweep.tsv")
-    conda:
-        "../envs/python.yaml"
     resources:
         prints=1,
     params:
@@ -53,12 +41,6 @@ rule fit_restitution:
         result=WORK.of_study("calibration", "result.json"),
         impacts=WORK.of_study("calibration", "impacts.csv"),
         bias=WORK.of_study("calibration", "bias.csv"),
-    log:
-        WORK.of_study("calibration", "logs/fit.log"),
-    benchmark:
-        WORK.of_study("calibration", "benchmarks/fit.tsv")
-    conda:
-        "../envs/python.yaml"
     resources:
         prints=1,
     params:
@@ -74,12 +56,6 @@ rule confirm_restitution:
         fit=WORK.of_study("calibration", "result.json"),
     output:
         WORK.of_study("calibration", "confirm/drops.json"),
-    log:
-        WORK.of_study("calibration", "logs/confirm.log"),
-    benchmark:
-        WORK.of_study("calibration", "benchmarks/confirm.tsv")
-    conda:
-        "../envs/python.yaml"
     resources:
         prints=1,
     params:
@@ -106,12 +82,6 @@ rule write_calibration_report:
             labels={"run": "drop test", "figure": "report"},
         ),
         figure=WORK.of_study("calibration", "figures/impacts.png"),
-    log:
-        WORK.of_study("calibration", "logs/report.log"),
-    benchmark:
-        WORK.of_study("calibration", "benchmarks/report.tsv")
-    conda:
-        "../envs/python.yaml"
     resources:
         prints=1,
     params:

@@ -19,6 +19,7 @@ from dragdeck.rules import (
     RECORD,
     WINDOWS_RECORD,
     Workflow,
+    add_records,
     of_run,
     of_whole_run,
     or_stop,

@@ -9,12 +9,6 @@ rule write_crate:
         report=rules.write_report.output,
     output:
         WORK.of_study("crate", "ro-crate-metadata.json"),
-    log:
-        WORK.of_study("logs", "crate.log"),
-    benchmark:
-        WORK.of_study("benchmarks", "crate.tsv")
-    conda:
-        "../envs/python.yaml"
     params:
         runs=[folder for name in SCENES for folder in WORK.every_folder(name)],
         licence=WORK.licence_option,

@@ -8,12 +8,6 @@ rule export_paraview:
         run=of_run("process", "run.json"),
     output:
         of_run("process", "export/paraview/run.pvd"),
-    log:
-        of_run("process", "logs/export.log"),
-    benchmark:
-        of_run("process", "benchmarks/export.tsv")
-    conda:
-        "../envs/python.yaml"
     params:
         source=source_hash("dragchain.export.write"),
     shell:

@@ -14,12 +14,6 @@ rule write_network_page:
             category="Process",
             labels={"run": "{run}", "figure": "network"},
         ),
-    log:
-        of_run("process", "logs/network.log"),
-    benchmark:
-        of_run("process", "benchmarks/network.tsv")
-    conda:
-        "../envs/python.yaml"
     params:
         source=source_hash("dragchain.network_page.page"),
     shell:

@@ -6,17 +6,11 @@
 rule draw_set_up:
     output:
         f"results/{STUDY}/set_up.png",
-    log:
-        f"results/{STUDY}/logs/preview.log",
-    benchmark:
-        f"results/{STUDY}/benchmarks/preview.tsv"
     localrule: True
-    conda:
-        "../envs/python.yaml"
     params:
+        study=STUDY,
         case=SCENES["process"].digest(CASES[0]),
         fidelity=WORK.fidelity_option,
-        study=STUDY,
         source=source_hash("dragdeck.preview.picture"),
     shell:
         "dragdeck preview {params.study} {params.fidelity} > {log} 2>&1"
@@ -43,12 +37,6 @@ rule write_report:
             category="Report",
             labels={"run": "all", "figure": "report"},
         ),
-    log:
-        WORK.of_study("report", "logs/report.log"),
-    benchmark:
-        WORK.of_study("report", "benchmarks/report.tsv")
-    conda:
-        "../envs/python.yaml"
     params:
         runs=lambda wildcards: WORK.every_folder("process"),
         advice=WORK.advice_option,

@@ -16,16 +16,10 @@ for PLACE, SCENE in PLACES.items():
                 of_run(PLACE, file)
                 for file in ("in.liggghts", "case.json", "columns.json", *SCENE.inputs)
             ],
-        log:
-            of_run(PLACE, "logs/render.log"),
-        benchmark:
-            of_run(PLACE, "benchmarks/render.tsv")
         wildcard_constraints:
             run=ENGINE_RUN,
         priority: 0 if SCENE.single_particle else 1
         localrule: True
-        conda:
-            "../envs/python.yaml"
         params:
             case=WORK.digest_of(PLACE),
             cases=WORK.cases_option(PLACE),
@@ -48,15 +42,9 @@ for PLACE, SCENE in PLACES.items():
             filling=WORK.of_its_bed(PLACE, "run.json"),
         output:
             of_run(PLACE, RECORD[PLACE]),
-        log:
-            of_run(PLACE, "logs/run.log"),
-        benchmark:
-            of_run(PLACE, "benchmarks/run.tsv")
         wildcard_constraints:
             run=ENGINE_RUN,
         priority: 0 if SCENE.single_particle else 1
-        conda:
-            "../envs/python.yaml"
         threads: WORK.ranks_of(PLACE)
         resources:
             engine=1,
@@ -83,15 +71,9 @@ for PLACE in ("process", WINDOWS):
                 of_run(PLACE, file)
                 for file in (RECORD[PLACE], "case.json", "columns.json", *SCENES["process"].inputs)
             ],
-        log:
-            of_run(PLACE, "logs/render.log"),
-        benchmark:
-            of_run(PLACE, "benchmarks/render.tsv")
         wildcard_constraints:
             run=FURTHER_WORKPIECE,
         localrule: True
-        conda:
-            "../envs/python.yaml"
         params:
             case=WORK.digest_of(PLACE),
             cases=WORK.cases_option(PLACE),
@@ -110,13 +92,7 @@ for PLACE, SCENE in SCENES.items():
             of_run(PLACE, "run.json"),
         output:
             tables_of(PLACE, SCENE.tables),
-        log:
-            of_run(PLACE, "logs/tables.log"),
-        benchmark:
-            of_run(PLACE, "benchmarks/tables.tsv")
         priority: 0 if SCENE.single_particle else 1
-        conda:
-            "../envs/python.yaml"
         params:
             source=source_hash("dragchain.tables.write"),
         shell:
@@ -139,12 +115,6 @@ for PLACE, SCENE in SCENES.items():
                 for name in SCENE.figures
             ],
             of_run(PLACE, "tables/figures.json"),
-        log:
-            of_run(PLACE, "logs/figures.log"),
-        benchmark:
-            of_run(PLACE, "benchmarks/figures.tsv")
-        conda:
-            "../envs/python.yaml"
         params:
             source=source_hash("dragchain.report.run_figures"),
         shell:
@@ -161,12 +131,6 @@ for PLACE, SCENE in SCENES.items():
                 run=of_run(PLACE, "run.json"),
             output:
                 tables_of(PLACE, SCENE.network),
-            log:
-                of_run(PLACE, "logs/chains.log"),
-            benchmark:
-                of_run(PLACE, "benchmarks/chains.tsv")
-            conda:
-                "../envs/python.yaml"
             params:
                 source=source_hash("dragchain.network.statistics", "dragchain.network.chains"),
             shell:
@@ -181,12 +145,6 @@ rule draw_for_journal:
         run=of_run("process", "run.json"),
     output:
         of_run("process", "figures/journal/workpiece.pdf"),
-    log:
-        of_run("process", "logs/journal.log"),
-    benchmark:
-        of_run("process", "benchmarks/journal.tsv")
-    conda:
-        "../envs/python.yaml"
     params:
         colours="--paper-colours" if COLOURS == "paper" else "",
         source=source_hash("dragchain.report.journal"),
@@ -204,14 +162,8 @@ checkpoint judge_windows:
         record=WINDOWS_RECORD,
     output:
         of_run("process", "windows/round-{round}.json"),
-    log:
-        of_run("process", "logs/windows-{round}.log"),
-    benchmark:
-        of_run("process", "benchmarks/windows-{round}.tsv")
     wildcard_constraints:
         round="[1-9][0-9]*",
-    conda:
-        "../envs/python.yaml"
     params:
         asked=WORK.windows_options,
         windows=WORK.windows_of_round,
@@ -230,12 +182,6 @@ rule extrapolate_process:
         windows=WORK.last_round,
     output:
         of_run("process", "tables/extrapolated.json"),
-    log:
-        of_run("process", "logs/extrapolate.log"),
-    benchmark:
-        of_run("process", "benchmarks/extrapolate.tsv")
-    conda:
-        "../envs/python.yaml"
     params:
         windows=lambda wildcards, input: f"--round {input.windows}" if input.windows else "",
         source=source_hash("dragchain.windows.extrapolate"),
@@ -251,12 +197,6 @@ rule measure_points:
         bed=WORK.of_its_bed(POINTS, "tables/packing.json"),
     output:
         of_run(POINTS, "measures.json"),
-    log:
-        of_run(POINTS, "logs/measures.log"),
-    benchmark:
-        of_run(POINTS, "benchmarks/measures.tsv")
-    conda:
-        "../envs/python.yaml"
     params:
         source=source_hash("dragchain.tradeoff.measure_run"),
     shell:
@@ -285,12 +225,6 @@ for PLACE, SCENE in {**SCENES, POINTS: SCENES["process"]}.items():
                     category=PLACE.capitalize(),
                     labels={"run": "{run}", "figure": "workpiece"},
                 ),
-            log:
-                of_run(PLACE, "logs/loading.log"),
-            benchmark:
-                of_run(PLACE, "benchmarks/loading.tsv")
-            conda:
-                "../envs/python.yaml"
             params:
                 source=source_hash("dragchain.loading.summary", "dragchain.loading.figure"),
             shell:

@@ -12,12 +12,6 @@ rule write_scaling:
             category="Scaling",
             labels={"run": "all", "figure": "scaling"},
         ),
-    log:
-        WORK.of_study("scaling", "logs/scaling.log"),
-    benchmark:
-        WORK.of_study("scaling", "benchmarks/scaling.tsv")
-    conda:
-        "../envs/python.yaml"
     resources:
         prints=1,
     params:

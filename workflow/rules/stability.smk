@@ -23,12 +23,6 @@ rule settle_beds:
         templates=WORK.files("templates/*.j2"),
     output:
         [f"{bed}/run.json" for bed in STABILITY_BEDS],
-    log:
-        "results/stability/logs/beds.log",
-    benchmark:
-        "results/stability/benchmarks/beds.tsv"
-    conda:
-        "../envs/python.yaml"
     resources:
         prints=1,
     params:
@@ -49,14 +43,8 @@ rule run_regime:
         ),
     output:
         "results/stability/points/{regime}.json",
-    log:
-        "results/stability/logs/{regime}.log",
-    benchmark:
-        "results/stability/benchmarks/{regime}.tsv"
     wildcard_constraints:
         regime="impact|settle|column|drag",
-    conda:
-        "../envs/python.yaml"
     resources:
         prints=1,
     params:
@@ -82,12 +70,6 @@ rule write_stability:
         tables=multiext("results/stability/", "points.csv", "points.parquet"),
         conditions=multiext("results/stability/", "conditions.csv", "conditions.parquet"),
         measured="results/stability/stability.json",
-    log:
-        "results/stability/logs/report.log",
-    benchmark:
-        "results/stability/benchmarks/report.tsv"
-    conda:
-        "../envs/python.yaml"
     params:
         source=source_hash("evidence.stability.report"),
     shell:

@@ -9,19 +9,13 @@ rule measure_costs:
         script=WORK.files("benchmarks/costs.*"),
     output:
         WORK.of_tradeoff("costs.json"),
-    log:
-        WORK.of_tradeoff("logs/costs.log"),
-    benchmark:
-        WORK.of_tradeoff("benchmarks/costs.tsv")
-    conda:
-        "../envs/python.yaml"
     threads: workflow.cores
     resources:
         prints=1,
     params:
         study=STUDY,
         fidelity=WORK.fidelity_option,
-        rounds=lambda wildcards: WORK.points.cost_rounds,
+        rounds=lambda wildcards: WORK.points_of(PLAN).cost_rounds,
         cases=[scene.digest(CASES[0]) for scene in SCENES.values()],
         source=source_hash("dragdeck.engine.batch", "dragdeck.project", "dragchain.tables.write"),
     shell:
@@ -33,7 +27,9 @@ rule write_tradeoff:
     input:
         measures=lambda wildcards: WORK.every_point("measures.json"),
         drops=lambda wildcards: WORK.every_drop_point("tables/impacts.parquet"),
-        costs=lambda wildcards: [WORK.of_tradeoff("costs.json")] if WORK.points.cost_rounds else [],
+        costs=lambda wildcards: (
+            [WORK.of_tradeoff("costs.json")] if WORK.points_of(PLAN).cost_rounds else []
+        ),
         templates=WORK.page_templates("tradeoff/tradeoff.html.j2"),
     output:
         page=report(
@@ -45,12 +41,6 @@ rule write_tradeoff:
         measured=WORK.of_tradeoff("tradeoff.json"),
         runs=multiext(WORK.of_tradeoff(""), "runs.csv", "runs.parquet"),
         errors=multiext(WORK.of_tradeoff(""), "errors.csv", "errors.parquet"),
-    log:
-        WORK.of_tradeoff("logs/report.log"),
-    benchmark:
-        WORK.of_tradeoff("benchmarks/report.tsv")
-    conda:
-        "../envs/python.yaml"
     params:
         reference=lambda wildcards: WORK.every_point("")[0],
         drops=lambda wildcards: WORK.every_drop_point(""),

@@ -22,12 +22,6 @@ rule write_validation:
             "effects.parquet",
             "statements.parquet",
         ),
-    log:
-        WORK.of_study("validation", "logs/report.log"),
-    benchmark:
-        WORK.of_study("validation", "benchmarks/report.tsv")
-    conda:
-        "../envs/python.yaml"
     params:
         command=f"snakemake validate --config study={STUDY} plan={VALIDATION}",
         runs=lambda wildcards, input: [str(Path(file).parent) for file in input.measures],

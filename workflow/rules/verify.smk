@@ -21,12 +21,6 @@ rule judge_verification:
             category="Verification",
             labels={"run": "all", "figure": "report"},
         ),
-    log:
-        "results/verification/logs/verify.log",
-    benchmark:
-        "results/verification/benchmarks/verify.tsv"
-    conda:
-        "../envs/python.yaml"
     threads: 4
     resources:
         prints=1,
@@ -46,12 +40,7 @@ rule pass_verdict:
         "results/verification/report/verification.parquet",
     output:
         "results/verification/report/verdict.txt",
-    log:
-        "results/verification/logs/verdict.log",
-    benchmark:
-        "results/verification/benchmarks/verdict.tsv"
-    conda:
-        "../envs/python.yaml"
+    localrule: True
     params:
         source=source_hash("evidence.verification.report"),
     shell:

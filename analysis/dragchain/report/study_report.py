@@ -40,7 +40,7 @@ from dragdeck.records.run import RunRecord
 # --- runs without a result -----------------------------------------------------------------------
 
 
-_STEPS = ("render", "run", "tables", "chains", "loading", "figures")
+_STEPS = ("render", "share", "run", "tabulate", "find_chains", "map_loading", "draw")
 """The steps of a run that have a log, in order: the first that failed is to blame."""
 
 _LOG_BYTES = 20_000

@@ -199,7 +199,7 @@ def test_a_run_that_was_never_written_points_to_the_run_before_it(
 
 
 @pytest.mark.parametrize(("log", "said"), [
-    ("render.log", "would reach below the floor"), ("tables.log", "ends inside a frame"),
+    ("render.log", "would reach below the floor"), ("tabulate.log", "ends inside a frame"),
 ])  # fmt: skip
 def test_the_step_that_failed_says_why(
     process: Path, other: Path, tmp_path: Path, log: str, said: str

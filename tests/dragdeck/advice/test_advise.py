@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from made_study import Made
-from made_tradeoff import made_tradeoff
+from made_tradeoff import cost, made_tradeoff
 from paths import ROOT
 
 from dragdeck import commands
@@ -20,6 +20,7 @@ from dragdeck.advice.advise import (
     consistent,
     plain_option,
     resolve,
+    step_cost,
     with_option,
 )
 from dragdeck.advice.forecast import question
@@ -145,6 +146,21 @@ def test_the_work_that_is_compared_is_that_of_the_runs(paper: Case, speed: float
     assert counted == pytest.approx(sum(steps), rel=0.03)
 
 
+def test_steps_of_softer_particles_cost_what_was_timed() -> None:
+    modulus = "youngs_modulus_scale"
+    costs = [
+        cost("stiff", parameter=modulus, level=1.0, per_step=0.8),
+        cost("soft", parameter=modulus, level=1e-4, per_step=1.6),
+        cost("fast", parameter="speed_factor", level=5.0, per_step=3.0),
+        cost("plain", per_step=9.0),
+    ]
+    tradeoff = made_tradeoff(costs=costs)
+    assert step_cost(1.0, tradeoff) == pytest.approx(0.8)
+    assert step_cost(1e-6, tradeoff) == pytest.approx(1.6)
+    assert step_cost(0.01, tradeoff) == pytest.approx((0.8 * 1.6) ** 0.5)
+    assert step_cost(0.01, made_tradeoff()) == 1.0
+
+
 # --- the step stays within the stability limits --------------------------------------------------
 
 
@@ -261,7 +277,7 @@ def test_advise_prints_and_keeps_what_it_says(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(project.root)
-    commands.advise("small", None, None, None, quick=True, tradeoff=tradeoff)
+    commands.advise("small", None, None, None, tradeoff=tradeoff)
     said = " ".join(capsys.readouterr().out.split())
     for words in ("drag_mean within 10 %", "advised", "reference", "sets no tolerance",
                   "wall time"):  # fmt: skip
@@ -280,7 +296,7 @@ def test_the_kept_advice_names_the_run_of_a_study_that_asks(
     asking: Case, tradeoff: TradeoffRecord, project: Project, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(project.root)
-    commands.advise("small", None, None, None, quick=True, tradeoff=tradeoff)
+    commands.advise("small", None, None, None, tradeoff=tradeoff)
     kept = json.loads((project.root / "results/small/advice.json").read_text())
     assert kept["cases"][0]["run"] == PROCESS.run_id(asking)
     assert kept["cases"][0]["options"][0]["inputs"] == process_scene(asking).case.inputs
@@ -295,7 +311,7 @@ def test_an_advice_that_cannot_be_kept_is_still_shown(
 ) -> None:
     monkeypatch.chdir(project.root)
     (project.root / "results").write_text("a file where the folder should be")
-    commands.advise("small", None, 0.02, None, quick=True, tradeoff=tradeoff)
+    commands.advise("small", None, 0.02, None, tradeoff=tradeoff)
     shown = capsys.readouterr()
     assert "drag_mean within 2 %" in shown.out and "not written: " in shown.err
 
@@ -317,4 +333,4 @@ def test_a_wrong_question_is_explained(
 ) -> None:
     monkeypatch.chdir(project.root)
     with pytest.raises(InputError, match="command line: "):
-        commands.advise("small", None, tolerance, quantity, quick=True, tradeoff=tradeoff)
+        commands.advise("small", None, tolerance, quantity, tradeoff=tradeoff)

@@ -176,7 +176,7 @@ def test_a_known_restitution_is_recovered(measured_case: Case, project: Project)
     checked = confirmed(read_drops(run(list(confirmation(case.study, *values))[::2], "confirm")))
     assert checked.effective == pytest.approx(result.measured.value, abs=4 * checked.std)
     write_calibration_report(folder / "trial-0.csv", folder)
-    page = (folder / "report.html").read_text()
+    page = (folder / "report.html").read_text(encoding="utf-8")
     assert f"<b>{result.put.value:.4g}</b>" in page
     assert page.count("data:image/") == 1
     assert "http" not in page

@@ -31,9 +31,9 @@ def test_the_last_step_is_that_of_the_last_row() -> None:
     assert last_step("nothing") is None
 
 
-def test_each_run_command_has_its_speed() -> None:
+def test_each_run_command_has_its_time_and_steps() -> None:
     text = (
         "Loop time of 4 on 1 procs for 100 steps with 300 atoms\n"
         "Loop time of 2.5 on 2 procs for 500 steps with 300 atoms\n"
     )
-    assert [loop.steps_per_s for loop in loops(text)] == [25.0, 200.0]
+    assert [(loop.wall_time_s, loop.steps) for loop in loops(text)] == [(4.0, 100), (2.5, 500)]

@@ -2,7 +2,6 @@
 
 import math
 import os
-import runpy
 import shutil
 import subprocess
 import time
@@ -16,13 +15,14 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from trimesh import Trimesh
 
-from dragdeck import mesh as m
 from dragdeck.errors import InputError
+from dragdeck.mesh import checks, files, shapes
+from dragdeck.mesh import surface as surfaces
 
 MESHES = Path(__file__).parents[3] / "meshes"
-SCENE = m.Surroundings(bowl_radius_m=0.04, particle_radius_m=0.00202)
+SCENE = checks.Surroundings(bowl_radius_m=0.04, particle_radius_m=0.00202)
 
-TETRAHEDRON = m.surface(
+TETRAHEDRON = surfaces.surface(
     points=np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]) * 0.01,
     triangles=np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]),
 )
@@ -32,11 +32,11 @@ def needle(tip_deg: float) -> Trimesh:
     """A closed body with a facet whose sharpest angle is the given one."""
     half = 0.02 * math.tan(math.radians(tip_deg) / 2)
     points = [[0, 0, 0], [0.02, -half, 0], [0.02, half, 0], [0.01, 0, 0.01]]
-    return m.surface(np.array(points), TETRAHEDRON.faces)
+    return surfaces.surface(np.array(points), TETRAHEDRON.faces)
 
 
 def with_facets(*facets: list[int]) -> Trimesh:
-    return m.surface(TETRAHEDRON.vertices, np.array(facets))
+    return surfaces.surface(TETRAHEDRON.vertices, np.array(facets))
 
 
 def lengths(mesh: Trimesh) -> np.ndarray:
@@ -45,7 +45,7 @@ def lengths(mesh: Trimesh) -> np.ndarray:
 
 
 def problems(mesh: Trimesh, **options: object) -> list[str]:
-    return [finding.problem for finding in m.findings(mesh, **options)]  # type: ignore[arg-type]
+    return [finding.problem for finding in checks.findings(mesh, **options)]  # type: ignore[arg-type]
 
 
 # --- the properties of a mesh -------------------------------------------------
@@ -66,7 +66,7 @@ def test_tetrahedron_by_hand():
 
 def test_bounds_ignore_nodes_that_no_facet_uses():
     points = np.vstack([TETRAHEDRON.vertices, [9.0, 9.0, 9.0]])
-    assert m.surface(points, TETRAHEDRON.faces).bounds.max() == 0.01
+    assert surfaces.surface(points, TETRAHEDRON.faces).bounds.max() == 0.01
 
 
 def test_a_facet_cannot_name_a_node_that_is_not_there():
@@ -80,9 +80,9 @@ def test_a_facet_cannot_name_a_node_that_is_not_there():
 @pytest.mark.parametrize("facet_size_m", [0.0005, 0.001, 0.0025, 0.005])
 def test_cylinder_against_the_formulas(facet_size_m: float):
     radius, length = 0.005, 0.08
-    workpiece = m.cylinder(radius, length, facet_size_m)
-    sides = m.polygon_sides(radius, facet_size_m)
-    corner = m.polygon_radius(radius, sides)
+    workpiece = shapes.cylinder(radius, length, facet_size_m)
+    sides = shapes.polygon_sides(radius, facet_size_m)
+    corner = shapes.polygon_radius(radius, sides)
     section = sides / 2 * corner**2 * math.sin(math.tau / sides)
     assert workpiece.is_watertight
     assert workpiece.volume == pytest.approx(section * length, rel=1e-12)
@@ -92,10 +92,10 @@ def test_cylinder_against_the_formulas(facet_size_m: float):
     )
     assert workpiece.area_faces[~on_side].sum() == pytest.approx(2 * section, rel=1e-12)
     assert workpiece.bounds[:, 2].tolist() == [0.0, length]
-    assert m.place(workpiece).vertices == pytest.approx(workpiece.vertices, abs=1e-15)
-    assert m.envelope(workpiece).radius_m == pytest.approx(corner)
-    assert m.cylinder_radius(radius, length, facet_size_m) == m.envelope(workpiece).radius_m
-    assert m.findings(workpiece, surroundings=SCENE) == []
+    assert surfaces.place(workpiece).vertices == pytest.approx(workpiece.vertices, abs=1e-15)
+    assert surfaces.outer_radius(workpiece) == pytest.approx(corner)
+    assert shapes.cylinder_radius(radius, length, facet_size_m) == surfaces.outer_radius(workpiece)
+    assert checks.findings(workpiece, surroundings=SCENE) == []
 
 
 @settings(max_examples=40)
@@ -108,22 +108,22 @@ def test_every_cylinder_is_a_body_of_shapely_facets(
     radius: float, slenderness: float, refinement: float
 ):
     length, facet = radius * slenderness, radius / refinement
-    workpiece = m.cylinder(radius, length, facet)
+    workpiece = shapes.cylinder(radius, length, facet)
     assert workpiece.is_watertight
     assert workpiece.is_winding_consistent
     assert workpiece.volume > 0
-    assert m.findings(workpiece) == []
+    assert checks.findings(workpiece) == []
     assert math.degrees(workpiece.face_angles.min()) > 15
     on_side = np.abs(workpiece.face_normals[:, 2]) < 0.5
     legs = np.sort(lengths(workpiece)[on_side], axis=1)[:, :2]
-    sides = m.polygon_sides(radius, facet)
+    sides = shapes.polygon_sides(radius, facet)
     assert legs.max() <= max(facet, math.tau * radius / sides) * (1 + 1e-9)
 
 
 @settings(deadline=None)
 @given(radius=st.floats(1e-3, 1.0), sides=st.integers(8, 400), heading=st.floats(0, math.tau))
 def test_the_polygon_is_on_average_as_wide_as_the_circle(radius: float, sides: int, heading: float):
-    corner = m.polygon_radius(radius, sides)
+    corner = shapes.polygon_radius(radius, sides)
     angles = math.tau * np.arange(sides) / sides
     turns = heading + np.linspace(0, math.tau / sides, 2001)[:-1]
     across = corner * np.cos(angles[:, None] - turns)
@@ -132,7 +132,7 @@ def test_the_polygon_is_on_average_as_wide_as_the_circle(radius: float, sides: i
 
 
 def test_bowl_holds_the_round_bowl_and_opens_upwards():
-    bowl = m.bowl(0.04, 0.08, 0.005)
+    bowl = shapes.bowl(0.04, 0.08, 0.005)
     assert not bowl.is_watertight
     assert bowl.is_winding_consistent
     assert problems(bowl, workpiece=False) == []
@@ -149,7 +149,7 @@ def test_bowl_holds_the_round_bowl_and_opens_upwards():
 
 @given(st.tuples(*[st.floats(-1, 1)] * 3))
 def test_place_undoes_any_shift(shift: tuple[float, float, float]):
-    moved = m.place(m.surface(TETRAHEDRON.vertices + shift, TETRAHEDRON.faces))
+    moved = surfaces.place(surfaces.surface(TETRAHEDRON.vertices + shift, TETRAHEDRON.faces))
     assert moved.bounds == pytest.approx(
         np.array([[-0.005, -0.005, 0], [0.005, 0.005, 0.01]]), abs=1e-12
     )
@@ -159,22 +159,22 @@ def test_place_undoes_any_shift(shift: tuple[float, float, float]):
 def test_upright_turns_an_axis_up_and_mirrors_nothing(axis: str):
     up = np.zeros(3)
     up["xyz".index(axis[1])] = 1.0 if axis[0] == "+" else -1.0
-    skew = m.surface(TETRAHEDRON.vertices * [1, 2, 3], TETRAHEDRON.faces)
-    stood = m.upright(skew, axis)
+    skew = surfaces.surface(TETRAHEDRON.vertices * [1, 2, 3], TETRAHEDRON.faces)
+    stood = surfaces.upright(skew, axis)
     assert stood.vertices[:, 2].tolist() == (skew.vertices @ up).tolist()
     assert stood.volume == pytest.approx(skew.volume)
     assert np.sort(stood.edges_unique_length) == pytest.approx(np.sort(skew.edges_unique_length))
 
 
 def test_an_upright_mesh_is_left_to_the_last_bit():
-    rod = m.cylinder(0.005, 0.02, 0.0025)
-    assert (m.upright(rod, "+z").vertices == rod.vertices).all()
+    rod = shapes.cylinder(0.005, 0.02, 0.0025)
+    assert (surfaces.upright(rod, "+z").vertices == rod.vertices).all()
 
 
 def test_place_puts_the_clamping_axis_in_the_origin():
-    low = m.place(TETRAHEDRON, (0.002, -0.003)).bounds[0]
+    low = surfaces.place(TETRAHEDRON, (0.002, -0.003)).bounds[0]
     assert low == pytest.approx([-0.002, 0.003, 0.0])
-    assert m.place(TETRAHEDRON, (0.0, 0.0)).bounds[0] == pytest.approx([0, 0, 0])
+    assert surfaces.place(TETRAHEDRON, (0.0, 0.0)).bounds[0] == pytest.approx([0, 0, 0])
 
 
 def test_nodes_that_are_there_twice_are_merged_with_a_word(tmp_path: Path):
@@ -182,26 +182,28 @@ def test_nodes_that_are_there_twice_are_merged_with_a_word(tmp_path: Path):
     loose.cells[0].data = np.arange(12).reshape(4, 3)
     for name, said in (("body.obj", 1), ("body.ply", 1), ("body.vtk", 1), ("body.stl", 0)):
         loose.write(tmp_path / name)
-        found = m.check(m.read(tmp_path / name, "m"))
+        found = checks.check(files.read(tmp_path / name, "m"))
         assert [one.problem for one in found] == said * ["nodes are duplicated"]
         assert not said or found[0].value.startswith("8 merged, 4 remain")
 
 
 def test_weld_joins_nodes_within_the_precision_only():
-    loose = m.surface(TETRAHEDRON.triangles.reshape(-1, 3), np.arange(12))
+    loose = surfaces.surface(TETRAHEDRON.triangles.reshape(-1, 3), np.arange(12))
     noise = np.random.default_rng(1).uniform(-2e-9, 2e-9, (12, 3))
-    rough = m.surface(loose.vertices + noise, loose.faces)
+    rough = surfaces.surface(loose.vertices + noise, loose.faces)
     assert not loose.is_watertight
-    assert len(m.weld(rough).vertices) == 4
-    assert m.weld(rough).is_watertight
-    assert not m.weld(m.surface(loose.vertices + 100 * noise, loose.faces)).is_watertight
+    assert len(surfaces.weld(rough).vertices) == 4
+    assert surfaces.weld(rough).is_watertight
+    assert not surfaces.weld(
+        surfaces.surface(loose.vertices + 100 * noise, loose.faces)
+    ).is_watertight
 
 
 # --- checks -----------------------------------------------------------------------
 
 
 def test_empty_mesh():
-    assert problems(m.surface(np.empty((0, 3)), np.empty((0, 3)))) == ["the mesh is empty"]
+    assert problems(surfaces.surface(np.empty((0, 3)), np.empty((0, 3)))) == ["the mesh is empty"]
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -1e160])
@@ -209,13 +211,13 @@ def test_empty_mesh():
 def test_coordinate_that_is_no_length(value: float):
     points = TETRAHEDRON.vertices.copy()
     points[3, 1] = value
-    mesh = m.upright(m.weld(m.surface(points, TETRAHEDRON.faces)), "+y")
+    mesh = surfaces.upright(surfaces.weld(surfaces.surface(points, TETRAHEDRON.faces)), "+y")
     assert problems(mesh) == ["a coordinate is not a length"]
 
 
 def test_degenerate_facets():
     assert "a facet has no area" in problems(with_facets([0, 1, 1]), workpiece=False)
-    flat = m.surface(np.array([[0, 0, 0], [0.01, 0, 0], [0.02, 1e-9, 0]]), [[0, 1, 2]])
+    flat = surfaces.surface(np.array([[0, 0, 0], [0.01, 0, 0], [0.02, 1e-9, 0]]), [[0, 1, 2]])
     assert "a facet has no area" in problems(flat, workpiece=False)
 
 
@@ -227,7 +229,7 @@ def test_duplicate_facet_whichever_way_it_runs():
 
 def test_open_box():
     with pytest.raises(InputError, match="not closed") as caught:
-        m.check(
+        checks.check(
             with_facets([0, 2, 1], [0, 1, 3], [1, 2, 3]), file="box.stl", field="workpiece.mesh"
         )
     assert str(caught.value).startswith("box.stl: workpiece.mesh: ")
@@ -235,22 +237,22 @@ def test_open_box():
 
 
 def test_an_open_surface_is_fine_where_no_body_is_needed():
-    assert m.check(with_facets([0, 2, 1], [0, 1, 3], [1, 2, 3]), workpiece=False) == []
+    assert checks.check(with_facets([0, 2, 1], [0, 1, 3], [1, 2, 3]), workpiece=False) == []
 
 
 def turned(mesh: Trimesh, which: list[int]) -> Trimesh:
     """The same surface with the corners of some facets in the other order."""
     faces = mesh.faces.copy()
     faces[which] = faces[which, ::-1]
-    return m.surface(mesh.vertices, faces)
+    return surfaces.surface(mesh.vertices, faces)
 
 
 @pytest.mark.parametrize("which", [[0], [0, 2], [0, 1, 2, 3]])
 def test_turned_normals_are_said_and_turned_outwards(which: list[int]):
     body = turned(TETRAHEDRON, which)
-    (finding,) = m.check(body)
+    (finding,) = checks.check(body)
     assert (finding.severity, finding.problem[:11]) == ("warning", "the normals")
-    repaired = m.facing_out(body)
+    repaired = surfaces.facing_out(body)
     assert repaired is not None
     assert problems(repaired) == []
     assert repaired.volume == pytest.approx(TETRAHEDRON.volume)
@@ -259,14 +261,14 @@ def test_turned_normals_are_said_and_turned_outwards(which: list[int]):
 @settings(max_examples=20)
 @given(st.sets(st.integers(0, 203)))
 def test_whichever_facets_are_turned_the_same_body_comes_back(which: set[int]):
-    bar = m.prism(6, 0.005, 0.08, 0.005, 0.005)
-    repaired = m.facing_out(turned(bar, sorted(which)))
+    bar = shapes.prism(6, 0.005, 0.08, 0.005, 0.005)
+    repaired = surfaces.facing_out(turned(bar, sorted(which)))
     assert repaired is not None
     assert repaired.face_normals == pytest.approx(bar.face_normals)
 
 
 def test_a_body_whose_normals_are_right_is_left_as_it_is():
-    assert m.facing_out(TETRAHEDRON) is TETRAHEDRON
+    assert surfaces.facing_out(TETRAHEDRON) is TETRAHEDRON
 
 
 def klein_bottle(rows: int = 8) -> Trimesh:
@@ -280,21 +282,21 @@ def klein_bottle(rows: int = 8) -> Trimesh:
     node = np.vstack([node, mirrored])
     a, b, c, d = node[:-1], node[1:], np.roll(node[1:], -1, 1), np.roll(node[:-1], -1, 1)
     faces = np.stack([np.stack([a, b, c], -1), np.stack([a, c, d], -1)]).reshape(-1, 3)
-    return m.surface(0.01 * np.stack(points, -1).reshape(-1, 3), faces)
+    return surfaces.surface(0.01 * np.stack(points, -1).reshape(-1, 3), faces)
 
 
 def test_a_surface_with_one_side_is_refused():
-    assert m.facing_out(klein_bottle()) is None
+    assert surfaces.facing_out(klein_bottle()) is None
     assert "the surface has one side only" in problems(klein_bottle())
 
 
 def beside(*meshes: Trimesh) -> Trimesh:
     """Several surfaces in one mesh, side by side."""
     shifted = [
-        m.surface(mesh.vertices + np.array([0.02 * number, 0, 0]), mesh.faces)
+        surfaces.surface(mesh.vertices + np.array([0.02 * number, 0, 0]), mesh.faces)
         for number, mesh in enumerate(meshes)
     ]
-    return m.surface(
+    return surfaces.surface(
         np.vstack([mesh.vertices for mesh in shifted]),
         np.vstack([mesh.faces + 4 * number for number, mesh in enumerate(shifted)]),
     )
@@ -302,13 +304,13 @@ def beside(*meshes: Trimesh) -> Trimesh:
 
 def test_several_bodies_are_refused():
     with pytest.raises(InputError, match="several bodies") as caught:
-        m.check(beside(TETRAHEDRON, TETRAHEDRON))
+        checks.check(beside(TETRAHEDRON, TETRAHEDRON))
     assert str(caught.value.value).startswith("2 bodies; the largest has 4 of 8 facets")
 
 
 def test_a_hollow_body_is_refused():
-    void = m.surface(0.1 * TETRAHEDRON.vertices + 0.001, TETRAHEDRON.faces[:, ::-1])
-    hollow = m.surface(
+    void = surfaces.surface(0.1 * TETRAHEDRON.vertices + 0.001, TETRAHEDRON.faces[:, ::-1])
+    hollow = surfaces.surface(
         np.vstack([TETRAHEDRON.vertices, void.vertices]),
         np.vstack([TETRAHEDRON.faces, void.faces + 4]),
     )
@@ -317,7 +319,7 @@ def test_a_hollow_body_is_refused():
 
 def test_sharp_angles():
     assert problems(needle(0.6)) == []
-    assert [f.severity for f in m.findings(needle(0.3))] == ["warning"]
+    assert [f.severity for f in checks.findings(needle(0.3))] == ["warning"]
     assert "the angle of a facet is too sharp for LIGGGHTS" in problems(needle(0.2))
 
 
@@ -325,7 +327,7 @@ def fan(blades: int) -> Trimesh:
     angle = math.tau * np.arange(blades) / blades
     tips = np.column_stack([np.cos(angle), np.sin(angle), np.full(blades, 0.5)])
     points = np.vstack([[0, 0, 0], [0, 0, 1], tips]) * 0.01
-    return m.surface(points, [[0, 1, 2 + blade] for blade in range(blades)])
+    return surfaces.surface(points, [[0, 1, 2 + blade] for blade in range(blades)])
 
 
 def test_neighbours_at_one_edge():
@@ -336,14 +338,14 @@ def test_neighbours_at_one_edge():
 
 def folded() -> Trimesh:
     points = np.array([[0, 0, 0], [1, 0, 0], [0.5, 1, 0], [0.6, 0.5, 0]]) * 0.01
-    return m.surface(points, [[0, 1, 2], [0, 1, 3]])
+    return surfaces.surface(points, [[0, 1, 2], [0, 1, 3]])
 
 
 def test_coplanar_facets_on_top_of_each_other():
     assert problems(folded(), workpiece=False) == [
         "two facets of one plane lie on top of each other"
     ]
-    flat = m.surface(folded().vertices * [1, -1, 1], [[1, 0, 2]])
+    flat = surfaces.surface(folded().vertices * [1, -1, 1], [[1, 0, 2]])
     assert problems(flat, workpiece=False) == []
 
 
@@ -355,10 +357,10 @@ def test_coplanar_facets_on_top_of_each_other():
     ],
 )
 def test_wrong_unit_is_named(factor: float, remedy: str):
-    workpiece = m.cylinder(0.005, 0.08, 0.005)
-    wrong = m.surface(workpiece.vertices * factor, workpiece.faces)
+    workpiece = shapes.cylinder(0.005, 0.08, 0.005)
+    wrong = surfaces.surface(workpiece.vertices * factor, workpiece.faces)
     with pytest.raises(InputError) as caught:
-        m.check(wrong, surroundings=SCENE)
+        checks.check(wrong, surroundings=SCENE)
     assert remedy in str(caught.value.remedy)
 
 
@@ -377,10 +379,10 @@ def test_wrong_unit_is_named(factor: float, remedy: str):
     ],
 )
 def test_formats_come_back_in_metres(tmp_path: Path, name: str, options: dict[str, object]):
-    workpiece = m.cylinder(0.005, 0.02, 0.0025)
+    workpiece = shapes.cylinder(0.005, 0.02, 0.0025)
     cells = [("triangle", workpiece.faces.astype(np.int32))]
     meshio.Mesh(workpiece.vertices * 1e3, cells).write(tmp_path / name, **options)
-    again = m.read(tmp_path / name, "mm")
+    again = files.read(tmp_path / name, "mm")
     assert len(again.faces) == len(workpiece.faces)
     assert again.is_watertight
     assert again.volume == pytest.approx(workpiece.volume, rel=1e-6)
@@ -392,7 +394,7 @@ def test_vtk_polygon_data_is_refused_with_a_way_out(tmp_path: Path):
 
     pyvista.Cylinder().save(tmp_path / "body.vtk")
     with pytest.raises(InputError) as caught:
-        m.read(tmp_path / "body.vtk", "mm")
+        files.read(tmp_path / "body.vtk", "mm")
     assert "POLYDATA" in str(caught.value.value)
     assert "unstructured grid" in str(caught.value.remedy)
 
@@ -418,20 +420,20 @@ def test_a_file_that_is_no_mesh_is_refused(tmp_path: Path, name: str, content: b
     path = tmp_path / name
     path.write_bytes(content)
     with pytest.raises(InputError, match=problem) as caught:
-        m.check(m.read(path, "mm"), file=path)
+        checks.check(files.read(path, "mm"), file=path)
     assert caught.value.file == path
     assert caught.value.remedy
 
 
 def test_a_missing_file_and_what_cannot_be_a_length_are_refused(tmp_path: Path):
     with pytest.raises(InputError, match="no such mesh file"):
-        m.read(tmp_path / "none.stl", "mm")
+        files.read(tmp_path / "none.stl", "mm")
     with pytest.raises(InputError, match="unknown length unit") as caught:
-        m.read(tmp_path / "none.stl", "furlong")
+        files.read(tmp_path / "none.stl", "furlong")
     assert "mm" in str(caught.value.limit)
     for facet_size_m in (0.006, 1e-6):  # too coarse, and too many
         with pytest.raises(InputError) as caught:
-            m.cylinder(0.005, 0.08, facet_size_m)
+            shapes.cylinder(0.005, 0.08, facet_size_m)
         assert caught.value.field == "facet_size_m"
         assert caught.value.remedy
 
@@ -448,30 +450,30 @@ def test_a_file_cut_short_never_passes(
     content = whole.read_bytes()
     cut.write_bytes(content[: int(part * len(content))])
     with pytest.raises(InputError):
-        m.check(m.read(cut, "m"))
+        checks.check(files.read(cut, "m"))
 
 
 def test_binary_stl_whose_header_says_solid(tmp_path: Path):
     path = tmp_path / "cad.stl"
     meshio.Mesh(TETRAHEDRON.vertices, [("triangle", TETRAHEDRON.faces)]).write(path, binary=True)
     path.write_bytes(b"solid by some CAD".ljust(80) + path.read_bytes()[80:])
-    assert m.read(path, "m").is_watertight
+    assert files.read(path, "m").is_watertight
 
 
 def test_quadrilaterals_are_cut_along_the_shorter_diagonal(tmp_path: Path):
     path = tmp_path / "kite.obj"
     path.write_text("v 0 -1 0\nv 3 0 0\nv 0 1 0\nv -3 0 0\nf 1 2 3 4\nf 2 3 4 1\n")
-    kite = m.read(path, "m")
+    kite = files.read(path, "m")
     longest = lengths(kite).max()
     assert len(kite.faces) == 4
     assert longest == pytest.approx(math.sqrt(10))
 
 
 def test_words_in_capitals_and_names_of_solids_are_no_trouble(tmp_path: Path):
-    m.write_stl(TETRAHEDRON, tmp_path / "body.stl")
+    (tmp_path / "body.stl").write_text(files.stl_text(TETRAHEDRON))
     text = (tmp_path / "body.stl").read_text().replace("solid mesh", "solid vertex facet 1 2 3")
     (tmp_path / "body.stl").write_text(text.upper())
-    assert m.read(tmp_path / "body.stl", "m").volume == pytest.approx(TETRAHEDRON.volume)
+    assert files.read(tmp_path / "body.stl", "m").volume == pytest.approx(TETRAHEDRON.volume)
 
 
 def test_a_fine_workpiece_is_checked_in_seconds(tmp_path: Path):
@@ -484,43 +486,24 @@ def test_a_fine_workpiece_is_checked_in_seconds(tmp_path: Path):
     faces = [np.column_stack(rows) for rows in (
         (beside, ring, np.full(fan, fan)), (ring, beside, np.full(fan, fan + 1))
     )]  # fmt: skip
-    m.write_stl(m.surface(points, np.vstack(faces)), tmp_path / "fan.stl")
+    (tmp_path / "fan.stl").write_text(files.stl_text(surfaces.surface(points, np.vstack(faces))))
     begun = time.process_time()
-    read = m.read(tmp_path / "fan.stl", "m")
+    read = files.read(tmp_path / "fan.stl", "m")
     assert len(read.vertices) == fan + 2
     assert "the angle of a facet is too sharp for LIGGGHTS" in problems(read)
     assert time.process_time() - begun < 10.0
 
 
-def test_write_stl_is_exact_deterministic_and_replaces(tmp_path: Path):
+def test_the_text_of_a_mesh_is_exact_and_always_the_same(tmp_path: Path):
     path = tmp_path / "workpiece.stl"
-    path.write_text("old")
-    workpiece = m.cylinder(0.005, 0.08, 0.0025)
-    m.write_stl(workpiece, path)
-    first = path.read_bytes()
-    m.write_stl(m.cylinder(0.005, 0.08, 0.0025), path)
-    assert path.read_bytes() == first
-    assert first.startswith(b"solid mesh\nfacet normal ")
-    assert b"-0 " not in first
-    assert b"\r" not in first
-    assert [file.name for file in tmp_path.iterdir()] == ["workpiece.stl"]
-    again = m.read(path, "m")
+    workpiece, other = (shapes.cylinder(0.005, 0.08, 0.0025) for _ in range(2))
+    text = files.stl_text(workpiece)
+    assert files.stl_text(other) == text
+    assert text.startswith("solid mesh\nfacet normal ") and "-0 " not in text
+    path.write_text(text)
+    again = files.read(path, "m")
     assert again.is_watertight
     assert again.triangles == pytest.approx(workpiece.triangles, abs=1e-10)
-
-
-def test_write_stl_leaves_the_old_file_if_it_fails(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    path = tmp_path / "workpiece.stl"
-    path.write_text("old")
-
-    def full_disk(*_: object) -> None:
-        raise OSError("no space left")
-
-    monkeypatch.setattr(os, "replace", full_disk)
-    with pytest.raises(OSError, match="no space"):
-        m.write_stl(TETRAHEDRON, path)
-    assert path.read_text() == "old"
-    assert [file.name for file in tmp_path.iterdir()] == ["workpiece.stl"]
 
 
 # --- the meshes that come with the project ------------------------------------------
@@ -534,8 +517,8 @@ def manifest() -> dict[str, dict[str, object]]:
 
 
 def test_every_mesh_is_in_the_manifest():
-    files = {file.name for file in MESHES.iterdir() if file.suffix not in {".yaml", ".py"}}
-    assert files - {"__pycache__"} == set(manifest())
+    names = {file.name for file in MESHES.iterdir() if file.suffix not in {".yaml", ".py"}}
+    assert names - {"__pycache__"} == set(manifest())
 
 
 @pytest.mark.parametrize("name", sorted(manifest()))
@@ -545,19 +528,14 @@ def test_the_manifest_is_true(name: str):
     if name.endswith(".step"):
         pytest.importorskip("gmsh", reason="gmsh is not made for every machine")
     sizes = [entry.get(field) for field in ("facet_size_m", "edge_facet_size_m")]
-    body = m.read(MESHES / name, unit, *sizes)  # type: ignore[arg-type]
+    body = files.read(MESHES / name, unit, *sizes)  # type: ignore[arg-type]
     assert body.is_watertight is entry["closed"]
     facets = entry["facets"]  # of STEP: with the version of gmsh in constraints.txt
     assert len(body.faces) == (facets if sizes[0] is None else pytest.approx(facets, rel=0.1))
     abs_tol = 1e-6 if sizes[0] is None else 0.02
-    assert body.bounds / m.UNITS[unit] == pytest.approx(np.array(entry["bounds"]), abs=abs_tol)
-    stood = m.upright(body, str(entry.get("axis", "+z")))
-    assert m.findings(stood, workpiece=bool(entry["closed"]), surroundings=SCENE) == []
-
-
-def test_the_generator_makes_the_file_that_is_there():
-    made = runpy.run_path(str(MESHES / "make_meshes.py"))["hex_bar"]()
-    assert made == (MESHES / "hex_bar.stl").read_text()
+    assert body.bounds / files.UNITS[unit] == pytest.approx(np.array(entry["bounds"]), abs=abs_tol)
+    stood = surfaces.upright(body, str(entry.get("axis", "+z")))
+    assert checks.findings(stood, workpiece=bool(entry["closed"]), surroundings=SCENE) == []
 
 
 # --- the engine's own opinion ---------------------------------------------------------
@@ -593,7 +571,7 @@ run 0
 def engine_reads(mesh: Trimesh, folder: Path) -> tuple[bool, str]:
     engine = os.environ.get("DRAGDECK_ENGINE") or "liggghts"
     assert shutil.which(engine), f"{engine} is missing: ./run installs it"
-    m.write_stl(mesh, folder / "workpiece.stl")
+    (folder / "workpiece.stl").write_text(files.stl_text(mesh))
     (folder / "in.liggghts").write_text(DECK)
     done = subprocess.run(
         [engine, "-in", "in.liggghts"],
@@ -609,7 +587,7 @@ def engine_reads(mesh: Trimesh, folder: Path) -> tuple[bool, str]:
 @pytest.mark.engine
 @pytest.mark.parametrize("facet_size_m", [0.0005, 0.002, 0.005])
 def test_engine_reads_every_cylinder_without_a_warning(tmp_path: Path, facet_size_m: float):
-    workpiece = m.cylinder(0.005, 0.08, facet_size_m)
+    workpiece = shapes.cylinder(0.005, 0.08, facet_size_m)
     read, output = engine_reads(workpiece, tmp_path)
     assert read, output
     assert f"containing {len(workpiece.faces)} triangle(s) successful" in output
@@ -620,7 +598,7 @@ def test_engine_reads_every_cylinder_without_a_warning(tmp_path: Path, facet_siz
 @pytest.mark.parametrize("name", ["shaft.step", "cutter.step"])
 def test_engine_reads_the_parts_without_a_warning(tmp_path: Path, name: str):
     pytest.importorskip("gmsh", reason="gmsh is not made for every machine")
-    part = m.place(m.read(MESHES / name, "mm", 0.0015, 0.0007))
+    part = surfaces.place(files.read(MESHES / name, "mm", 0.0015, 0.0007))
     read, output = engine_reads(part, tmp_path)
     assert read, output
     assert f"containing {len(part.faces)} triangle(s) successful" in output
@@ -636,12 +614,14 @@ def test_engine_reads_the_parts_without_a_warning(tmp_path: Path, name: str):
         (fan(6), True),
         (fan(7), False),
         (with_facets(*TETRAHEDRON.faces.tolist(), [0, 2, 1]), False),
-        (m.bowl(0.04, 0.08, 0.005), True),
+        (shapes.bowl(0.04, 0.08, 0.005), True),
     ],
     ids=["blunt", "sharp", "five neighbours", "six neighbours", "duplicate", "bowl"],
 )
 def test_engine_agrees_with_the_checks(tmp_path: Path, mesh: Trimesh, reads: bool):
     read, output = engine_reads(mesh, tmp_path)
-    errors = [found for found in m.findings(mesh, workpiece=False) if found.severity == "error"]
+    errors = [
+        found for found in checks.findings(mesh, workpiece=False) if found.severity == "error"
+    ]
     assert read is reads, output
     assert bool(errors) is not reads

@@ -1,7 +1,6 @@
 """CAD parts in STEP files: meshed, checked, turned and placed, or refused."""
 
 import re
-import runpy
 import signal
 import subprocess
 import sys
@@ -12,9 +11,8 @@ import numpy as np
 import pytest
 from trimesh import Trimesh
 
-from dragdeck import mesh as m
 from dragdeck.errors import InputError
-from dragdeck.mesh import step_mesher
+from dragdeck.mesh import checks, files, step_mesher
 from dragdeck.mesh.step import mesh_step
 
 gmsh = pytest.importorskip("gmsh", reason="gmsh is not made for every machine")
@@ -54,14 +52,14 @@ def longest_edge(mesh: Trimesh) -> float:
 
 @pytest.mark.parametrize("size_m", [0.0015, 0.0025])
 def test_the_facets_have_the_size_that_is_asked_for(size_m: float) -> None:
-    shaft = m.read(SHAFT, "mm", size_m)
+    shaft = files.read(SHAFT, "mm", size_m)
     assert np.median(shaft.edges_unique_length) == pytest.approx(size_m, rel=0.15)
     assert longest_edge(shaft) < 1.5 * size_m
     assert shaft.volume == pytest.approx(SHAFT_VOLUME_MM3 * 1e-9, rel=0.08)
 
 
 def test_sharp_edges_can_be_finer() -> None:
-    coarse, fine = (m.read(CUTTER, "mm", 0.002, edge) for edge in (None, 0.0007))
+    coarse, fine = (files.read(CUTTER, "mm", 0.002, edge) for edge in (None, 0.0007))
 
     def at_cutting_edges(mesh: Trimesh) -> float:
         sharp = mesh.face_adjacency_angles > np.radians(60)
@@ -74,16 +72,16 @@ def test_sharp_edges_can_be_finer() -> None:
 
 
 def test_the_same_part_gives_the_same_bytes(cube: Path) -> None:
-    first, second = (m.stl_text(m.read(cube, "mm", 0.002)) for _ in range(2))
+    first, second = (files.stl_text(files.read(cube, "mm", 0.002)) for _ in range(2))
     assert first == second
 
 
 @pytest.mark.parametrize("name", ["PART.STEP", "part.stp", "Part.Stp"])
 def test_suffixes(cube: Path, tmp_path: Path, name: str) -> None:
     (tmp_path / name).write_bytes(cube.read_bytes())
-    body = m.read(tmp_path / name, "mm", 0.005)
+    body = files.read(tmp_path / name, "mm", 0.005)
     assert body.volume == pytest.approx(1e-6)
-    assert m.findings(body) == []
+    assert checks.findings(body) == []
 
 
 def inches(text: str) -> str:
@@ -105,11 +103,11 @@ def test_the_unit_of_the_file(cube: Path, tmp_path: Path, unit: str) -> None:
     prefix = {"m": "$", "cm": ".CENTI.", "um": ".MICRO."}
     other = inches(text) if unit == "in" else text.replace(".MILLI.", prefix[unit])
     (tmp_path / "other.step").write_text(other)
-    one = m.UNITS[unit]
-    body = m.read(tmp_path / "other.step", unit, 5 * one)
+    one = files.UNITS[unit]
+    body = files.read(tmp_path / "other.step", unit, 5 * one)
     assert body.extents / one == pytest.approx([10, 10, 10], rel=1e-9)
     with pytest.raises(InputError, match="another unit") as caught:
-        m.read(tmp_path / "other.step", "mm", 5 * one)
+        files.read(tmp_path / "other.step", "mm", 5 * one)
     assert (caught.value.value, caught.value.limit) == ("mm", unit)
     assert caught.value.remedy
 
@@ -117,12 +115,12 @@ def test_the_unit_of_the_file(cube: Path, tmp_path: Path, unit: str) -> None:
 def test_an_unknown_unit_is_named(cube: Path, tmp_path: Path) -> None:
     (tmp_path / "part.step").write_text(inches(cube.read_text()).replace("'INCH'", "'FOOT'"))
     with pytest.raises(InputError, match="another unit") as caught:
-        m.read(tmp_path / "part.step", "in", 0.05)
+        files.read(tmp_path / "part.step", "in", 0.05)
     assert caught.value.limit == "FOOT"
 
 
 def test_facets_that_are_coarse_for_the_part_are_said() -> None:
-    (said,) = m.check(m.read(SHAFT, "mm", 0.006))
+    (said,) = checks.check(files.read(SHAFT, "mm", 0.006))
     assert said.problem == "the facets are coarse for this part"
     assert "facet_size_m" in said.remedy
 
@@ -151,7 +149,7 @@ def test_one_solid_is_a_workpiece(
 ) -> None:
     file = made(tmp_path / "part.step", draw)
     with pytest.raises(InputError, match=problem) as caught:
-        m.read(file, "mm", 0.002)
+        files.read(file, "mm", 0.002)
     assert (caught.value.file, caught.value.value) == (file, value)
     assert caught.value.limit and caught.value.remedy and "STL" not in caught.value.remedy
 
@@ -162,7 +160,7 @@ def test_a_cube_without_one_face_is_refused(cube: Path, tmp_path: Path) -> None:
     fewer = ",".join(faces.split(",")[1:])
     (tmp_path / "open.step").write_text(f"{start}CLOSED_SHELL('',({fewer}){rest}")
     with pytest.raises(InputError, match=r"not closed|no solid"):
-        m.check(m.read(tmp_path / "open.step", "mm", 0.005))
+        checks.check(files.read(tmp_path / "open.step", "mm", 0.005))
 
 
 @pytest.mark.parametrize("part", [0.02, 0.3, 0.6, 0.9])
@@ -170,7 +168,7 @@ def test_a_file_that_was_cut_short(cube: Path, tmp_path: Path, part: float) -> N
     content = cube.read_bytes()
     (tmp_path / "cut.step").write_bytes(content[: int(part * len(content))])
     with pytest.raises(InputError) as caught:
-        m.read(tmp_path / "cut.step", "mm", 0.005)
+        files.read(tmp_path / "cut.step", "mm", 0.005)
     assert caught.value.file == tmp_path / "cut.step"
     assert caught.value.limit and caught.value.remedy
 
@@ -181,7 +179,7 @@ def test_a_file_that_ends_the_reader_is_damage(cube: Path, tmp_path: Path) -> No
     damaged = text.replace("ADVANCED_FACE('',(#18)", "ADVANCED_FACE('',(#1)", 1)
     (tmp_path / "loop.step").write_text(damaged)
     with pytest.raises(InputError, match="STEP file is damaged") as caught:
-        m.read(tmp_path / "loop.step", "mm", 0.005)
+        files.read(tmp_path / "loop.step", "mm", 0.005)
     assert caught.value.value == f"the mesher ended with code -{int(signal.SIGSEGV)}"
 
 
@@ -189,11 +187,11 @@ def test_a_script_of_gmsh_is_not_run(tmp_path: Path) -> None:
     for name in ("part.step", "part.stp"):
         (tmp_path / name).write_text(f'SystemCall "touch {tmp_path}/ran";\n')
         with pytest.raises(InputError, match="not a STEP file"):
-            m.read(tmp_path / name, "mm", 0.002)
+            files.read(tmp_path / name, "mm", 0.002)
     script = f'ISO-10303-21;\nSystemCall "touch {tmp_path}/ran";\nBox(1) = {{0,0,0,9,9,9}};\n'
     (tmp_path / "part.step").write_text(script)
     with pytest.raises(InputError):
-        m.read(tmp_path / "part.step", "mm", 0.002)
+        files.read(tmp_path / "part.step", "mm", 0.002)
     assert not (tmp_path / "ran").exists()
 
 
@@ -202,13 +200,13 @@ def test_the_configuration_of_gmsh_is_not_read(
 ) -> None:
     (tmp_path / ".gmshrc").write_text(f'SystemCall "touch {tmp_path}/ran";\n')
     monkeypatch.setenv("HOME", str(tmp_path))
-    m.read(cube, "mm", 0.005)
+    files.read(cube, "mm", 0.005)
     assert not (tmp_path / "ran").exists()
 
 
 def test_facets_that_are_far_too_fine(cube: Path) -> None:
     with pytest.raises(InputError, match="too many facets") as caught:
-        m.read(cube, "mm", 1e-5)
+        files.read(cube, "mm", 1e-5)
     assert "facet_size_m" in str(caught.value.remedy)
 
 
@@ -216,13 +214,13 @@ def test_a_large_file_is_not_opened(cube: Path, tmp_path: Path) -> None:
     with (tmp_path / "large.step").open("wb") as stream:
         stream.truncate(60_000_000)
     with pytest.raises(InputError, match="too large") as caught:
-        m.read(tmp_path / "large.step", "mm", 0.002)
+        files.read(tmp_path / "large.step", "mm", 0.002)
     assert caught.value.value == "60 MB"
 
 
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such mesh file"):
-        m.read(tmp_path / "none.step", "mm", 0.002)
+        files.read(tmp_path / "none.step", "mm", 0.002)
 
 
 def test_without_gmsh_the_remedy_is_named(cube: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -249,30 +247,3 @@ def test_however_the_mesher_ends_the_file_is_named(
     assert caught.value.value == (
         "last line" if code == 1 else f"the mesher ended with code {code}"
     )
-
-
-# --- the parts that come with the project ----------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("name", "volume_mm3", "low_mm", "high_mm"),
-    [
-        ("shaft", SHAFT_VOLUME_MM3, (0, -6, -6), (85, 6, 6)),
-        ("cutter", 5118.9, (-5, -5, 0), (5, 5, 75)),
-    ],
-)
-def test_the_script_makes_the_parts_that_are_there(
-    tmp_path: Path,
-    name: str,
-    volume_mm3: float,
-    low_mm: tuple[float, ...],
-    high_mm: tuple[float, ...],
-) -> None:
-    again = runpy.run_path(str(MESHES / "parts.py"))["step"](name, tmp_path)
-    for file in (MESHES / f"{name}.step", again):
-        assert file.stat().st_size < 200_000
-        found = mesh_step(file, "mm", 2.0, 2.0)
-        assert found["volume"] == pytest.approx(volume_mm3, rel=1e-4)
-        points = np.array(found["points"])
-        assert points.min(axis=0) == pytest.approx(low_mm, abs=0.03)
-        assert points.max(axis=0) == pytest.approx(high_mm, abs=0.03)

@@ -46,17 +46,19 @@ TABLE = RestitutionErrors(
 
 
 @pytest.mark.parametrize(
-    ("steps", "error", "inside"),
-    [(5.0, 1e-1, True), (50.0, 1e-3, True), (math.sqrt(250.0), 1e-2, True), (2.0, 1e-1, False),
-     (500.0, 1e-3, False)],
-)  # fmt: skip
-def test_errors_are_interpolated_on_logarithmic_scales(
-    steps: float, error: float, inside: bool
-) -> None:
-    found = expected_error(steps, 0.9, TABLE)
-    assert found.value == pytest.approx(error, rel=1e-9)
-    assert found.measured is inside
-    assert expected_error(steps, 0.2, TABLE).value == pytest.approx(3 * error, rel=1e-9)
+    ("steps", "error"),
+    [(5.0, 1e-1), (50.0, 1e-3), (math.sqrt(250.0), 1e-2), (2.0, 1e-1), (500.0, 1e-3)],
+)
+def test_errors_are_interpolated_on_logarithmic_scales(steps: float, error: float) -> None:
+    assert expected_error(steps, 0.9, TABLE) == pytest.approx(error, rel=1e-9)
+    assert expected_error(steps, 0.2, TABLE) == pytest.approx(3 * error, rel=1e-9)
+
+
+def test_what_lies_outside_of_the_measured_range_is_said(case: Case) -> None:
+    for step, outside in ((1e-6, False), (1e-3, True)):
+        for pair in outlook(case, PROCESS, step):
+            assert pair.measured is not outside
+            assert ("outside the measured range" in str(pair)) is outside
 
 
 def test_the_measured_table_is_of_a_real_map() -> None:

@@ -7,6 +7,7 @@ from scipy.integrate import solve_ivp
 
 from dragdeck.physics.contact_mechanics import (
     effective_modulus,
+    effective_shear,
     fall_speed,
     hertz_contact_time,
     hertz_overlap,
@@ -38,6 +39,8 @@ def test_shear_modulus_of_an_incompressible_body_is_a_third() -> None:
 def test_effective_modulus_of_two_alike() -> None:
     alike = effective_modulus(CERAMIC, CERAMIC)
     assert alike == pytest.approx(77e9 / (2 * (1 - 0.19**2)))
+    shear = 77e9 / (4 * (2 - 0.19) * (1 + 0.19))
+    assert effective_shear(CERAMIC, CERAMIC) == pytest.approx(shear)
     rigid = Material(youngs_modulus_pa=1e20, poissons_ratio=0.3, density_kg_m3=1)
     assert effective_modulus(CERAMIC, rigid) == pytest.approx(2 * alike)
 

@@ -6,10 +6,10 @@ from typing import Any
 import pytest
 from made_study import Made
 
+from dragdeck.cases.bed import softest_scale
 from dragdeck.cases.case import Case
 from dragdeck.physics.contact_mechanics import SOLID_FRACTION_ESTIMATE
 from dragdeck.physics.rounding import rounded
-from dragdeck.physics.similarity import softest_scale
 from dragdeck.scenes.workpiece import describe
 
 

@@ -1,7 +1,6 @@
 """Motions that are superposed on the path: study fields, speeds, checks, input scripts."""
 
 import math
-import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,6 @@ import pytest
 import yaml
 from pydantic import ValidationError
 
-from dragdeck.campaigns.machine_speed import short_case
 from dragdeck.cases.bed import bed_timestep, skin
 from dragdeck.cases.case import Case
 from dragdeck.decks.render import deck_text
@@ -61,23 +59,6 @@ def test_a_study_without_them_is_as_it_was(case: Case, project: Project) -> None
     assert "superpose" not in script(case, project)
     assert not {"spin", "oscillation", "counted_from_revolution"} & set(case.study.motion.plain())
     assert "superposed_speed" not in describe(case)
-
-
-def test_spin_follows_the_path_and_starts_where_the_engine_has_the_workpiece(
-    with_motion: Callable[..., Case], project: Project
-) -> None:
-    """The path carries the centre of what is defined after it, and is unfixed last."""
-    text = script(with_motion(spin={"rpm": -300}), project)
-    names = re.findall(r"^(fix|unfix) (move_drag|superpose_\w+)", text, re.MULTILINE)
-    assert names == [
-        ("fix", "move_drag"), ("fix", "superpose_spin"),
-        ("unfix", "superpose_spin"), ("unfix", "move_drag"),
-    ]  # fmt: skip
-    assert (
-        "rotate/variable origin ${reference_x} ${reference_y} ${reference_z} axis 0. 0. 1." in text
-    )
-    rate = re.search(r"^variable spin_rate_1 equal (.*)$", text, re.MULTILINE)
-    assert rate is not None and float(rate[1]) == pytest.approx(-RATE, rel=1e-4)
 
 
 def test_every_speed_grows_by_the_speed_factor(with_motion: Callable[..., Case]) -> None:
@@ -174,19 +155,9 @@ def test_the_highest_surface_speed_counts_all_that_moves(with_motion: Callable[.
     assert surface_speed(plain, radius) == 0.02
 
 
-def test_the_short_run_for_its_speed_keeps_the_turn_per_step(
-    with_motion: Callable[..., Case],
-) -> None:
-    case = with_motion(spin={"rpm": 300}, counted_from_revolution=1)
-    short = short_case(case)
-    assert short.study.motion.spin is not None and short.study.motion.spin.rpm is not None
-    per_step = [
-        rpm
-        * bed_timestep(each.study, "timestep_fraction")
-        * each.study.chosen_fidelity().speed_factor
-        for rpm, each in ((300, case), (short.study.motion.spin.rpm, short))
-    ]
-    assert per_step[0] == pytest.approx(per_step[1])
+def test_a_drag_at_another_pace_spins_as_much_faster(with_motion: Callable[..., Case]) -> None:
+    motion = with_motion(spin={"rpm": 300}, counted_from_revolution=1).study.motion.at(2.0, 0.05)
+    assert motion.spin is not None and motion.spin.rpm == 600
 
 
 def test_a_workpiece_that_oscillates_is_as_much_longer(with_motion: Callable[..., Case]) -> None:

@@ -11,8 +11,6 @@ import numpy as np
 import pytest
 import yaml
 
-from dragdeck.campaigns.machine_speed import DRAG_STEPS, short_case
-from dragdeck.cases.bed import bed_timestep
 from dragdeck.cases.case import Case
 from dragdeck.decks.render import deck_text
 from dragdeck.decks.templates import environment
@@ -363,30 +361,6 @@ def test_a_path_that_crosses_particles_in_a_step_is_refused(made: Made) -> None:
 # --- input script and preview --------------------------------------------------------------------
 
 
-def test_the_input_script_has_a_formula_per_axis(made: Made, project: Project) -> None:
-    case = made(motion={"spin": {"rpm": 60}})
-    scene = process_scene(case, BED)
-    text, drag = deck_text(scene, environment(project.templates)), scene.case.phases[-1]
-    stages = motion_of_run(case)["stages"]
-    fixes = re.findall(r"^(fix|unfix) (move_drag|superpose_\w+)", text, re.MULTILINE)
-    assert fixes == [
-        ("fix", "move_drag"), ("fix", "superpose_spin"),
-        ("unfix", "superpose_spin"), ("unfix", "move_drag"),
-    ]  # fmt: skip
-    mover = "linear/variable v_stage_vx_1 v_stage_vy_1 v_stage_vz_1\n"
-    assert f"fix move_drag all move/mesh mesh workpiece {mover}" in text
-    ends = drag.start_step + np.cumsum([stage["steps"] for stage in stages])
-    for axis, name in enumerate("xyz"):
-        first, *others = (repr(stage["velocity_m_s"][axis]) for stage in stages)
-        formula = first + "".join(
-            f"*(step<={end})+({velocity})*(step>{end})"
-            for velocity, end in zip(others, ends, strict=False)
-        )
-        assert f"variable stage_v{name}_1 equal {formula}\n" in text
-    assert sum(stage["steps"] for stage in stages) == drag.end_step - drag.start_step
-    assert stages[2]["velocity_m_s"] == [0, 0, 0]
-
-
 def test_long_paths_take_several_formulas(made: Made, project: Project) -> None:
     """Each has the steps and values of its stages, and no line is too long for the engine."""
     points = [[n / 100, 0.01 * math.sin(n), 0.01 * math.cos(n)] for n in range(100)]
@@ -449,11 +423,8 @@ def test_a_fraction_of_the_path(made: Made) -> None:
         np.testing.assert_allclose(one["velocity_m_s"], other["velocity_m_s"], rtol=2e-4)
 
 
-def test_the_short_run_for_its_speed_is_as_short_as_others(made: Made) -> None:
-    case = made(points=[[0, 0, 0], [100, 0, 0], [101, 0.01, 0]], motion={"transient_m": 0.0})
-    short = short_case(case)
-    dt = bed_timestep(short.study, "timestep_fraction")
-    motion = short.study.motion
-    duration = motion.path_length_m / motion.axis_speed_m_s
-    factor = short.study.chosen_fidelity().speed_factor
-    assert duration / factor / dt == pytest.approx(DRAG_STEPS, rel=0.01)
+def test_a_drag_at_another_pace_and_length(made: Made) -> None:
+    own = made(points=[[0, 0, 0], [100, 0, 0], [101, 0.01, 0]], motion={"transient_m": 0.0})
+    motion = own.study.motion.at(2.0, 0.004)
+    assert motion.path_length_m == pytest.approx(0.004)
+    assert motion.axis_speed_m_s == pytest.approx(2 * own.study.motion.axis_speed_m_s)

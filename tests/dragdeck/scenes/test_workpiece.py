@@ -9,7 +9,9 @@ import pytest
 
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
-from dragdeck.mesh import prism, surface, write_stl
+from dragdeck.mesh.files import stl_text
+from dragdeck.mesh.shapes import prism
+from dragdeck.mesh.surface import surface
 from dragdeck.scenes.process import PROCESS, process_scene
 from dragdeck.scenes.workpiece import workpiece_mesh
 from dragdeck.sweep.cases import load_cases
@@ -28,7 +30,7 @@ def dragged(small: dict[str, Any], write_study: Callable[..., Path]) -> Dragged:
         bar = prism(6, 0.004, length_m, 0.004, 0.004)
         faces = np.array(bar.faces)
         faces[list(turned)] = faces[list(turned), ::-1]
-        write_stl(surface(bar.vertices, faces), file.parent / name)
+        (file.parent / name).write_text(stl_text(surface(bar.vertices, faces)))
         (only,) = load_cases(file)
         return only
 

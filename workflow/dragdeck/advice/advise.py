@@ -12,12 +12,11 @@ from itertools import chain
 
 import numpy as np
 
-from dragdeck.cases.bed import bed_timestep, full_stiffness_number, widest_skin
+from dragdeck.cases.bed import bed_timestep, full_stiffness_number, softest_scale, widest_skin
 from dragdeck.cases.case import Case, of_each_workpiece
 from dragdeck.errors import InputError
 from dragdeck.outlook.timestep import largest_fraction, stable_fraction, stable_step_cautions
 from dragdeck.physics.rounding import rounded
-from dragdeck.physics.similarity import softest_scale
 from dragdeck.records.advised import AdvisedSettings
 from dragdeck.records.tradeoff import DropEntry, TradeoffRecord, measured_tradeoff
 from dragdeck.scenes.filling import FILLING, expected_surface, expected_time, filling_cautions
@@ -328,10 +327,6 @@ def _drop_option(process: Fidelity, drop: DropEntry, fraction: float) -> Option:
     """A step of the drop test, whose error has no scatter."""
     cost = drop.relative_cost
     return Option(process, cost, cost, abs(drop.restitution_error), fraction)
-
-
-SCALE = 1e-3
-"""On the modulus of the short run; more where the engine refuses so soft a particle."""
 
 
 @dataclass(frozen=True)

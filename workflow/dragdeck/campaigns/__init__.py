@@ -1,1 +1,1 @@
-"""Sets of many small runs: calibration, speed of this machine."""
+"""Sets of many small runs: calibration."""

@@ -8,6 +8,7 @@ import numpy as np
 
 from dragdeck.errors import Caution
 from dragdeck.physics.contact_mechanics import (
+    ENGINE_SOFTEST_PA,
     bed_pressure,
     effective_modulus,
     hertz_contact_time,
@@ -162,3 +163,9 @@ def skin(study: Study) -> float:
 def widest_skin(study: Study) -> float:
     """Widest neighbour skin without a measurable cost, m (docs/evidence/costs.md)."""
     return round_to(0.3 * study.media.typical_radius_m, 3)
+
+
+def softest_scale(study: Study) -> float:
+    """The smallest modulus scale that the engine takes for a study's materials."""
+    softest = min(study.materials[name].youngs_modulus_pa for name in study.type_names())
+    return min(1.0, rounded(ENGINE_SOFTEST_PA / softest, up=True))

@@ -1,69 +1,20 @@
-"""A place in a dump, compressed or not: bytes and lines from there on, and what is wrong there."""
+"""A place in a dump: bytes and lines from there on, and what is wrong there."""
 
-import bz2
-import gzip
 import io
-import zlib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NoReturn, Self
+from typing import NoReturn, Self
 
 import numpy as np
 
 from dragdeck.dumps.frame import Layout
 from dragdeck.errors import DumpError, TruncatedDumpError
 
-CODECS = (".gz", ".bz2", ".zst", ".lz4")
-"""Last suffixes of the names of compressed files."""
-
 BUFFER_BYTES = 1 << 18
 _PIECE_BYTES = 1 << 24
-_PACKED_BYTES = 1 << 16
-"""Content that a compressed file gives at once: what follows damage of it is lost."""
-
 _LONGEST_LINE = 1 << 20
 _MOST_DIGITS = 18
 """Digits of a count or a step that fits into 64 bits, whatever they are."""
-
-
-class _Unpacked(io.RawIOBase):
-    """The content of a compressed file, which ends where the file is damaged or cut short."""
-
-    def __init__(self, file: Path) -> None:
-        self.damage: str | None = None
-        self._position = 0
-        self._stream = _opened(file)
-
-    def readable(self) -> bool:
-        return True
-
-    def tell(self) -> int:
-        return self._position
-
-    def readinto(self, buffer: Any) -> int:
-        try:
-            data = self._stream.read1(min(len(buffer), _PACKED_BYTES))
-        except (OSError, EOFError, zlib.error) as error:
-            self.damage = str(error)
-            return 0
-        buffer[: len(data)] = data
-        self._position += len(data)
-        return len(data)
-
-    def close(self) -> None:
-        self._stream.close()
-        super().close()
-
-
-def _opened(file: Path) -> Any:
-    """Open a compressed file: ``read1`` gives its content."""
-    if file.suffix == ".gz":
-        return gzip.open(file)
-    if file.suffix == ".bz2":
-        return bz2.open(file)
-    import pyarrow as pa
-
-    return pa.input_stream(str(file), compression="detect")
 
 
 class Cursor:
@@ -72,29 +23,24 @@ class Cursor:
     Parameters
     ----------
     file : Path
-        Compressed if its name ends in one of `CODECS`.
     layout : Layout
         What it holds.
     offset : int
-        Where the first frame to be read begins; not of a compressed file.
+        Where the first frame to be read begins.
 
     Attributes
     ----------
-    size : int or None
-        Length of the content in bytes; None if only reading it tells.
+    size : int
+        Length of the content in bytes.
     frame, offset : int
         Number of the frame (of the data row in a ``fix print`` file), and where it begins.
     """
 
     def __init__(self, file: Path, layout: Layout, offset: int = 0) -> None:
         self.file, self.layout, self.frame, self.offset = file, layout, 0, offset
-        packed = file.suffix in CODECS
-        self.size = None if packed else file.stat().st_size
-        self._unpacked = _Unpacked(file) if packed else None
-        raw: Any = self._unpacked or file.open("rb", buffering=0)
-        self._stream = io.BufferedReader(raw, BUFFER_BYTES)
-        if offset:
-            self._stream.seek(offset)
+        self.size = file.stat().st_size
+        self._stream = io.BufferedReader(file.open("rb", buffering=0), BUFFER_BYTES)
+        self._stream.seek(offset)
 
     def __enter__(self) -> Self:
         return self
@@ -113,9 +59,9 @@ class Cursor:
         return self._stream.tell()
 
     @property
-    def left(self) -> float:
-        """Bytes that come next; infinite if only reading them tells."""
-        return np.inf if self.size is None else self.size - self.place
+    def left(self) -> int:
+        """Bytes that come next."""
+        return self.size - self.place
 
     def frames(self) -> Iterator[int]:
         """Number of each frame that begins where the one before it ended."""
@@ -124,16 +70,10 @@ class Cursor:
             yield self.frame
             self.frame += 1
         self.offset = self.place
-        self.check_end("more frames")
 
     def next_bytes(self) -> bytes:
         """Some of the bytes that come next; none at the end."""
         return self._stream.peek(1)
-
-    def check_end(self, expected: str) -> None:
-        """Fail if the content has ended because a compressed file is damaged."""
-        if self._unpacked is not None and self._unpacked.damage is not None:
-            self.cut_short(expected)
 
     def take(self, count: int, what: str) -> bytes:
         """The next bytes; what a damaged file claims to hold is never allocated at once."""
@@ -148,10 +88,7 @@ class Cursor:
         """Go on after the next bytes."""
         if count > self.left:
             self.cut_short(what)
-        if self.size is not None:
-            self._stream.seek(self.place + count)
-        else:
-            self.take(count, what)
+        self._stream.seek(self.place + count)
 
     def lines(self, count: int) -> Iterator[bytes]:
         """The next lines in pieces of whole ones; the last line may be cut at the end."""
@@ -208,11 +145,9 @@ class Cursor:
     def cut_short(self, expected: str) -> NoReturn:
         """Say that the file ends within this frame or row."""
         thing = "row" if self.layout.kind == "print" else "frame"
-        damage = self._unpacked and self._unpacked.damage
         raise TruncatedDumpError(
             self.file,
-            f"the file ends after {self.place if self.size is None else self.size} bytes"
-            f"{f' ({damage})' if damage else ''}, inside this {thing};"
+            f"the file ends after {self.size} bytes, inside this {thing};"
             f" the {thing}s before it are intact",
             frame=self.frame,
             offset=self.offset,

@@ -188,7 +188,6 @@ def print_rows(at: Cursor, most: int = _BLOCK_ROWS) -> Iterator[PrintRows]:
         at.offset = start + end
         if end < len(text):
             at.cut_short(f"{at.width} numbers and the end of the line")
-    at.check_end("more rows")
 
 
 def _printed(at: Cursor, text: bytes) -> Iterator[PrintRows]:

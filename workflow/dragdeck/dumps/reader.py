@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dragdeck.dumps.content import CODECS, Cursor
+from dragdeck.dumps.content import Cursor
 from dragdeck.dumps.frame import Columns, Frame, Layout
 from dragdeck.dumps.grammar import frame_cells, print_rows
 from dragdeck.dumps.numbers import WrongRow, first_rows, named_columns
@@ -22,8 +22,7 @@ def read_frames(files: Iterable[Path], layout: Layout) -> Iterator[Frame]:
     Parameters
     ----------
     files : iterable of Path
-        The files, one after the other; compressed if their names end in one of
-        `dragdeck.dumps.content.CODECS`.
+        The files, one after the other.
     layout : Layout
         What they hold. A text dump may have its columns in any order, as its header says.
 
@@ -102,8 +101,7 @@ def read_dump(source: Path | str, columns: Sequence[str] | None = None) -> Itera
     ----------
     source : Path or str
         The file; or, for a dump with one file per frame, its pattern with ``*`` for the step.
-        The ending ``.bin`` marks a binary dump; an additional ``.gz``, ``.zst``, ``.bz2`` or
-        ``.lz4`` marks a compressed one.
+        The ending ``.bin`` marks a binary dump.
     columns : sequence of str, optional
         Names of the columns: required for a binary dump, in the order of its dump command; a text
         dump must contain all of them, in any order. By default those in its header.
@@ -170,8 +168,7 @@ def layout_of(file: Path, columns: Sequence[str] | None) -> DumpLayout:
     DumpError
         If it is no dump, or columns of a binary one are not given, or one comes twice.
     """
-    name = file.with_suffix("") if file.suffix in CODECS else file
-    binary = name.suffix == ".bin"
+    binary = file.suffix == ".bin"
     kind, names = ("custom", []) if binary else _header(file)
     wanted = tuple(columns or names)
     if not wanted:
@@ -190,8 +187,6 @@ def _header(file: Path) -> tuple[str, list[str]]:
     expected = "the header of a text dump of LIGGGHTS"
     with Cursor(file, DumpLayout("custom", ())) as at:
         lines = b"".join(at.lines(9)).split(b"\n")
-        if len(lines) < 10:
-            at.check_end(expected)
     words = [word.decode("ascii", "replace") for word in lines[8].split()] if lines[9:] else []
     if len(words) < 3 or words[0] != "ITEM:" or words[1] not in _KINDS:
         raise DumpError(
@@ -200,7 +195,7 @@ def _header(file: Path) -> tuple[str, list[str]]:
             frame=0,
             offset=0,
             expected=expected,
-            remedy="give a file of dump custom or dump local; the name of a binary file "
-            "must end with .bin",
+            remedy="give a file of dump custom or dump local, not compressed; the name of a binary "
+            "file must end with .bin",
         )
     return _KINDS[words[1]], words[2:]

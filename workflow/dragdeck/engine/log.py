@@ -53,11 +53,6 @@ class Loop:
     wall_time_s: float
     steps: int
 
-    @property
-    def steps_per_s(self) -> float:
-        """Speed of the command."""
-        return self.steps / self.wall_time_s
-
 
 def loops(screen: str) -> list[Loop]:
     """The ``run`` commands that ended, in order."""

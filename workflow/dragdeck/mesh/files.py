@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dragdeck.errors import InputError
-from dragdeck.files import write_text
 from dragdeck.mesh.step import mesh_step
 from dragdeck.mesh.surface import CAD_VOLUME, MERGED, Floats, Integers, surface, weld
 
@@ -196,25 +195,12 @@ def _split(quads: Integers, points: Floats) -> Integers:
     return turned[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
 
 
-def write_stl(mesh: Trimesh, path: Path | str) -> None:
-    """Write an ASCII STL file in metres, as the engine reads it.
+def stl_text(mesh: Trimesh) -> str:
+    """Return the ASCII STL text of a mesh in metres, as the engine reads it.
 
-    Nine digits keep nodes apart that the engine keeps apart. The same mesh
-    gives the same bytes, and the file appears whole or not at all.
-
-    Parameters
-    ----------
-    mesh : Trimesh
-        In metres.
-    path : Path or str
-        The file; an existing one is replaced.
+    Nine digits keep nodes apart that the engine keeps apart. The same mesh gives the same bytes.
     """
-    write_text(Path(path), stl_text(mesh))
-
-
-def stl_text(mesh: Trimesh, factor: float = 1.0) -> str:
-    """Return the ASCII STL text of a mesh, its coordinates times `factor`."""
-    corners = factor * mesh.triangles + 0.0  # + 0.0 turns -0 into 0
+    corners = mesh.triangles + 0.0  # + 0.0 turns -0 into 0
     normals = np.round(mesh.face_normals, 9) + 0.0
     facets = [
         "facet normal {:.9g} {:.9g} {:.9g}\nouter loop\n".format(*normal)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -32,8 +31,6 @@ _TURNED = {
     "-z": ((0, 1, 2), (1, -1, -1)),
 }
 """Rotations of an axis to +z, those of x about y, the others about x: old axes and their signs."""
-
-_KEY_FACTORS = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np.uint64)
 
 
 def surface(points: ArrayLike, triangles: ArrayLike) -> Trimesh:
@@ -75,7 +72,7 @@ def weld(mesh: Trimesh, precision_m: float = NODE_PRECISION_M) -> Trimesh:
     if mesh.is_empty or not are_lengths(mesh.vertices).all():
         return mesh
     used = surface(mesh.vertices[mesh.referenced_vertices], _renumbered(mesh))
-    places, same = _distinct(used.vertices)
+    places, same = np.unique(used.vertices, axis=0, return_inverse=True)
     tree = KDTree(places, compact_nodes=False, balanced_tree=False)  # made in half the time
     close = tree.query_pairs(precision_m, output_type="ndarray")
     label = connected_component_labels(close, node_count=len(places))[same]
@@ -86,21 +83,6 @@ def weld(mesh: Trimesh, precision_m: float = NODE_PRECISION_M) -> Trimesh:
 def are_lengths(coordinates: Floats) -> NDArray[np.bool_]:
     """Which coordinates are numbers with which a surface can be measured."""
     return np.abs(coordinates) <= _FARTHEST_M
-
-
-def _distinct(points: Floats) -> tuple[Floats, Integers]:
-    """Places of (N, 3) points, and for each point the row of its place, (N,).
-
-    Points of one place have one key. Those of two that share a key may come apart: what is left
-    together is joined by its distance.
-    """
-    key = (points.view(np.uint64) * _KEY_FACTORS).sum(axis=1)
-    order = np.argsort(key)
-    ordered = points[order]
-    new = np.append(True, (ordered[1:] != ordered[:-1]).any(axis=1))
-    place_of = np.empty(len(points), dtype=np.int64)
-    place_of[order] = np.cumsum(new) - 1
-    return ordered[new], place_of
 
 
 def _renumbered(mesh: Trimesh) -> Integers:
@@ -199,31 +181,10 @@ def place(mesh: Trimesh, axis_m: tuple[float, float] | None = None) -> Trimesh:
     return surface(mesh.vertices - np.array([x, y, low[2]]), mesh.faces)
 
 
-@dataclass(frozen=True)
-class Envelope:
-    """The upright cylinder around the z axis that just holds a workpiece.
+def outer_radius(mesh: Trimesh) -> float:
+    """Distance of the outermost node from the z axis, m.
 
-    Parameters
-    ----------
-    radius_m : float
-        Distance of the outermost node from the axis, in metres: how near to a
-        wall the workpiece's reference point may come, whichever way the workpiece turns.
-    bottom_m, top_m : float
-        Lowest and highest z, in metres.
+    How near to a wall a workpiece's reference point may come, whichever way the workpiece turns.
     """
-
-    radius_m: float
-    bottom_m: float
-    top_m: float
-
-    @property
-    def length_m(self) -> float:
-        """Height of the cylinder, in metres."""
-        return self.top_m - self.bottom_m
-
-
-def envelope(mesh: Trimesh) -> Envelope:
-    """Measure the cylinder around the z axis that holds the mesh where it stands."""
     used = mesh.vertices[mesh.referenced_vertices]
-    bottom, top = mesh.bounds[:, 2]
-    return Envelope(float(np.hypot(used[:, 0], used[:, 1]).max()), float(bottom), float(top))
+    return float(np.hypot(used[:, 0], used[:, 1]).max())

@@ -10,6 +10,8 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import numpy as np
+
 from dragdeck.cases.bed import full_stiffness_number, particle_material, smallest_radius
 from dragdeck.cases.case import Case
 from dragdeck.errors import Caution, InputError
@@ -22,27 +24,9 @@ from dragdeck.physics.contact_mechanics import (
 from dragdeck.physics.rounding import rounded
 from dragdeck.records.stability import RestitutionErrors, stability_map, stable_step_law
 from dragdeck.scenes.scene import Regime, SceneType, StudyScene
-from dragdeck.study.model import Study
 
 ORDINARY_RESTITUTION = 0.5
 """The map tells apart conditions below and above: strong damping needs smaller steps."""
-
-
-@dataclass(frozen=True)
-class Expected:
-    """An error read from the measured table.
-
-    Attributes
-    ----------
-    value : float
-        Largest absolute error of the restitution that was seen.
-    measured : bool
-        Whether the number of steps lies within the measured range; if not,
-        `value` is that of the range's nearest end.
-    """
-
-    value: float
-    measured: bool
 
 
 @dataclass(frozen=True)
@@ -60,7 +44,11 @@ class PairOutlook:
         Expected speed of an impact.
     steps_per_contact : float
         Elastic Hertz contact time at that speed over the time step.
-    error : Expected
+    error : float
+        Largest absolute error of the restitution that was seen.
+    measured : bool
+        Whether the number of steps lies within the measured range; if not, the error is that of the
+        range's nearest end.
     """
 
     bodies: str
@@ -68,18 +56,19 @@ class PairOutlook:
     rayleigh_fraction: float
     speed_m_s: float
     steps_per_contact: float
-    error: Expected
+    error: float
+    measured: bool
 
     def __str__(self) -> str:
-        outside = "" if self.error.measured else " (outside the measured range)"
+        outside = "" if self.measured else " (outside the measured range)"
         return (
             f"{100 * self.rayleigh_fraction:.3g} % of the Rayleigh time ({self.limiting}), "
             f"{self.steps_per_contact:.3g} steps per contact at {self.speed_m_s:.3g} m/s, "
-            f"error of restitution up to {self.error.value:.2g}{outside}"
+            f"error of restitution up to {self.error:.2g}{outside}"
         )
 
 
-def expected_error(steps: float, restitution: float, table: RestitutionErrors) -> Expected:
+def expected_error(steps: float, restitution: float, table: RestitutionErrors) -> float:
     """Error of the restitution at a number of steps per contact.
 
     Parameters
@@ -91,17 +80,12 @@ def expected_error(steps: float, restitution: float, table: RestitutionErrors) -
         Between its entries the error is interpolated on logarithmic scales.
     """
     ordinary = restitution >= ORDINARY_RESTITUTION
-    known, errors = table.steps_per_contact, table.ordinary_worst if ordinary else table.worst
-    if steps <= known[0] or steps >= known[-1]:
-        end = 0 if steps <= known[0] else -1
-        return Expected(errors[end], steps == known[end])
-    after = next(n for n, value in enumerate(known) if value > steps)
-    low, high = known[after - 1], known[after]
-    fraction = math.log(steps / low) / math.log(high / low)
-    return Expected(errors[after - 1] ** (1 - fraction) * errors[after] ** fraction, True)
+    errors = table.ordinary_worst if ordinary else table.worst
+    known = np.log(table.steps_per_contact)
+    return math.exp(np.interp(math.log(steps), known, np.log(errors)))
 
 
-def outlook(case: Case, scene: SceneType, timestep_s: float) -> list[PairOutlook]:
+def outlook(case: Case, scene: SceneType, timestep_s: float) -> Iterator[PairOutlook]:
     """Every pair of bodies that meets in a scene, unlike ones included.
 
     LIGGGHTS's own check of the time step looks at particles of one material only.
@@ -112,45 +96,30 @@ def outlook(case: Case, scene: SceneType, timestep_s: float) -> list[PairOutlook
     scene : SceneType
     timestep_s : float
     """
-    study = case.study
+    study, particle = case.study, particle_material(case.study)
     scale = 1.0 if scene.single_particle else study.chosen_fidelity().youngs_modulus_scale
     radius = study.media.typical_radius_m if scene.single_particle else smallest_radius(study)
-    speed = scene.impact_speed(case)
-    return [
-        _pair(study, other, others_radius, radius, scale, speed, timestep_s, name)
-        for name, other, others_radius in scene.partners(case)
-    ]
-
-
-def _pair(
-    study: Study,
-    other: str,
-    others_radius: float,
-    radius: float,
-    scale: float,
-    speed: float,
-    timestep_s: float,
-    name: str,
-) -> PairOutlook:
-    particle, partner = particle_material(study), study.materials[other]
-    times = {"particle": rayleigh_time(particle, radius, scale)}
-    times.setdefault(name, rayleigh_time(partner, others_radius, scale))
-    limiting = min(times, key=lambda body: times[body])
-    mass = particle_mass(particle, radius)
-    # the engine meets walls and facets as planes: half of it all for two particles
-    fraction = 0.5 if name == "particle" else 1.0
-    modulus = effective_modulus(particle, partner, scale)
-    contact = hertz_contact_time(fraction * mass, fraction * radius, modulus, speed)
-    steps = contact / timestep_s
-    pair = study.pair(study.media.main_material, other)
-    return PairOutlook(
-        bodies=f"particle on {name}",
-        limiting=limiting,
-        rayleigh_fraction=timestep_s / times[limiting],
-        speed_m_s=speed,
-        steps_per_contact=steps,
-        error=expected_error(steps, pair.restitution, stability_map().restitution_error),
-    )
+    mass, speed = particle_mass(particle, radius), scene.impact_speed(case)
+    table = stability_map().restitution_error
+    for name, other, others_radius in scene.partners(case):
+        partner = study.materials[other]
+        times = {"particle": rayleigh_time(particle, radius, scale)}
+        times.setdefault(name, rayleigh_time(partner, others_radius, scale))
+        limiting = min(times, key=lambda body: times[body])
+        # the engine meets walls and facets as planes: half of it all for two particles
+        part = 0.5 if name == "particle" else 1.0
+        modulus = effective_modulus(particle, partner, scale)
+        steps = hertz_contact_time(part * mass, part * radius, modulus, speed) / timestep_s
+        restitution = study.pair(study.media.main_material, other).restitution
+        yield PairOutlook(
+            bodies=f"particle on {name}",
+            limiting=limiting,
+            rayleigh_fraction=timestep_s / times[limiting],
+            speed_m_s=speed,
+            steps_per_contact=steps,
+            error=expected_error(steps, restitution, table),
+            measured=table.steps_per_contact[0] <= steps <= table.steps_per_contact[-1],
+        )
 
 
 def safe_fraction(case: Case, scene: SceneType) -> tuple[float, str]:

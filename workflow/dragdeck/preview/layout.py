@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dragdeck.cases.case import Case, of_each_workpiece
-from dragdeck.mesh import bowl, surface
+from dragdeck.mesh.shapes import bowl
+from dragdeck.mesh.surface import surface
 from dragdeck.scenes.filling import expected_bed
 from dragdeck.scenes.motion import Course, course, driven_surface_speed
 from dragdeck.scenes.workpiece import reference_height, workpiece_mesh, workpiece_radius

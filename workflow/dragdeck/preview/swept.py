@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dragdeck.mesh import facing_out, surface
+from dragdeck.mesh.surface import facing_out, surface
 
 if TYPE_CHECKING:
     from trimesh import Trimesh

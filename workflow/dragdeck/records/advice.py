@@ -8,35 +8,6 @@ from dragdeck.study.base import Json
 from dragdeck.study.model import Fidelity
 
 
-class Speed(Part):
-    """Speed of LIGGGHTS measured on this machine.
-
-    Attributes
-    ----------
-    filling_steps_per_s, drag_steps_per_s : float
-    particles, ranks : int
-    engine_version : str
-    """
-
-    filling_steps_per_s: float
-    drag_steps_per_s: float
-    particles: int
-    ranks: int
-    engine_version: str
-
-    def of(self, particles: int) -> "Speed":
-        """The speed with another number of particles: a step takes a time a particle."""
-        ratio = self.particles / particles
-        filling, drag = ratio * self.filling_steps_per_s, ratio * self.drag_steps_per_s
-        return Speed(
-            filling_steps_per_s=filling,
-            drag_steps_per_s=drag,
-            particles=particles,
-            ranks=self.ranks,
-            engine_version=self.engine_version,
-        )
-
-
 class SettingsOfOption(Fidelity):
     """The settings of an option, with the MPI ranks of its runs.
 
@@ -110,8 +81,6 @@ class AdviceFile(Document):
     ----------
     date : str
         Date on which it was written.
-    speed : Speed or None
-        Measured speed of LIGGGHTS on this machine.
     cases : sequence of AdvisedCase
         One entry per process run.
     """
@@ -121,5 +90,4 @@ class AdviceFile(Document):
     study: str
     date: str
     versions: Mapping[str, str | None]
-    speed: Speed | None
     cases: tuple[AdvisedCase, ...]

@@ -12,7 +12,8 @@ from dragdeck.decks.deck import LeftOut, Scene
 from dragdeck.decks.outputs import Output
 from dragdeck.errors import Caution
 from dragdeck.files import file_checksum
-from dragdeck.mesh import bowl, stl_text
+from dragdeck.mesh.files import stl_text
+from dragdeck.mesh.shapes import bowl
 from dragdeck.physics.contact_mechanics import ENGINE_NEIGHBOURS
 from dragdeck.physics.domain_split import rank_warnings
 from dragdeck.physics.packing import Bed

@@ -29,18 +29,14 @@ from dragdeck.cases.bed import (
 )
 from dragdeck.cases.case import Case, mesh_file, of_each_workpiece
 from dragdeck.errors import Caution, InputError, together
-from dragdeck.mesh import (
-    Finding,
-    Surroundings,
-    check,
-    cylinder,
-    cylinder_facets,
-    cylinder_radius,
-    envelope,
+from dragdeck.mesh.checks import Finding, Surroundings, check
+from dragdeck.mesh.files import read
+from dragdeck.mesh.shapes import cylinder, cylinder_facets, cylinder_radius
+from dragdeck.mesh.surface import (
     facing_out,
+    outer_radius,
     place,
     points_below,
-    read,
     surface,
     tilted,
     upright,
@@ -181,7 +177,8 @@ def workpiece_length(case: Case) -> float:
     """Height of the workpiece, m: its length if it is not tilted."""
     study = case.study
     if isinstance(study.workpiece.shape, MeshShape) or study.motion.tilt_deg:
-        return envelope(workpiece_mesh(case)).length_m
+        low, high = workpiece_mesh(case).bounds[:, 2]
+        return float(high - low)
     return _generated_length(case)
 
 
@@ -198,8 +195,7 @@ def workpiece_radius(case: Case) -> float:
     shape = case.study.workpiece.shape
     if isinstance(shape, CylinderShape):
         return cylinder_radius(shape.radius_m, _generated_length(case), shape.facet_size_m)
-    mesh, _ = _of_case(case, shape)
-    return envelope(mesh).radius_m
+    return outer_radius(_of_case(case, shape)[0])
 
 
 def workpiece_reach(case: Case) -> float:
