@@ -390,9 +390,11 @@ def test_formats_come_back_in_metres(tmp_path: Path, name: str, options: dict[st
 
 
 def test_vtk_polygon_data_is_refused_with_a_way_out(tmp_path: Path):
-    import pyvista
-
-    pyvista.Cylinder().save(tmp_path / "body.vtk")
+    """Written by hand: VTK's writer would leave the process with the locale C."""
+    (tmp_path / "body.vtk").write_text(
+        "# vtk DataFile Version 3.0\nbody\nASCII\nDATASET POLYDATA\nPOINTS 3 float\n"
+        "0 0 0 1 0 0 0 1 0\nPOLYGONS 1 4\n3 0 1 2\n"
+    )
     with pytest.raises(InputError) as caught:
         files.read(tmp_path / "body.vtk", "mm")
     assert "POLYDATA" in str(caught.value.value)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 from pydantic import ValidationError
 
 from dragchain import write_tables
@@ -219,3 +220,18 @@ def test_a_mixture_of_materials_and_sizes_comes_to_rest_as_asked(
     assert found == pytest.approx((100, radii.mean(), radii.std()), rel=1e-6)
     limit = case.study.filling.energy_ratio
     assert packing.kinetic_energy_ratio < 1.5 * limit
+
+
+def test_alternatives_in_a_study_replace_those_of_the_one_it_extends(
+    small: Small, write_study: Write
+) -> None:
+    file = write_study(small)
+    other = file.parent.with_name("other") / "study.yaml"
+    other.parent.mkdir()
+    for media in ({"mass_kg": 0.1}, {"classes": MIXTURE}, {"sieve": SIEVE, "fill_height_m": 0.02}):
+        own = {"extends": file.parent.name, "media": media}
+        pairs = {"pairs": {"steel-steel": PAIR}} if "classes" in media else {}
+        other.write_text(yaml.safe_dump(own | pairs))
+        (case,) = load_cases(other)
+        assert set(media) <= set(case.study.media.plain())
+        assert ("count" in case.study.media.plain()) == ("classes" in media)

@@ -129,7 +129,7 @@ def _added_forces(text: str) -> list[str]:
 
 def of_its_law(scene: AnyScene, templates: jinja2.Environment) -> dict[str, tuple[str, ...]]:
     """What ``case.json`` says of the contact law in the deck of a scene."""
-    text, original = _rendered(scene, templates), _rendered(scene, without(templates))
+    text, original = deck_text(scene, templates), _rendered(scene, without(templates))
     known = law_commands(original)
     changed = tuple(command for command in law_commands(text) if command not in known)
     known = _added_forces(original)  # each has its formula in dragdeck.study.contact_law

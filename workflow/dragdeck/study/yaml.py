@@ -171,16 +171,30 @@ _WHOLE = ("fidelity", "sweep")
 """Blocks that a study takes or replaces as a whole."""
 
 
+_SIZES = ("radius_mean_m", "radius_std_m", "distribution")
+_INSTEAD_OF = {
+    "count": ("mass_kg", "fill_height_m"),
+    "mass_kg": ("count", "fill_height_m"),
+    "fill_height_m": ("count", "mass_kg"),
+    "radius_mean_m": ("sieve", "classes"),
+    "sieve": (*_SIZES, "classes"),
+    "classes": (*_SIZES, "material", "sieve"),
+}
+"""Fields of the media that others of the base give way to."""
+
+
 def _merged(base: Json, own: Json, top: bool = True) -> dict[str, JsonValue]:
     """A study's content with another's changes.
 
     A part of another `kind` is replaced, and ``null`` leaves out a part of the base. A ``null``
-    with nothing to leave out stays: only fields that may be empty accept it.
+    with nothing to leave out stays: only fields that may be empty accept it. Alternatives of the
+    media give way to each other.
     """
-    found = dict(base)
+    replaced = {name for key in own for name in _INSTEAD_OF.get(key, ())}
+    found = {key: value for key, value in base.items() if key not in replaced}
     for key, value in own.items():
-        there = base.get(key)
-        if value is None and key in base:
+        there = found.get(key)
+        if value is None and key in found:
             del found[key]
         elif isinstance(value, dict) and not (top and key in _WHOLE):
             if not isinstance(there, dict) or value.get("kind") not in (None, there.get("kind")):
