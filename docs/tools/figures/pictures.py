@@ -14,8 +14,8 @@ from records import ROOT
 
 from dragdeck.errors import DragdeckError
 
-STUDY = "half_minute"
-"""Its results are needed: ``./run all --config study=half_minute``."""
+STUDY = "quickstart"
+"""Its results are needed: ``./run all --config study=quickstart``."""
 
 
 def _network_page(run: Path) -> bytes:
