@@ -20,6 +20,7 @@ from dragdeck.campaigns.restitution_drops import confirmation, run_drops, sweep
 from dragdeck.cases.case import Case
 from dragdeck.cases.ranks import check_ranks, cores_here
 from dragdeck.decks.render import (
+    deck_text,
     effective,
     idle,
     of_its_law,
@@ -116,7 +117,8 @@ class _Findings:
         case = next(iter(runs.values()))
         try:
             scene = _built(kind, case, None)
-            unknown = _friction_unknown(scene, self.templates)
+            script = deck_text(scene, self.templates)
+            unknown = _friction_unknown(script, scene, self.templates)
         except InputError as error:
             self.errors.append(error)
             raise
@@ -143,9 +145,9 @@ class _Findings:
             print(f"{_first(names)}\n  {text}")
 
 
-def _friction_unknown(scene: StudyScene, templates: jinja2.Environment) -> list[str]:
+def _friction_unknown(script: str, scene: StudyScene, templates: jinja2.Environment) -> list[str]:
     """A warning that contacts of a run cannot be analysed, if a template adds a force."""
-    added = of_its_law(scene, templates)["added_forces"]
+    added = of_its_law(script, scene, templates)["added_forces"]
     if not added:
         return []
     return [
@@ -345,7 +347,8 @@ def render(
     templates = environment(project.templates, study_templates(case))
     built = _built(kind, case, _bed(kind, packing))
     _check_overrides(built, every, templates)
-    for warning in (*built.warnings, *_friction_unknown(built, templates)):
+    script = deck_text(built, templates)
+    for warning in (*built.warnings, *_friction_unknown(script, built, templates)):
         say(f"warning: {warning}")
     folder = project.run_folder(case, kind, of_plan=plan is not None)
     if case.number > 1:

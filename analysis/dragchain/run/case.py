@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from pydantic import JsonValue
 
-from dragchain.arrays import Floats, Ints
+from dragchain.arrays import Floats
 from dragchain.errors import TableError
 from dragdeck.physics.coulomb import FrictionLimit
 from dragdeck.records.case import CaseOfRun, ClassOfRun
@@ -59,12 +59,6 @@ def friction_with(case: CaseOfRun, body: str) -> FrictionLimit:
     friction = table(lambda one, other: one.contact_moduli[other].friction)
     first_ids = tuple(one.first_id for one in case.classes)
     return FrictionLimit(friction, {name: of(name) for name in names}, wall, first_ids)
-
-
-def class_of(case: CaseOfRun, particle_id: Ints) -> Ints:
-    """Number of the class of (N,) particles in `CaseOfRun.classes`, from 0."""
-    first = [one.first_id for one in case.classes]
-    return np.searchsorted(first, particle_id, side="right") - 1
 
 
 def attracts(case: CaseOfRun) -> bool:

@@ -5,7 +5,6 @@ import pandas as pd
 
 from dragchain.arrays import Floats
 from dragchain.errors import TableError
-from dragchain.run.case import class_of
 from dragchain.run.kinematics import needed
 from dragdeck.dumps.frame import Frame
 from dragdeck.records.case import CaseOfRun
@@ -37,8 +36,7 @@ def describe_bed(particles: Frame, case: CaseOfRun) -> Packing:
     volume = 4.0 / 3.0 * np.pi * radius**3
     density: Floats | float = case.media.density_kg_m3
     if case.classes:
-        own = class_of(case, particles.ids("particle_id"))
-        density = np.array([one.density_kg_m3 for one in case.classes])[own]
+        density = case.density_of(particles.ids("particle_id"))
     mass = volume * density
     energy = 0.5 * mass * (particles.vectors("vx_m_s", "vy_m_s", "vz_m_s") ** 2).sum(axis=1)
     scale = mass.mean() * case.gravity_m_s2 * 2.0 * radius.mean()
@@ -56,9 +54,9 @@ def describe_bed(particles: Frame, case: CaseOfRun) -> Packing:
 def segregation(particles: pd.DataFrame) -> dict[str, float]:
     """How far each class of the media has risen above the others, from -1 to 1.
 
-    Mean height of the particles of a class less that of all particles, both weighted by volume,
-    over the mean height of all: 0 in a mixed bed; in a bed of two classes with equal volumes, 0.5
-    and -0.5 if one lies on top of the other.
+    Ratio of the mean height of a class to that of all particles, minus one, both weighted by
+    volume: 0 in a mixed bed; in a bed of two classes with equal volumes, 0.5 and -0.5 if one lies
+    on top of the other.
 
     Parameters
     ----------

@@ -37,7 +37,7 @@ class ContactRows:
         Normal part of the force, positive in compression; magnitude of the
         rest; overlap.
     removed_n : (N,) ndarray
-        What was cut off the tangential force as written; see `FrictionLimit`.
+        What was cut off the tangential force as written; see `within_friction`.
     """
 
     kind: NDArray[np.int8]

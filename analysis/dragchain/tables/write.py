@@ -11,7 +11,7 @@ import pyarrow as pa
 
 from dragchain.arrays import Floats, Ints
 from dragchain.errors import TableError
-from dragchain.run.case import attracts, class_of, friction_with
+from dragchain.run.case import attracts, friction_with
 from dragchain.run.kinematics import (
     counted_mask,
     directions,
@@ -331,7 +331,7 @@ def _classes(table: str, case: CaseOfRun, *particle_ids: Ints) -> dict[str, pa.A
     if not case.classes:
         return {}
     names = (*(one.name for one in case.classes), "none")
-    codes = (np.where(ids > 0, class_of(case, ids), len(names) - 1) for ids in particle_ids)
+    codes = (np.where(ids > 0, case.class_of(ids), len(names) - 1) for ids in particle_ids)
     return {
         column: category(of_column, names)
         for column, of_column in zip(CLASSES[table], codes, strict=True)

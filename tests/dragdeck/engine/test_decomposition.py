@@ -21,7 +21,7 @@ from dragdeck.project import Project
 from dragdeck.records.run import Decomposition, ParticlesPerRank
 from dragdeck.scenes.filling import filling_scene
 from dragdeck.scenes.process import PROCESS
-from dragdeck.study.media import QUANTILES
+from dragdeck.study.media import quantiles
 from dragdeck.sweep.cases import load_cases
 
 WriteStudy = Callable[..., Path]
@@ -106,7 +106,7 @@ def test_an_uneven_split_gets_a_warning() -> None:
 
 
 def test_the_expected_share_is_that_of_the_poured_particles() -> None:
-    particles = pour([QUANTILES["normal"](3e-3, 1e-4, 20000)], 0.15, seed=1)
+    particles = pour([quantiles("normal", 3e-3, 1e-4, 20000)], 0.15, seed=1)
     x, y, _ = particles.positions_m.T
     half = 0.156
     filled = FilledBowl(20000, 0.15, 0.1, half, -0.003, 0.3, 0.006)

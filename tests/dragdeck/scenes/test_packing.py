@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from dragdeck.errors import InputError
 from dragdeck.physics.packing import pour
-from dragdeck.study.media import QUANTILES
+from dragdeck.study.media import quantiles
 
 
 @given(
@@ -17,14 +17,14 @@ from dragdeck.study.media import QUANTILES
     spread=st.floats(0.001, 0.3),
 )
 def test_mean_and_spread_are_exact(count: int, mean: float, spread: float) -> None:
-    found = QUANTILES["normal"](mean, spread * mean, count)
+    found = quantiles("normal", mean, spread * mean, count)
     assert found.mean() == pytest.approx(mean, rel=1e-12)
     assert found.std() == pytest.approx(spread * mean, rel=1e-9)
     assert found.min() > 0
 
 
 def test_no_spread_means_equal_particles() -> None:
-    assert set(QUANTILES["normal"](2e-3, 0.0, 7)) == {2e-3}
+    assert set(quantiles("normal", 2e-3, 0.0, 7)) == {2e-3}
 
 
 @settings(max_examples=25)
@@ -39,7 +39,7 @@ def test_no_particle_touches_another_or_the_bowl(
 ) -> None:
     mean = 3e-3
     bowl = width * mean
-    sizes = QUANTILES["normal"](mean, spread * mean, count)
+    sizes = quantiles("normal", mean, spread * mean, count)
     if bowl < (1 + 0.2 * 2**0.5) * sizes.max():
         with pytest.raises(InputError, match="does not fit"):
             pour([sizes], bowl, seed)
@@ -56,7 +56,7 @@ def test_no_particle_touches_another_or_the_bowl(
 
 
 def test_the_seed_decides() -> None:
-    sizes = QUANTILES["normal"](3e-3, 2e-4, 50)
+    sizes = quantiles("normal", 3e-3, 2e-4, 50)
     first, again, other = (pour([sizes], 0.03, seed) for seed in (1, 1, 2))
     assert np.array_equal(first.positions_m, again.positions_m)
     assert not np.array_equal(first.positions_m, other.positions_m)

@@ -18,13 +18,14 @@ from dragdeck.decks.templates import environment
 from dragdeck.engine.log import read_samples
 from dragdeck.engine.run_folder import run
 from dragdeck.physics.contact_mechanics import effective_modulus, pull_off_force
-from dragdeck.physics.coulomb import Floats, FrictionLimit
+from dragdeck.physics.coulomb import FrictionLimit
 from dragdeck.project import Project
 from dragdeck.scenes.filling import FILLING, filling_scene
 from dragdeck.scenes.process import SCENES, process_scene
 from dragdeck.study import contact_law
 from dragdeck.study.contact_law import (
     Coefficient,
+    Floats,
     Pair,
     added_forces,
     coefficients,
@@ -83,7 +84,9 @@ def test_cohesion_of_the_study_is_no_unknown_force(
 ) -> None:
     case = with_coefficient(small, write_study, "cohesion_j_m3", USED)
     for scene in (filling_scene(case), process_scene(case)):
-        assert of_its_law(scene, environment(project.templates))["added_forces"] == ()
+        templates = environment(project.templates)
+        law = of_its_law(deck_text(scene, templates), scene, templates)
+        assert law["added_forces"] == ()
 
 
 @pytest.mark.parametrize("name", OPTIONAL)

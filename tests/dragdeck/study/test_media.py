@@ -235,3 +235,11 @@ def test_alternatives_in_a_study_replace_those_of_the_one_it_extends(
         (case,) = load_cases(other)
         assert set(media) <= set(case.study.media.plain())
         assert ("count" in case.study.media.plain()) == ("classes" in media)
+
+
+def test_a_changed_study_counts_its_own_particles(small: Small, write_study: Write) -> None:
+    (case,) = load_cases(write_study(small))
+    study = case.study
+    assert study.particle_count == 300
+    changed = study.model_copy(update={"media": study.media.model_copy(update={"count": 7})})
+    assert changed.particle_count == 7

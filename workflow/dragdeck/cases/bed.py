@@ -45,11 +45,12 @@ class BedClass:
 
 def bed_classes(study: Study) -> tuple[BedClass, ...]:
     """The particles of a study, class by class."""
-    return _classes(study.media, tuple(study.class_counts.values()))
+    return media_classes(study.media, tuple(study.class_counts.values()))
 
 
 @lru_cache(maxsize=2)
-def _classes(media: Media, counts: tuple[int, ...]) -> tuple[BedClass, ...]:
+def media_classes(media: Media, counts: tuple[int, ...]) -> tuple[BedClass, ...]:
+    """`bed_classes` of the media and the number of particles of each class alone."""
     parts = zip(media.parts.items(), counts, strict=True)
     return tuple(
         BedClass(name, str(part.material), part.radii(count)) for (name, part), count in parts
@@ -81,9 +82,10 @@ def bed_volume(study: Study) -> float:
 
 
 def bed_density(study: Study) -> float:
-    """Mass of the particles over their volume, kg/m3."""
-    volumes = [(one.radii_m**3).sum() for one in bed_classes(study)]
-    densities = [study.materials[one.material].density_kg_m3 for one in bed_classes(study)]
+    """Mean density of the particles, weighted by volume, kg/m3."""
+    classes = bed_classes(study)
+    volumes = [(one.radii_m**3).sum() for one in classes]
+    densities = [study.materials[one.material].density_kg_m3 for one in classes]
     return densities[0] if len(densities) == 1 else float(np.average(densities, weights=volumes))
 
 

@@ -11,7 +11,13 @@ from dragdeck.physics.contact_mechanics import ENGINE_HARD_PA, ENGINE_NEIGHBOURS
 from dragdeck.physics.domain_split import ENGINE_CHOOSES
 from dragdeck.physics.rounding import round_to
 from dragdeck.records.run import CaseFile
-from dragdeck.study.contact_law import Pair, contact_model, contact_settings, present
+from dragdeck.study.contact_law import (
+    Pair,
+    contact_model,
+    contact_settings,
+    present,
+    softened,
+)
 
 
 @dataclass(frozen=True)
@@ -77,8 +83,7 @@ class Materials:
         moduli = [round_to(scale * modulus, 12) for modulus in self.youngs_moduli_pa]
         tables = [
             replace(
-                table,
-                values=[round_to(scale**table.modulus_power * one, 12) for one in table.values],
+                table, values=[softened(one, table.modulus_power, scale) for one in table.values]
             )
             for table in self.law.tables
             if table.modulus_power

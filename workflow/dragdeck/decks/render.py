@@ -127,11 +127,13 @@ def _added_forces(text: str) -> list[str]:
     return list(dict.fromkeys(force for each in found for force in each))
 
 
-def of_its_law(scene: AnyScene, templates: jinja2.Environment) -> dict[str, tuple[str, ...]]:
-    """What ``case.json`` says of the contact law in the deck of a scene."""
-    text, original = deck_text(scene, templates), _rendered(scene, without(templates))
-    known = law_commands(original)
-    changed = tuple(command for command in law_commands(text) if command not in known)
+def of_its_law(
+    text: str, scene: AnyScene, templates: jinja2.Environment
+) -> dict[str, tuple[str, ...]]:
+    """What ``case.json`` says of the contact law in the deck of a scene, which is `text`."""
+    original = _rendered(scene, without(templates))
+    commands = law_commands(original)
+    changed = tuple(command for command in law_commands(text) if command not in commands)
     known = _added_forces(original)  # each has its formula in dragdeck.study.contact_law
     added = tuple(force for force in _added_forces(text) if force not in known or changed)
     return {"added_forces": added, "changed_law": changed}
@@ -159,7 +161,7 @@ def write_workpiece(
     outputs = {each.name: each.as_part() for each in scene.deck.outputs}
     forces = [outputs.pop(name) for name in list(outputs) if name.startswith(WORKPIECE_FORCE)]
     columns = ColumnsFile(outputs={**outputs, WORKPIECE_FORCE: forces[number - 1]})
-    own = of_its_law(scene, templates)
+    own = of_its_law(deck_text(scene, templates), scene, templates)
     texts = {
         CASE_FILE: scene.case.model_copy(update=own).as_text(),
         COLUMNS_FILE: columns.as_text(),
@@ -196,7 +198,7 @@ def write_run(scene: AnyScene, folder: Path, templates: jinja2.Environment) -> l
     source = folder / scene.deck.source
     if scene.deck.source not in texts and source.is_file():
         checksums[scene.deck.source] = file_checksum(source)
-    own = {"files": checksums, **of_its_law(scene, templates)}
+    own = {"files": checksums, **of_its_law(texts[DECK_FILE], scene, templates)}
     texts[CASE_FILE] = scene.case.model_copy(update=own).as_text()
     for name, text in texts.items():
         write_text(folder / name, text)

@@ -226,13 +226,11 @@ def _stability_number(case: CaseOfRun, rows: Floats) -> float:
     """That of centres, radii and ids; infinite for those of no packing."""
     if not (rows.size and np.isfinite(rows).all()):
         return math.inf
-    first = [one.first_id for one in case.classes] or [1]
-    own = np.searchsorted(first, rows[:, 4], side="right") - 1
-    densities = [one.density_kg_m3 for one in case.classes] or [case.media.density_kg_m3]
+    ids = rows[:, 4].astype(np.int64)
     bodies = [*(one.name for one in case.classes), "bowl"] if case.classes else ["particle", "bowl"]
     constants = [[one.contact_moduli[body] for body in bodies] for one in case.classes or (case,)]
-    of_case = np.array(densities)[own], case.bowl.radius_m, constants, case.timestep_s
-    return stability_number(rows[:, :3], rows[:, 3], *of_case, own)
+    of_case = case.density_of(ids), case.bowl.radius_m, constants, case.timestep_s
+    return stability_number(rows[:, :3], rows[:, 3], *of_case, case.class_of(ids))
 
 
 def ranks_check(split: Decomposition | None, ranks: int) -> AcceptanceCheck:

@@ -51,7 +51,7 @@ def effective_modulus(
 def pull_off_force(slope_n_m: float, modulus_pa: float, reduced_radius_m: float) -> float:
     """Largest tension of a contact with an attraction proportional to the overlap, N.
 
-    The attraction ``a d`` less Hertz's force ``4/3 E* sqrt(R*) d^(3/2)`` is largest at
+    The attraction ``a d`` minus Hertz's force ``4/3 E* sqrt(R*) d^(3/2)`` is largest at
     ``sqrt(d) = a / (2 E* sqrt(R*))``, where it is ``a^3 / (12 E*^2 R*)``.
     """
     return slope_n_m**3 / (12 * modulus_pa**2 * reduced_radius_m)

@@ -4,12 +4,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dragdeck.study.contact_law import coefficients
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from dragdeck.study.contact_law import Floats, coefficients
+from dragdeck.study.media import Ints, class_numbers
 
 
 @dataclass(frozen=True)
@@ -38,8 +35,7 @@ class FrictionLimit:
         """What limits (N,) contacts; the ids of the other body count if it is a particle."""
         if not self.first_ids:
             return self
-        first = np.searchsorted(self.first_ids, particle_id, side="right") - 1
-        second = np.searchsorted(self.first_ids, other_id, side="right") - 1
+        first, second = (class_numbers(ids, self.first_ids) for ids in (particle_id, other_id))
         place = first if self.wall else (first, second)
         attractive = {name: np.asarray(values)[place] for name, values in self.attractive.items()}
         return FrictionLimit(np.asarray(self.friction)[place], attractive, self.wall)

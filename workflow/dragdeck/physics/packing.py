@@ -10,11 +10,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dragdeck.errors import InputError
-
-Array = NDArray[np.float64]
+from dragdeck.study.media import Array, Ints
 
 _SPACING = 1.2
 """Lattice spacing over the largest diameter: room to jitter, and to fall."""
@@ -54,7 +52,7 @@ class Particles:
     velocities_m_s : (N, 3) array
     """
 
-    classes: NDArray[np.int64]
+    classes: Ints
     radii_m: Array
     positions_m: Array
     velocities_m_s: Array

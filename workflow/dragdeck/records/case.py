@@ -4,15 +4,17 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
 from pydantic import JsonValue, PositiveFloat, PositiveInt
 
 from dragdeck.documents import Part, omitted
 from dragdeck.errors import DocumentError, choices
-from dragdeck.physics.contact_mechanics import ContactConstants
+from dragdeck.physics.contact_mechanics import ContactConstants, Floats
 from dragdeck.physics.run_limits import RunLimits
 from dragdeck.records.advised import AdvisedSettings
 from dragdeck.records.run import CaseFile, CountOfRun, RanksOfRun, SettlingCriterion
 from dragdeck.study.drive import PathEntry, SuperposedEntry
+from dragdeck.study.media import Ints, class_numbers
 from dragdeck.study.reference import Reference
 
 
@@ -238,6 +240,15 @@ class CaseOfRun(CaseFile):
     statistics: StatisticsOfRun | None = omitted(None)
     asked: AdvisedSettings | None = omitted(None)
     restitution: float | None = omitted(None)
+
+    def class_of(self, particle_id: Ints) -> Ints:
+        """Number of the class of (N,) particles in `classes`; 0 if there are none."""
+        return class_numbers(particle_id, [one.first_id for one in self.classes])
+
+    def density_of(self, particle_id: Ints) -> Floats:
+        """Density of (N,) particles, kg/m3."""
+        densities = [one.density_kg_m3 for one in self.classes] or [self.media.density_kg_m3]
+        return np.array(densities)[self.class_of(particle_id)]
 
 
 class DropTestCase(CaseOfRun):

@@ -15,6 +15,7 @@ from dragdeck.cases.bed import (
     bed_rayleigh_time,
     bed_timestep,
     bed_volume,
+    media_classes,
     outrun,
     particle_material,
     skin,
@@ -166,8 +167,7 @@ def first_particles(study: Study) -> Particles:
 def _first_particles(
     media: Media, counts: tuple[int, ...], bowl_radius_m: float, seed: int
 ) -> Particles:
-    parts = zip(media.parts.values(), counts, strict=True)
-    return pour([part.radii(count) for part, count in parts], bowl_radius_m, seed)
+    return pour([one.radii_m for one in media_classes(media, counts)], bowl_radius_m, seed)
 
 
 def _check_capacity(case: Case) -> None:
@@ -278,7 +278,7 @@ def _overlap_caution(study: Study) -> Iterator[Caution]:
 
 
 def _cohesion_caution(study: Study) -> Iterator[Caution]:
-    """A warning where an attraction holds more than a particle's weight."""
+    """A warning where the largest tension exceeds a particle's weight."""
     particle, radius = particle_material(study), study.media.typical_radius_m
     pair = study.pair(study.media.main_material, study.media.main_material)
     one, half = np.ones(1), np.full(1, radius / 2)
@@ -288,13 +288,13 @@ def _cohesion_caution(study: Study) -> Iterator[Caution]:
     if bond > 1:
         yield Caution(
             "cohesion",
-            f"cohesion holds {bond:.3g} times the weight of a mean particle (Bond number); above 1 "
-            "a bed fills loosely or bridges, and may not come to rest",
+            f"the largest tension by cohesion is {bond:.3g} times the weight of a mean particle "
+            "(Bond number); above 1 a bed fills loosely or bridges, and may not come to rest",
         )
 
 
 _DEAR = 10.0
-"""Cost of a run over that without one of its classes, from which a warning is given."""
+"""Ratio of the cost with a class to that without it, from which a warning is given."""
 
 
 def _class_cautions(study: Study) -> Iterator[Caution]:

@@ -22,8 +22,8 @@ from dragdeck.study.base import Model, Number
 _PUSHING = ("hertz", "hertz/stiffness", "hooke", "hooke/stiffness")
 """Normal models whose force, in LIGGGHTS, is the one to which Coulomb's limit refers."""
 
-_Floats = NDArray[np.float64]
-Attraction = Callable[[_Floats | float, _Floats, _Floats, bool], _Floats]
+Floats = NDArray[np.float64]
+Attraction = Callable[[Floats | float, Floats, Floats, bool], Floats]
 """Attractive force of (N,) contacts, N, from the coefficient, reduced radii and overlaps, m, and
 whether the other body is a wall."""
 
@@ -64,9 +64,14 @@ class Coefficient:
     modulus_power: float = 0.0
 
 
+def softened(value: float, modulus_power: float, scale: float) -> float:
+    """A coefficient with moduli times `scale`, to 12 digits."""
+    return float(f"{value * scale**modulus_power:.12g}")
+
+
 def _sjkr2(
-    density_j_m3: _Floats | float, reduced_m: _Floats, overlap_m: _Floats, wall: bool
-) -> _Floats:
+    density_j_m3: Floats | float, reduced_m: Floats, overlap_m: Floats, wall: bool
+) -> Floats:
     """Cohesion of LIGGGHTS's model ``sjkr2``: a density times the area 2 pi d (2 R*).
 
     Its area at a wall is half of that, 2 pi d R.
@@ -108,14 +113,11 @@ class Pair(Model):
 
     def softened(self, scale: float) -> "Pair":
         """The pair as it is simulated with moduli times `scale`."""
-        powers = {
-            name: row.modulus_power for name, row in coefficients().items() if row.modulus_power
-        }
+        rows = present([self]).items()
+        powers = {name: row.modulus_power for name, row in rows if row.modulus_power}
         return self.model_copy(
             update={
-                name: float(f"{getattr(self, name) * scale**power:.12g}")
-                for name, power in powers.items()
-                if name not in self.absent()
+                name: softened(getattr(self, name), power, scale) for name, power in powers.items()
             }
         )
 

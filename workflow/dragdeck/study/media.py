@@ -7,6 +7,7 @@ out as asked.
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from itertools import pairwise
 from typing import Annotated, Literal, NamedTuple, Self
 
@@ -25,6 +26,7 @@ from dragdeck.study.base import (
 )
 
 Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 SOLID_FRACTION_ESTIMATE = 0.59
 """Solid fraction of a poured bed about twelve particles wide, an estimate used only for
@@ -40,6 +42,19 @@ _LEVELS = 4096
 """Quantiles from which the moments of a distribution are computed."""
 
 MOST_SIEVES = 100
+
+
+_SIZES = ("radius_mean_m", "radius_std_m", "distribution")
+
+INSTEAD_OF: Mapping[str, Sequence[str]] = {
+    "count": ("mass_kg", "fill_height_m"),
+    "mass_kg": ("count", "fill_height_m"),
+    "fill_height_m": ("count", "mass_kg"),
+    "radius_mean_m": ("sieve", "classes"),
+    "sieve": (*_SIZES, "classes"),
+    "classes": (*_SIZES, "material", "sieve"),
+}
+"""Fields that others of a study that is extended give way to."""
 
 
 def _none(value: object) -> bool:
@@ -99,7 +114,7 @@ class Grains(Model):
         if self.sieve is not None:
             return _sieved(self.sieve, count)
         assert self.radius_mean_m is not None
-        return QUANTILES[self.distribution](self.radius_mean_m, self.radius_std_m, count)
+        return quantiles(self.distribution, self.radius_mean_m, self.radius_std_m, count)
 
     @property
     def mean_volume_m3(self) -> float:
@@ -120,6 +135,13 @@ def _check_sieve(rows: Sequence[Sieve]) -> None:
         )
 
 
+def quantiles(distribution: str, mean_m: float, std_m: float, count: int) -> Array:
+    """Radii of a distribution whose sample mean and spread are exact, (count,), ascending, m."""
+    if count == 1 or std_m == 0:
+        return np.full(count, mean_m)
+    return _SPREAD[distribution](mean_m, std_m, count)
+
+
 def _normal_scores(count: int) -> Array:
     from scipy.special import ndtr, ndtri
 
@@ -134,14 +156,10 @@ def _scaled(scores: Array, mean_m: float, std_m: float) -> Array:
 
 def _normal(mean_m: float, std_m: float, count: int) -> Array:
     """A normal distribution cut at `CUTOFF_STD`."""
-    if count == 1 or std_m == 0:
-        return np.full(count, mean_m)
     return _scaled(_normal_scores(count), mean_m, std_m)
 
 
 def _uniform(mean_m: float, std_m: float, count: int) -> Array:
-    if count == 1 or std_m == 0:
-        return np.full(count, mean_m)
     return _scaled((np.arange(count) + 0.5) / count, mean_m, std_m)
 
 
@@ -149,8 +167,6 @@ def _log_normal(mean_m: float, std_m: float, count: int) -> Array:
     """A log-normal distribution cut at `CUTOFF_STD` of the logarithm."""
     from scipy.optimize import brentq
 
-    if count == 1 or std_m == 0:
-        return np.full(count, mean_m)
     scores = _normal_scores(count)
 
     def spread(width: float) -> float:
@@ -161,7 +177,7 @@ def _log_normal(mean_m: float, std_m: float, count: int) -> Array:
     return np.asarray(mean_m * sizes / sizes.mean())
 
 
-QUANTILES = {"normal": _normal, "uniform": _uniform, "log_normal": _log_normal}
+_SPREAD = {"normal": _normal, "uniform": _uniform, "log_normal": _log_normal}
 
 
 def _sieved(rows: Sequence[Sieve], count: int) -> Array:
@@ -274,24 +290,23 @@ class Media(Grains):
         return list(dict.fromkeys(str(part.material) for part in self.parts.values()))
 
 
+@lru_cache(maxsize=16)
 def class_counts(
-    media: Media, densities_kg_m3: Mapping[str, float], bowl_area_m2: float
+    media: Media, densities_kg_m3: tuple[float, ...], bowl_area_m2: float
 ) -> Mapping[str, int]:
     """Number of particles of each class.
 
     Parameters
     ----------
     media : Media
-    densities_kg_m3 : mapping
-        Of the materials by name.
+    densities_kg_m3 : tuple of float
+        Of each class.
     bowl_area_m2 : float
         Area of the bowl's floor, on which a fill height stands.
     """
     volume = {name: part.mean_volume_m3 for name, part in media.parts.items()}
-    mass = {
-        name: volume[name] * densities_kg_m3[str(part.material)]
-        for name, part in media.parts.items()
-    }
+    densities = dict(zip(volume, densities_kg_m3, strict=True))
+    mass = {name: volume[name] * densities[name] for name in volume}
     per_particle = {"number": dict.fromkeys(volume, 1.0), "mass": mass, "volume": volume}
     fractions = {name: one.fraction for name, one in media.classes.items()} or {"": 1.0}
     by_number = {
@@ -305,6 +320,11 @@ def class_counts(
         solid = SOLID_FRACTION_ESTIMATE * bowl_area_m2 * (media.fill_height_m or 0.0)
         scale = (solid if media.mass_kg is None else media.mass_kg) / of_all
     return _whole_numbers({name: scale * number for name, number in by_number.items()})
+
+
+def class_numbers(particle_id: Ints, first_ids: Sequence[int]) -> Ints:
+    """Number of the class, from 0, of (N,) particles, whose ids rise from class to class."""
+    return np.searchsorted(first_ids or [1], particle_id, side="right") - 1
 
 
 def _whole_numbers(wanted: Mapping[str, float]) -> dict[str, int]:

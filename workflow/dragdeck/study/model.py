@@ -6,7 +6,6 @@ run.
 
 import math
 from collections.abc import Mapping, Sequence
-from functools import cached_property
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
@@ -582,10 +581,12 @@ class Study(Model):
         walls = (self.bowl.material, self.workpiece.material)
         return list(dict.fromkeys((*self.media.materials, *walls)))
 
-    @cached_property
+    @property
     def class_counts(self) -> Mapping[str, int]:
         """Number of particles of each class of the media."""
-        densities = {name: one.density_kg_m3 for name, one in self.materials.items()}
+        densities = tuple(
+            self.materials[str(part.material)].density_kg_m3 for part in self.media.parts.values()
+        )
         return class_counts(self.media, densities, math.pi * self.bowl.radius_m**2)
 
     @property

@@ -30,7 +30,7 @@ def with_recording(data: Json, study: Path) -> tuple[Json, Places]:
     """
     motion, media = data.get("motion"), data.get("media")
     places: dict[str | None, _Place] = {}
-    if isinstance(motion, dict):
+    if isinstance(motion, dict) and "path" in motion:
         data = {**data, "motion": {**motion, "path": _waypoints(motion.get("path"), study, places)}}
     if isinstance(media, dict):
         media, classes = _sieved(media, "media", study, places), media.get("classes")
@@ -96,7 +96,7 @@ def _read(
     if not set(needed) <= set(header) <= set(columns) or len(set(header)) < len(header):
         limit = ",".join(needed) + (f", optionally {', '.join(optional)}" if optional else "")
         limit += ", separated by commas"
-        problem = f"the columns are not those of {'waypoints' if row is Waypoint else 'sieves'}"
+        problem = f"the columns are not those of {row.__name__.lower()}s"
         value = ",".join(header)[:200] if set(needed) & set(header) else None  # quote only a table
         raise InputError(problem, file=file, field="line 1", value=value, limit=limit)
     surplus: Any = None  # the key of values beyond the header

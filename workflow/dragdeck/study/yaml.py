@@ -12,6 +12,7 @@ from pydantic import JsonValue
 
 from dragdeck.errors import InputError, choices
 from dragdeck.study.base import DECIMAL, NAME, STUDY_FILE, Json
+from dragdeck.study.media import INSTEAD_OF
 
 
 class _Loader(yaml.SafeLoader):
@@ -171,18 +172,6 @@ _WHOLE = ("fidelity", "sweep")
 """Blocks that a study takes or replaces as a whole."""
 
 
-_SIZES = ("radius_mean_m", "radius_std_m", "distribution")
-_INSTEAD_OF = {
-    "count": ("mass_kg", "fill_height_m"),
-    "mass_kg": ("count", "fill_height_m"),
-    "fill_height_m": ("count", "mass_kg"),
-    "radius_mean_m": ("sieve", "classes"),
-    "sieve": (*_SIZES, "classes"),
-    "classes": (*_SIZES, "material", "sieve"),
-}
-"""Fields of the media that others of the base give way to."""
-
-
 def _merged(base: Json, own: Json, top: bool = True) -> dict[str, JsonValue]:
     """A study's content with another's changes.
 
@@ -190,7 +179,7 @@ def _merged(base: Json, own: Json, top: bool = True) -> dict[str, JsonValue]:
     with nothing to leave out stays: only fields that may be empty accept it. Alternatives of the
     media give way to each other.
     """
-    replaced = {name for key in own for name in _INSTEAD_OF.get(key, ())}
+    replaced = {name for key in own for name in INSTEAD_OF.get(key, ())}
     found = {key: value for key, value in base.items() if key not in replaced}
     for key, value in own.items():
         there = found.get(key)
