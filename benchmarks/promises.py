@@ -22,6 +22,7 @@ import numpy as np
 import yaml
 
 from dragchain.report.values import Extrapolated
+from dragchain.statistics.estimate import NORMAL_QUANTILE
 from dragchain.tradeoff.measure_run import quantities_along
 from dragchain.windows.estimate import Round, WindowsRecord
 from dragchain.windows.rounds import judged
@@ -260,10 +261,11 @@ def _rows(project: Project, name: str, record: WindowsRecord) -> Iterator[dict[s
             known = Extrapolated.read(folder / "tables/extrapolated.json").of(one)
             assert known is not None and known.value is not None
             found, count, cpu = known.value, 0, shared
-            reached = (found.ci95_high - found.ci95_low) / 2 <= TOLERANCE * abs(found.value)
+            reached = found.relative_half_width <= TOLERANCE
         beside = reference[one]
         error = found.value / beside.mean - 1
-        half = (found.ci95_high - found.ci95_low) / 2
+        apart = (found.value - beside.mean) / found.value
+        uncertain = NORMAL_QUANTILE * beside.se / found.value
         yield {
             "scene": name,
             "material": case.study.title.rsplit(" ", 1)[-1],
@@ -273,12 +275,12 @@ def _rows(project: Project, name: str, record: WindowsRecord) -> Iterator[dict[s
             "windows": count,
             "reached": reached,
             "value": f"{found.value:.6g}",
-            "half_width": round(half / abs(found.value), 4),
+            "half_width": round(found.relative_half_width, 4),
             "soft": f"{soft.values()[one]:.6g}",
             "reference": f"{beside.mean:.6g}",
             "reference_se": round(beside.se / abs(beside.mean), 4),
             "error": round(error, 4),
-            "covered": abs(found.value - beside.mean) <= math.hypot(half, 1.96 * beside.se),
+            "covered": abs(apart) <= math.hypot(found.relative_half_width, uncertain),
             "cpu_time_s": round(cpu, 1),
             "led_cpu_time_s": round(led_s, 1),
             "plain_cpu_time_s": round(plain, 1),
