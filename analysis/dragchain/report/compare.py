@@ -199,7 +199,7 @@ def effects_of(
         for seed, standing in _standings(one, quantity).items()
     ]
     frame = pd.DataFrame(rows)
-    if len(frame) < len(cases) or not np.isfinite(frame["y"]).all():
+    if len(frame) < len(cases) or not 0.0 < np.ptp(frame["y"]) < math.inf:
         return []
     shared = all(one.by_seed.keys() == cases[0].by_seed.keys() for one in cases)
     block = " + C(seed)" if shared and len(cases[0].by_seed) > 1 else ""

@@ -88,7 +88,8 @@ def test_a_packing_of_each_case_leaves_no_interaction(tmp_path: Path) -> None:
 
 def test_page_and_linked_networks(tmp_path: Path) -> None:
     write_comparison(tmp_path / "out", study(tmp_path))
-    page = stands_alone((tmp_path / "out/comparison.html").read_text(encoding="utf-8"))
+    text = (tmp_path / "out/comparison.html").read_text(encoding="utf-8")
+    page = stands_alone(text, beside=["networks.html"])
     assert len(page.images) == 2
     assert "deep-1_fast-1" in page.words
     linked = (tmp_path / "out/networks.html").read_text(encoding="utf-8")
