@@ -5,6 +5,7 @@ are taken packing by packing, so that what the packings have in common cancels.
 """
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -89,18 +90,16 @@ class CaseDifference:
 
     @property
     def relative(self) -> Estimate:
-        """The difference over the magnitude in the first case."""
-        size = abs(self.first.value)
+        """The difference over the value in the first case: positive where this one is larger."""
+        size = self.first.value
         return self.difference.over(size) if size else Estimate(math.nan, math.nan, math.nan)
 
     @property
     def verdict(self) -> str:
-        """Whether the interval excludes zero, and on which side it lies."""
-        if not self.difference.known:
-            return "no interval"
-        if self.difference.contains(0.0):
-            return "undecided"
-        return "more" if self.difference.value > 0 else "less"
+        """Whether the interval excludes zero, and what that says of the magnitude."""
+        if not self.difference.known or self.difference.contains(0.0):
+            return "undecided" if self.difference.known else "no interval"
+        return "larger" if self.relative.value > 0 else "smaller"
 
 
 def differences(first: ComparedCase, other: ComparedCase) -> list[CaseDifference]:
@@ -261,7 +260,7 @@ def draw_maps(cases: Sequence[ComparedCase]) -> Figure:
     below = panels[len(cases) + 1 :]
     for axes, one, change in zip(below, others, changes, strict=True):
         drawn = _patches(axes, change, cmap="RdBu_r", norm=Normalize(-largest, largest))
-        axes.set(title=f"{one.name}\nminus {first.name}", xlabel="azimuth from direction of motion")
+        axes.set(title=f"{one.name}\nminus {first.name}", xlabel="azimuth from motion")
         if len(one.load_maps) > 1 and one.load_maps.keys() == first.load_maps.keys():
             _mark_certain(
                 axes, [one.load_maps[seed] - first.load_maps[seed] for seed in first.load_maps]
@@ -315,7 +314,9 @@ def draw_response(
                 "marker": MARKERS[number % len(MARKERS)],
             }
             axes.errorbar([_place(places[k]) for k in here], value, reach, label=label, **style)
-        axes.set(xlabel=across, ylabel=f"{quantity.label} ({quantity.unit or '1'})")
+        unit = f" ({quantity.unit})" if quantity.unit else ""
+        axes.set(xlabel=across, ylabel=f"{quantity.label}{unit}")
+        axes.set_xticks(list(dict.fromkeys(map(_place, places))))
     panels[0].legend()
     head(figure, "bars: 95 % confidence interval of each case")
     return figure
@@ -389,6 +390,8 @@ def write_comparison(out_dir: Path, folders: Sequence[Path]) -> None:
     cases = read_compared(folders)
     first, *others = cases
     rows = [row for other in others for row in differences(first, other)]
+    by_quantity = {one: [row for row in rows if row.quantity == one] for one in QUANTITIES}
+    notes = Counter(note for one in cases for note in one.case.values.notes)
     factors = factors_of(cases)
     measured = [one for one in QUANTITIES if first.case.values.of(one.name)]
     effects = (
@@ -416,6 +419,8 @@ def write_comparison(out_dir: Path, folders: Sequence[Path]) -> None:
         filters={"relative": _relative, "joined": f" {TIMES} ".join},
         cases=cases,
         rows=rows,
+        by_quantity={one: found for one, found in by_quantity.items() if found},
+        notes=notes,
         effects=effects,
         linked=linked,
         changed=[(name, [own.get(name) for own in inputs]) for name in changed],
