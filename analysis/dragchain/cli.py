@@ -92,7 +92,7 @@ COMMANDS = (
             "contact networks side by side and, of a sweep over two or more fields, main effects "
             "and interactions. It reads tables and figures of the runs and writes comparison.html, "
             "differences.csv and effects.csv to the folder.",
-            "report.compare:write_comparison", (
+            "compare.report:write_comparison", (
         OUT_DIR,
         Argument("folders", type=Path, nargs="+", metavar="FOLDER",
                   help="results/STUDY with a report, or folders of process runs; differences are "

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -227,7 +228,8 @@ def _coded(levels: Sequence[JsonValue]) -> Floats:
     else:
         order = list(dict.fromkeys(map(repr, levels)))
         places = np.array([order.index(repr(one)) for one in levels], dtype=np.float64)
-    return 2 * (places - places.min()) / np.ptp(places) - 1
+    coded: Floats = 2 * (places - places.min()) / np.ptp(places) - 1
+    return coded
 
 
 # --- figures -------------------------------------------------------------------------------------
@@ -271,7 +273,7 @@ def draw_maps(cases: Sequence[ComparedCase]) -> Figure:
     return figure
 
 
-def _patches(axes: Axes, values: Floats, **style: object) -> object:
+def _patches(axes: Axes, values: Floats, **style: Any) -> Any:
     azimuths = np.degrees(circumference(MAP_AZIMUTHS))
     axes.set(
         xticks=np.arange(-180, 181, 90), xticklabels=["back", "right", "ahead", "left", "back"]
@@ -309,7 +311,7 @@ def draw_response(
                 [(one.value, one.ci95_low, one.ci95_high) for one in found]
             ).T
             reach = np.nan_to_num([value - low, high - value])
-            style = {
+            style: dict[str, Any] = {
                 "color": SERIES[number % len(SERIES)],
                 "marker": MARKERS[number % len(MARKERS)],
             }
@@ -412,7 +414,7 @@ def write_comparison(out_dir: Path, folders: Sequence[Path]) -> None:
         tables["effects"] = _table(effects, "effect")
     write_report(
         out_dir,
-        "report/compare.html.j2",
+        "compare/compare.html.j2",
         draw=draw,
         tables=tables,
         name="comparison",
@@ -452,6 +454,6 @@ def _write_networks(out_dir: Path, cases: Sequence[ComparedCase]) -> bool:
         return False
     copies = {f"network-{number}.html": file.read_bytes() for number, file in enumerate(files, 1)}
     shown = list(zip(copies, (one.name for one in cases), strict=True))
-    page = render_page("report/networks.html.j2", shown=shown)
+    page = render_page("compare/networks.html.j2", shown=shown)
     write_bundle(out_dir, files=copies, pages={"networks": page})
     return True

@@ -11,7 +11,7 @@ from pages import stands_alone
 from report_files import PICTURES, case_json, make_run, process_findings, write_quantities
 
 from dragchain.errors import TableError
-from dragchain.report.compare import read_compared, write_comparison
+from dragchain.compare.report import read_compared, write_comparison
 from dragchain.report.values import EXTRAPOLATED, Extrapolated, LoadMap
 
 DEPTH, SPEED, TOGETHER = 0.8, 0.3, 0.1
