@@ -186,7 +186,7 @@ chmod +x ../bin/df"""
         (FULL_DISK, ["all"], {}, ["the disk is full", "42 kB free"]),
         ("", ["web"], {}, ["npm is missing"]),
         ("", ["all", "--profile", "profiles/slurm"], {}, ["--workflow-profile"]),
-        ("", ["setup", "crates"], {}, ["crates", "cad, crate, docs"]),
+        ("", ["setup", "crates"], {}, ["crates", "cad, compare, crate, docs"]),
     ],
 )
 def test_what_is_missing_is_named_with_a_remedy(
