@@ -10,8 +10,8 @@ import pytest
 from pages import stands_alone
 from report_files import PICTURES, case_json, make_run, process_findings, write_quantities
 
-from dragchain.errors import TableError
 from dragchain.compare.report import read_compared, write_comparison
+from dragchain.errors import TableError
 from dragchain.report.values import EXTRAPOLATED, Extrapolated, LoadMap
 
 DEPTH, SPEED, TOGETHER = 0.8, 0.3, 0.1
