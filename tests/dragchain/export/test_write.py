@@ -169,16 +169,6 @@ def test_without_chain_tables_there_are_no_chains(run: Path) -> None:
         assert not {"peters_chain", "widest_paths", "dominant"} & set(blocks[name].array_names)
 
 
-def test_the_workpiece_is_where_the_force_was_measured(run: Path) -> None:
-    stl = pv.read(run / "workpiece.stl")
-    for step, blocks in zip(
-        STEPS, series(write_export(run, "paraview").file).values(), strict=True
-    ):
-        moved = stl.points + np.array([workpiece_x_m(step), 0.0, 0.02])
-        np.testing.assert_allclose(blocks["workpiece"].points, moved, atol=1e-8)
-        assert blocks["workpiece"].n_cells == stl.n_cells
-
-
 def test_the_workpiece_turns_with_its_path(run: Path, edit_json) -> None:
     def circle(case: dict[str, Any]) -> None:
         path = {"kind": "circle", "radius_m": 0.02}

@@ -1,17 +1,20 @@
 import math
+from itertools import pairwise
 
 import numpy as np
 import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from networks import R, make_frame, row
+from networks import R, make_frame, random_frame, row
+from scipy.sparse.csgraph import csgraph_from_dense, dijkstra
 
 from dragchain.network.chains import (
     dominant_path,
     major_stress,
     particle_stress,
     peters_rows,
+    split_chains,
     widest_paths,
 )
 from dragchain.network.frame import FLOOR, SIDE, WORKPIECE, NetworkFrame
@@ -253,3 +256,72 @@ def test_numbering_and_order_change_nothing(seed: int) -> None:
     pd.testing.assert_frame_equal(
         plain.sort_values(keys, ignore_index=True), mixed.sort_values(keys, ignore_index=True)
     )
+
+
+# --- random networks -------------------------------------------------------------------------
+
+frames = st.builds(
+    random_frame,
+    st.integers(0, 2**32 - 1),
+    edge=st.integers(2, 6),
+    levels=st.sampled_from([None, 1, 2, 5]),
+)
+
+
+def joined(frame: NetworkFrame, contact: int) -> set[int]:
+    return {int(frame.a[contact]), int(frame.b[contact])}
+
+
+@given(frames, st.sampled_from([0.3, 1.0, 2.0]), st.booleans())
+@settings(max_examples=30)
+def test_a_path_is_the_shortest_of_the_widest(
+    frame: NetworkFrame, threshold: float, with_workpiece: bool
+) -> None:
+    """Against the search of scipy, where a link is shorter the stronger it is."""
+    force, bowl, long = frame.normal_force, frame.particle_id.size, 1e6
+    strong = force > threshold * frame.mean_force_n(with_workpiece=with_workpiece)
+    strong &= frame.other != WORKPIECE
+
+    def distance(start: int, least: float) -> float:
+        used = np.flatnonzero(strong & (force >= least))
+        lengths = np.full((bowl + 1, bowl + 1), np.inf)
+        ends = frame.a[used], np.where(frame.b[used] >= 0, frame.b[used], bowl)
+        np.minimum.at(lengths, ends, long - force[used])
+        graph = csgraph_from_dense(np.minimum(lengths, lengths.T), null_value=np.inf)
+        return float(dijkstra(graph, indices=start)[bowl])
+
+    for path in widest_paths(frame, threshold, with_workpiece=with_workpiece):
+        (first, *links), start = path.contacts, path.particles[0]
+        assert (frame.other[first], frame.a[first]) == (WORKPIECE, start)
+        if path.end is None:
+            assert not links and distance(start, 0.0) == np.inf
+            continue
+        weakest = force[links].min()
+        least = min(weakest, force[first]) if with_workpiece else weakest
+        assert distance(start, least) == pytest.approx((long - force[links]).sum(), rel=1e-12)
+        if weakest < force[first] or not with_workpiece:
+            assert distance(start, np.nextafter(least, np.inf)) == np.inf
+        for pair, link in zip(pairwise(path.particles), links[:-1], strict=True):
+            assert set(pair) == joined(frame, link)
+        assert frame.a[links[-1]] == path.particles[-1] and frame.other[links[-1]] == path.end
+
+
+@given(frames, st.sampled_from([30.0, 45.0, 60.0]), st.sampled_from([0.3, 1.0, 2.0]))
+@settings(max_examples=30)
+def test_peters_chains_go_along_the_axes_of_stressed_particles(
+    frame: NetworkFrame, angle_deg: float, factor: float
+) -> None:
+    tensor = particle_stress(frame)
+    np.testing.assert_allclose(tensor, tensor.transpose(0, 2, 1))
+    stress, axis = major_stress(tensor)
+    chains = peters_rows(frame, math.radians(angle_deg), factor)
+    assert len(set(chains.particles.tolist())) == len(chains.particles)
+    assert (stress[chains.particles] > factor * stress.mean()).all()
+    links = split_chains(chains.contacts, chains.contact_starts)
+    for particles, contacts in zip(chains.particle_lists(), links, strict=True):
+        assert len(particles) >= 3
+        for pair, contact in zip(pairwise(particles), contacts, strict=True):
+            assert set(pair) == joined(frame, contact)
+            line = np.subtract(*frame.centre[list(pair)])
+            cosines = axis[list(pair)] @ line / np.linalg.norm(line)
+            assert (np.abs(cosines) > math.cos(math.radians(angle_deg)) - 1e-9).all()

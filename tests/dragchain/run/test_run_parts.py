@@ -48,23 +48,6 @@ FORCE = OutputOfRun(
 )
 ROWS = {0: [], 10: [[1, 0.5], [2, 0.25]], 20: [[2, -1.5]]}
 
-# Step 7, two particles from two ranks, written out field by field.
-BY_HAND = (
-    bytes([7, 0, 0, 0, 0, 0, 0, 0])
-    + bytes([2, 0, 0, 0, 0, 0, 0, 0])
-    + bytes([0, 0, 0, 0])
-    + bytes([1, 0, 0, 0]) * 6
-    + bytes(48)
-    + bytes([2, 0, 0, 0])
-    + bytes([2, 0, 0, 0])
-    + bytes([2, 0, 0, 0])
-    + bytes([0, 0, 0, 0, 0, 0, 0x08, 0x40])
-    + bytes([0, 0, 0, 0, 0, 0, 0xE0, 0x3F])
-    + bytes([2, 0, 0, 0])
-    + bytes([0, 0, 0, 0, 0, 0, 0xF0, 0x3F])
-    + bytes([0, 0, 0, 0, 0, 0, 0xF0, 0xBF])
-)
-
 
 def binary_file(raw, steps, width=2):
     return b"".join(raw.binary(step, ROWS[step], width) for step in steps)
@@ -82,52 +65,12 @@ def steps_of(frames):
     return [frame.step for frame in frames]
 
 
-def test_reads_a_binary_frame_written_by_hand(tmp_path: Path) -> None:
-    (tmp_path / "a.bin").write_bytes(BY_HAND)
-    (frame,) = read_frames([tmp_path / "a.bin"], PARTICLES)
-    assert frame.step == 7
-    np.testing.assert_array_equal(frame.columns["particle_id"], [3, 1])
-    np.testing.assert_array_equal(frame.columns["x_m"], [0.5, -1.0])
-    assert frame.columns["particle_id"].dtype == np.int64
-
-
-@pytest.mark.parametrize(("output", "write"), [(PARTICLES, binary_file), (CONTACTS, text_file)])
-def test_reads_frames_whose_number_of_rows_changes(tmp_path: Path, raw, output, write) -> None:
-    (tmp_path / output.pattern.format(part=1)).write_bytes(write(raw, [0, 10, 20]))
-    frames = list(iter_frames(tmp_path, output))
-    assert [(frame.step, frame.rows) for frame in frames] == [(0, 0), (10, 2), (20, 1)]
-    assert [frame.opening for frame in frames] == [True, False, False]
-    first, second = output.columns
-    np.testing.assert_array_equal(frames[1].columns[first], [1, 2])
-    np.testing.assert_array_equal(frames[1].columns[second], [0.5, 0.25])
-    assert frames[0].columns[first].dtype == np.int64
-
-
 def test_reads_a_frame_in_a_tilted_box(tmp_path: Path, raw) -> None:
     frame = raw.binary(0, [[1, 2.0]], 2, ranks=1)
     tilted = frame[:16] + struct.pack("<i", 1) + frame[20:92] + bytes(24) + frame[92:]
     (tmp_path / "a.bin").write_bytes(tilted)
     (read,) = read_frames([tmp_path / "a.bin"], PARTICLES)
     np.testing.assert_array_equal(read.columns["x_m"], [2.0])
-
-
-@pytest.mark.parametrize(("output", "write"), [(PARTICLES, binary_file), (CONTACTS, text_file)])
-def test_every_cut_keeps_the_frames_before_it(tmp_path: Path, raw, output, write) -> None:
-    whole = write(raw, [0, 10, 20])
-    ends = [len(write(raw, [0, 10, 20][:n])) for n in range(4)]
-    file = tmp_path / output.pattern.format(part=1)
-    for size in range(len(whole)):
-        file.write_bytes(whole[:size])
-        frames = read_frames([file], output)
-        before = sum(size >= end for end in ends[1:])
-        assert steps_of(next(frames) for _ in range(before)) == [0, 10, 20][:before]
-        if size in ends:
-            assert next(frames, None) is None
-            continue
-        with pytest.raises(TruncatedDumpError, match="frames before it are intact") as caught:
-            next(frames)
-        assert (caught.value.frame, caught.value.offset) == (before, ends[before])
-        assert str(file) in str(caught.value)
 
 
 def test_a_cut_number_is_not_read_as_another_number(tmp_path: Path, raw) -> None:
