@@ -14,7 +14,6 @@ from mathml import mathml
 from paths import ROOT
 from PIL import Image
 
-README_LINES = 90
 LINK = re.compile(r"(?<!\\)\]\(([^)\s]+)\)")
 
 
@@ -68,10 +67,6 @@ def test_every_page_of_the_documentation_is_in_a_table_of_contents() -> None:
     own = {page.resolve() for page in (ROOT / "docs").rglob("*.md")}
     own -= {(ROOT / "docs/index.md").resolve(), (ROOT / "docs/data/README.md").resolve()}
     assert own == listed
-
-
-def test_the_readme_is_short() -> None:
-    assert len((ROOT / "README.md").read_text().splitlines()) <= README_LINES
 
 
 def test_every_image_is_shown_and_every_figure_is_drawn() -> None:

@@ -131,16 +131,6 @@ def test_it_plays_pauses_and_ends(page: Browser) -> None:
     assert page.run("return networkPage.frames.count") == frame_at(page) + 2
 
 
-def test_the_slider_moves_the_cursor(page: Browser) -> None:
-    place = "return document.querySelector('#curve .cursor').offsetLeft"
-    page.find("#time").send_keys(Keys.HOME)
-    first = page.run(place)
-    page.find("#time").send_keys(Keys.END)
-    assert page.run(place) > first + 100
-    time_s = page.run("return networkPage.frames.times.at(-1)")
-    assert numbers(page.text("#now"))[0] == pytest.approx(time_s, abs=5e-4)
-
-
 # --- contacts and particles ----------------------------------------------------------------------
 
 
@@ -250,13 +240,3 @@ def test_without_webgl_the_curve_works(run: Path, tmp_path: Path) -> None:
         assert page.run("return document.querySelector('#curve .cursor').offsetLeft") > 100
     finally:
         page.close()
-
-
-def test_data_that_are_damaged_are_told(window: Browser, run: Path, tmp_path: Path) -> None:
-    text = (run / "network.html").read_text(encoding="utf-8")
-    at = text.index('id="data">') + 2000
-    broken = tmp_path / "broken.html"
-    broken.write_text(text[:at] + text[at + 400 :], encoding="utf-8")
-    window.open(broken)
-    assert "could not be shown" in window.text("#problem")
-    window.errors()
