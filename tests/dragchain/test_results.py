@@ -10,13 +10,7 @@ from report_files import DROP, FILLING, make_run
 from report_files import case_json as upstream_case
 from tiny_run_files import chain_n
 
-from dragchain import (
-    DocumentError,
-    RejectedRunError,
-    TableError,
-    UnknownNameError,
-    load,
-)
+from dragchain import DocumentError, RejectedRunError, TableError, UnknownNameError, load
 from dragchain.report.findings import FILE
 from dragchain.report.run_data import write_findings
 

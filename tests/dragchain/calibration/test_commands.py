@@ -44,14 +44,7 @@ def test_a_refusal_names_the_reason_and_leaves_no_file(
 def test_a_missing_sweep_is_told_with_what_makes_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    words = [
-        "step",
-        "calibrate",
-        str(EXAMPLE),
-        "--drops",
-        str(tmp_path / "drops.json"),
-        "--out",
-        "x",
-    ]
+    drops = str(tmp_path / "drops.json")
+    words = ["step", "calibrate", str(EXAMPLE), "--drops", drops, "--out", "x"]
     assert main(words) == 1
     assert "snakemake calibrate" in capsys.readouterr().err

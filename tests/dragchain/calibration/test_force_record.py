@@ -199,6 +199,12 @@ def swapped(time: Floats, force: Floats) -> tuple[Floats, Floats]:
     return time, force
 
 
+def stamped_twice(time: Floats, force: Floats) -> tuple[Floats, Floats]:
+    time = time.copy()
+    time[501] = time[500]
+    return time, force
+
+
 def with_a_hole(time: Floats, force: Floats) -> tuple[Floats, Floats]:
     keep = np.ones(len(time), dtype=bool)
     keep[30_000:30_100] = False
@@ -247,6 +253,7 @@ def long_flight(time: Floats, force: Floats) -> tuple[Floats, Floats]:
 
 REFUSALS: dict[str, tuple[Change, str]] = {
     "time runs backwards": (swapped, "time"),
+    "a time given twice": (stamped_twice, "time"),
     "samples are missing": (with_a_hole, "uneven"),
     "not a number": (not_a_number, "numbers"),
     "the trigger came late": (late_trigger, "baseline"),

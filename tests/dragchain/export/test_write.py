@@ -3,6 +3,7 @@
 import json
 import shlex
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,24 +13,15 @@ import pytest
 import pyvista as pv
 from finished_runs import analysed_tiny_run
 from made_run import with_motion
-from tiny_run_files import (
-    CHAIN_Z_M,
-    LAST,
-    TIMESTEP_S,
-    workpiece_x_m,
-)
+from networks import random_frame
+from tiny_run_files import CHAIN_Z_M, LAST, TIMESTEP_S, workpiece_x_m
 
 from dragchain.cli import main
 from dragchain.errors import ExportError, TableError
 from dragchain.export.frames import Membership, Selection, chain_membership
 from dragchain.export.write import fresh_folder, write_export
-from dragchain.network.chains import (
-    WidestPath,
-    dominant_path,
-    peters_rows,
-    widest_paths,
-)
-from dragchain.network.frame import NetworkFrame, network_frames
+from dragchain.network.chains import WidestPath, dominant_path, peters_rows, widest_paths
+from dragchain.network.frame import WORKPIECE, NetworkFrame, network_frames
 from dragchain.network.statistics import contact_counts
 from dragchain.network.write import chain_table
 from dragchain.run.workpiece import read_surface
@@ -203,30 +195,19 @@ def test_a_filling_has_particles_only(run: Path, edit_json) -> None:
 # --- chain membership ------------------------------------------------------------------------
 
 
-def random_frame(seed: int) -> NetworkFrame:
-    """Return 40 particles in a cube with random forces; several of them press the workpiece
-    twice."""
-    rng = np.random.default_rng(seed)
-    centre = rng.random((40, 3))
-    pairs = np.array([(i, j) for i in range(40) for j in range(i) if rng.random() < 0.15])
-    walls = rng.integers(0, 40, 60)
-    body = rng.choice([0, -1, -2], 60)
-    a, b = np.concatenate([pairs[:, 0], walls]), np.concatenate([pairs[:, 1], np.full(60, -1)])
-    inner = b >= 0
-    point = centre[a] + 0.05 * rng.normal(size=(a.size, 3))
-    point[inner] = (centre[a] + centre[b])[inner] / 2
-    normal = rng.gamma(2.0, 1.0, a.size)
-    return NetworkFrame(
-        step=1, time_s=0.1, direction_rad=0.0, particle_id=np.arange(1, 41) * 3, centre=centre,
-        radius=np.full(40, 0.1), a=a, b=b,
-        other=np.concatenate([np.ones(len(pairs), dtype=int), body]),
-        point=point, force=(centre[a] - point) * normal[:, None], normal_force=normal,
-    )  # fmt: skip
+def doubled(seed: int) -> NetworkFrame:
+    """A random network whose particles on the workpiece touch it twice, with other forces."""
+    frame = random_frame(seed, edge=4)
+    again = np.append(np.arange(frame.a.size), np.flatnonzero(frame.other == WORKPIECE))
+    scale = np.where(np.arange(again.size) < frame.a.size, 1.0, 0.8)
+    parts = {name: getattr(frame, name)[again] for name in ("a", "b", "other", "point")}
+    force = scale[:, None] * frame.force[again]
+    return replace(frame, **parts, force=force, normal_force=scale * frame.normal_force[again])
 
 
 def test_membership_from_the_table_is_that_of_the_search() -> None:
     doubles = ends = 0
-    for frame in map(random_frame, range(40)):
+    for frame in map(doubled, range(20)):
         found = chain_membership(frame, chain_table(frame))
         paths = widest_paths(frame)
         check_membership(frame, found, paths)
@@ -237,7 +218,8 @@ def test_membership_from_the_table_is_that_of_the_search() -> None:
 
 def check_membership(frame: NetworkFrame, found: Membership, paths: list[WidestPath]) -> None:
     whole = [path for path in paths if path.end is not None]
-    particles, contacts = np.zeros(40, dtype=int), np.zeros(frame.a.size, dtype=int)
+    particles = np.zeros(frame.particle_id.size, dtype=int)
+    contacts = np.zeros(frame.a.size, dtype=int)
     for path in whole:
         particles[list(path.particles)] += 1
         contacts[list(path.contacts)] += 1

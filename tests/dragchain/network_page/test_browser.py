@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from browser import MISSING, NO_WEBGL, Browser
+from browser import MISSING, Browser
 from made_run import line
 from network_run_files import PEAK_N, PEAKS_S, accept, write_network_run
 from selenium.webdriver import Keys
@@ -61,10 +61,6 @@ def step_at(page: Browser) -> int:
     return int(page.run("return networkPage.head.steps[networkPage.number]"))
 
 
-def frame_at(page: Browser) -> int:
-    return int(page.run("return networkPage.number"))
-
-
 def chosen(page: Browser) -> dict[str, float]:
     """The table of what was chosen, the first number of each row."""
     lines = page.run("""return [...document.querySelectorAll("#chosen tr")]
@@ -111,24 +107,6 @@ def test_a_peak_shows_its_force_and_the_strongest_chain(
     )
     assert said.endswith(f"to {path['end_kind']}.")
     assert page.run("return networkPage.contacts.halos.count") == path["n_particles"] + 1
-
-
-def test_it_plays_pauses_and_ends(page: Browser) -> None:
-    speed = "networkPage.player.speed = arguments[0]"
-    page.run(f"networkPage.show(0); {speed}", 0.02)  # so slow that no machine comes to the end
-    page.click("#play")
-    page.wait(lambda: frame_at(page) > 0, "the second frame")
-    page.click("#play")
-    assert page.text("#play") == "Play"
-    paused = frame_at(page)
-    turn = "new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"
-    page.run(f"{speed}; return {turn}", 1e6)  # it would be at the end now
-    assert frame_at(page) == paused
-    page.click("#play")
-    page.wait(lambda: page.text("#play") == "Play", "the end")
-    assert page.run("return networkPage.frames.count") == frame_at(page) + 1
-    page.click("#previous")
-    assert page.run("return networkPage.frames.count") == frame_at(page) + 2
 
 
 # --- contacts and particles ----------------------------------------------------------------------
@@ -228,15 +206,3 @@ def test_a_section_plane_hides_what_is_beyond_it(page: Browser, run: Path) -> No
 
 
 # --- without a scene -----------------------------------------------------------------------------
-
-
-def test_without_webgl_the_curve_works(run: Path, tmp_path: Path) -> None:
-    page = Browser(tmp_path / "profile", NO_WEBGL)
-    try:
-        page.open(run / "network.html")
-        assert "WebGL" in page.text("#problem")
-        assert not page.find("#canvas").is_displayed()
-        page.click("#peaks li:first-child button")
-        assert page.run("return document.querySelector('#curve .cursor').offsetLeft") > 100
-    finally:
-        page.close()

@@ -7,14 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from report_files import (
-    ASKED,
-    PICTURES,
-    case_json,
-    make_run,
-    process_findings,
-    write_quantities,
-)
+from report_files import ASKED, PICTURES, case_json, make_run, process_findings, write_quantities
 
 from dragchain.report.cases import cases_of, read_study_runs
 from dragchain.report.cost_check import answers, prediction_for, read_advice

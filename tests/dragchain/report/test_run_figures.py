@@ -8,31 +8,18 @@ import numpy as np
 import pandas as pd
 import pytest
 from changed import changed
-from figure_files import (
-    LAST,
-    R,
-    case_json,
-    resistance,
-    write_process_run,
-)
+from figure_files import LAST, R, case_json, resistance, write_process_run
 from made_run import line, with_motion, write_documents
+from networks import make_frame
 from PIL import Image
 
 from dragchain.errors import TableError
 from dragchain.figures import network_picture as scene
 from dragchain.figures.rendering import RenderError, check_rendering
-from dragchain.network.frame import NetworkFrame
-from dragchain.report.findings import (
-    FIGURES,
-    FILE,
-    FillingFindings,
-    ProcessFindings,
-)
+from dragchain.network.frame import SIDE, NetworkFrame
+from dragchain.report.findings import FIGURES, FILE, FillingFindings, ProcessFindings
 from dragchain.report.run_data import RunData, dominant_bottlenecks, process_findings
-from dragchain.report.run_figures import (
-    energy_ratio,
-    write_figures,
-)
+from dragchain.report.run_figures import energy_ratio, write_figures
 from dragchain.run.reference import reference_drags
 from dragchain.statistics.estimate import Estimate
 from dragdeck.records.case import CaseOfRun, load_case
@@ -123,15 +110,10 @@ def test_process_figures_are_whole_pictures(process: Path, drawn: list[Path]) ->
 UPRIGHT = Rotation(np.zeros(1))
 
 
-def network_frame(normal_force: list[float], *, direction_rad: float = 0.0) -> NetworkFrame:
-    """Return two particles on the x axis in contact with each other and with the side."""
-    return NetworkFrame(
-        step=300, time_s=0.3, direction_rad=direction_rad, particle_id=np.array([4, 7]),
-        centre=np.array([[-R, 0.0, 0.015], [R, 0.0, 0.015]]), radius=np.array([R, R]),
-        a=np.array([0, 1]), b=np.array([1, -1]), other=np.array([1, -2]),
-        point=np.array([[0.0, 0.0, 0.015], [2 * R, 0.0, 0.015]]), force=np.zeros((2, 3)),
-        normal_force=np.array(normal_force),
-    )  # fmt: skip
+def network_frame(between_n: float, on_side_n: float) -> NetworkFrame:
+    """Two particles on the x axis in contact with each other and with the side."""
+    centres = {4: (-R, 0.0, 0.015), 7: (R, 0.0, 0.015)}
+    return make_frame(centres, [(4, 7, between_n), (7, SIDE, on_side_n)])
 
 
 def test_the_largest_force_has_the_mean_particle_radius() -> None:
@@ -184,7 +166,7 @@ def test_a_rendered_contact_is_where_its_axes_say(
 ) -> None:
     case = load_case(process)
     far = np.array([0.015, 0.012, 0.01])
-    shown = scene.NetworkScene(network_frame([2.0, 0.5]), far, UPRIGHT, None, 0.2)
+    shown = scene.NetworkScene(network_frame(2.0, 0.5), far, UPRIGHT, None, 0.2)
     image, extent = scene.render_view(process, case, shown, view)
     assert is_strongest(pixel(image, extent, 0.0, level_mm))
     assert is_strongest(pixel(image, extent, -2.5, level_mm + 2.0))
@@ -206,7 +188,7 @@ def test_a_wide_bowl_is_cut_to_the_surroundings_of_the_workpiece(process: Path) 
     reach = 2 * R * scene.WINDOW_DIAMETERS
     depth = 2 * R * scene.DEPTH_DIAMETERS
     workpiece = np.array([0.5 + 0.004 - reach / 2, 0.1, 0.01])
-    frame = network_frame([1.0, 1.0])
+    frame = network_frame(1.0, 1.0)
     places = np.array([[0.0, 1.1 * depth, 0.0], [-1.1 * reach, 0.0, 0.0]]) + workpiece
     shown = scene.NetworkScene(replace(frame, point=places), workpiece, UPRIGHT, None, 0.2)
     above, side = (scene.window(case, shown, view) for view in ("xy", "xz"))

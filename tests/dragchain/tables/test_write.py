@@ -21,7 +21,6 @@ from tiny_run_files import (
 )
 
 from dragchain import DumpError, RejectedRunError, TableError, load_outputs, write_tables
-from dragchain.drag import read_counted, summarise_forces
 from dragchain.loading.write import write_loading
 from dragchain.run.run_parts import iter_prints
 from dragchain.tables.columns import FORCES, REFERENCE
@@ -55,13 +54,6 @@ def test_workpiece_force_is_turned_into_the_workpiece_frame(tables) -> None:
     np.testing.assert_allclose(force["vertical_n"].iloc[4:], -WEIGHT_N)
     assert (force["lateral_n"] == 0).all()
     assert force.loc[force["in_statistics"], "step"].tolist() == list(range(40, LAST + 1, 2))
-
-
-def test_the_counted_samples_alone_make_the_statistics(tiny_run: Path) -> None:
-    write_tables(tiny_run)
-    mean = -np.mean([chain_n(step) for step in range(40, LAST + 1, 2)])
-    assert len(read_counted(tiny_run)) == 31
-    assert summarise_forces(read_counted(tiny_run))["drag_n"].mean == pytest.approx(mean)
 
 
 def test_workpiece_contacts_hold_the_applied_force_on_the_workpiece(tables) -> None:
@@ -231,18 +223,6 @@ def test_a_truncated_output_leaves_no_table_of_it(tiny_run: Path) -> None:
     names = {path.name for path in (tiny_run / "tables").iterdir()}
     assert "workpiece_force.parquet" in names
     assert not {name for name in names if "contacts.parquet" in name and "workpiece" not in name}
-
-
-def test_a_period_that_does_not_divide_is_an_error(tiny_run: Path, edit_json, raw) -> None:
-    rows = [[step, *[0] * 10] for step in range(3, LAST + 1, 3)]
-    content = raw.prints(rows, COLUMNS["workpiece_force"])
-    (tiny_run / "workpiece_force.1.txt").write_bytes(content)
-    schedule = {"period_steps": 3, "first_step": 3, "last_step": 99}
-    edit_json(tiny_run / "columns.json", lambda c: c["outputs"]["workpiece_force"].update(schedule))
-    with pytest.raises(
-        TableError, match="workpiece_particles has step 10 but workpiece_force does not"
-    ):
-        write_tables(tiny_run)
 
 
 def test_samples_are_found_in_blocks_and_gaps_are_not() -> None:

@@ -93,7 +93,7 @@ def test_a_setting_with_one_run_or_a_failed_one_is_not_offered(tmp_path: Path) -
     tradeoff = made(tmp_path, found)
     assert choose(tradeoff, "workpiece_contacts", 0.2).setting == Setting(*SOFT)
     table = run_table(tradeoff)
-    assert table["failure"].tolist()[-1] == "no particle lost: 12 particles"
+    assert table["failure"].tolist()[-1] == "no particle lost: 12"
     assert table["complete"].sum() == len(found) - 1
     assert math.isnan(table["drag_mean"].iloc[-1])
 

@@ -10,9 +10,10 @@ import pandas as pd
 import pytest
 from changed import changed
 from scipy import stats
+from tradeoff_files import measures
 
 from dragchain.statistics.estimate import Estimate
-from dragchain.tradeoff.measures import Measures, RunCost
+from dragchain.tradeoff.measures import Measures
 from dragdeck.records.case import load_case
 from dragdeck.study.reference import Drag, Reference
 from evidence.validation import force
@@ -48,31 +49,10 @@ def made_run(
             simulation=Drag(drag_mean_n=-2.0),
         ),
     )
-    modulus, step = parameters
-    measures = Measures(
-        study="small",
-        run=folder.name,
-        bed=f"bed-{seed}",
-        inputs={"seed": seed, "bowl.radius_m": 0.04, **(varied or {})},
-        fidelity=changed(
-            case.fidelity, youngs_modulus_scale=modulus, timestep_fraction=step, speed_factor=1.0
-        ),
-        single={"bed_height": 0.07},
-        arc_m=20 * DIAMETER_M,
-        cost=RunCost(
-            steps=1000,
-            wall_time_s=60.0,
-            cpu_time_s=60.0,
-            ranks=1,
-            timestep_s=1e-6,
-            axis_speed_m_s=0.1,
-            steps_per_m=1e7,
-        ),
-        versions={"dragdeck": "1"},
-        started="2026-01-01T00:00:00+00:00",
-        complete=True,
-    )
-    return MeasuredRun(folder, case, measures, varied or {})
+    inputs = {"bowl.radius_m": 0.04, **(varied or {})}
+    content = measures((*parameters, 1.0), seed, np.random.default_rng(1), inputs=inputs)
+    content |= {"run": folder.name, "arc_m": 20 * DIAMETER_M}
+    return MeasuredRun(folder, case, Measures.model_validate(content), varied or {})
 
 
 def series(mean: float, rng: np.random.Generator, count: int = 4000) -> np.ndarray[Any, Any]:
