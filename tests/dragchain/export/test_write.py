@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import pyvista as pv
-from finished_runs import analysed_tiny_run
+from finished_runs import write_finished_run
 from made_run import with_motion
 from networks import random_frame
 from tiny_run_files import CHAIN_Z_M, LAST, TIMESTEP_S, workpiece_x_m
@@ -37,8 +37,8 @@ FORCE = ["force_x_n", "force_y_n", "force_z_n"]
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The tiny run with its tables, chains and a mesh of the workpiece; not to be changed."""
-    return analysed_tiny_run(tmp_path_factory.mktemp("made") / "tiny")
+    """The tiny run with all its tables; not to be changed."""
+    return write_finished_run(tmp_path_factory.mktemp("made") / "tiny")
 
 
 @pytest.fixture

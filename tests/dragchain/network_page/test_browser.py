@@ -178,31 +178,3 @@ def test_contacts_are_shown_by_force_class_and_chain(page: Browser, run: Path) -
     assert drawn() == (b_id.size, 0, expected)
     page.click("#class-0")
     assert drawn() == (sum(expected[1:]), 0, [0, *expected[1:]])
-    page.run("networkPage.setThreshold(1e6)")
-    page.click("#path")
-    assert drawn()[:2] == (path, path)
-    assert "N, or on the dominant path." in page.text("#status")
-
-
-def test_a_section_plane_hides_what_is_beyond_it(page: Browser, run: Path) -> None:
-    choose(page, "section-axis", "y")
-    at = page.run("""const slider = document.getElementById("section-at");
-        slider.value = 0.4 * slider.min + 0.6 * slider.max;
-        slider.dispatchEvent(new Event("input", {bubbles: true}));
-        return Number(slider.value)""")
-    assert numbers(page.text("#section-shown")) == [pytest.approx(at, abs=0.06)]
-    particles, contacts = (rows(run, name, step_at(page)) for name in ("particles", "contacts"))
-    beyond = 1e3 * particles["y_m"] > at
-    for _ in range(2):
-        larger = page.find("#section-side").is_selected()
-        kept = set(particles["particle_id"][beyond == larger])
-        ids = page.run("const {media: {spheres}, frames, number} = networkPage;"
-                       "return spheres.rows.map(row => frames.at(number).id[row])")  # fmt: skip
-        assert set(ids) == kept
-        other = contacts["b_id"].isin(kept) | (contacts["b_id"] <= 0)
-        inside = (contacts["a_id"].isin(kept) & other).sum()
-        assert page.text("#status").startswith(f"{inside} of {len(contacts)} contacts shown")
-        page.click("#section-side")
-
-
-# --- without a scene -----------------------------------------------------------------------------

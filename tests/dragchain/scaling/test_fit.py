@@ -19,7 +19,6 @@ from dragchain.scaling.fit import (
     find,
     read_scaled_runs,
     read_scalings,
-    said,
     table,
     write_scaling,
 )
@@ -155,19 +154,6 @@ def test_the_scalings_of_the_package_are_whole() -> None:
         assert found.commands and found.engine and found.started
         assert vars(_refit(found)) == pytest.approx(vars(found.fit.exponent), abs=1e-4)
         assert list(table(found)[found.field]) == [level.x for level in found.levels]
-
-
-def test_the_words_name_a_lack_of_fit(write_run: Writer) -> None:
-    field = "motion.speed_m_s"
-    bent = {0.005: 1.0, 0.01: 1.0, 0.02: 1.0, 0.04: 1.8, 0.08: 1.0}
-    folders = [
-        write_run(drag, seed, **{field: speed}) for speed, drag in bent.items() for seed in (1, 2)
-    ]
-    found = find(folders, field, Expectation(exponent=0.0))
-    assert found.fit.lack_of_fit is not None and found.fit.lack_of_fit < 0.05
-    off = found.levels[3].deviation
-    assert off is not None and off.ci95_low > 0.0
-    assert f"40 mm/s by +{100 * off.value:.0f} %" in said(found)
 
 
 def _refit(found: ScalingFile) -> Estimate:
