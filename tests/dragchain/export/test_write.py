@@ -98,12 +98,7 @@ def test_lines_go_from_centre_to_centre_or_to_the_contact_point(run: Path) -> No
     contacts = table(run, "contacts")
     point = contacts[contacts["step"] == LAST][["point_x_m", "point_y_m", "point_z_m"]].to_numpy()
     centre = dict(zip(particles["id"].tolist(), particles.points, strict=True))
-    kinds = {
-        0: "particle-particle",
-        1: "particle-workpiece",
-        2: "particle-floor",
-        3: "particle-side",
-    }
+    kinds = [f"particle-{body}" for body in ("particle", "workpiece", "floor", "side")]
     assert contacts[contacts["step"] == LAST]["kind"].tolist() == [kinds[k] for k in lines["kind"]]
     ends = lines.points[lines.lines.reshape(-1, 3)[:, 1:]]
     for row, (start, end) in enumerate(ends):
@@ -177,13 +172,9 @@ def test_a_frame_without_contacts_has_none(run: Path) -> None:
 
 
 def test_a_filling_has_particles_only(run: Path, edit_json) -> None:
-    edit_json(
-        run / "case.json", lambda case: case.update(scene="filling", workpiece=None, motion=None)
-    )
-    edit_json(
-        run / "columns.json",
-        lambda content: content["outputs"].pop("contacts"),
-    )
+    bare = {"scene": "filling", "workpiece": None, "motion": None}
+    edit_json(run / "case.json", lambda case: case.update(bare))
+    edit_json(run / "columns.json", lambda content: content["outputs"].pop("contacts"))
     for format_ in ("paraview", "xyz"):
         folder = write_export(run, format_).file.parent
     assert "Coordination" not in (folder / "run.xyz").read_text()
