@@ -1,0 +1,257 @@
+"""A simulated force signal beside a measured one: quantities, their differences, and a figure.
+
+Both signals are low-pass filtered to the same bandwidth and have the same rate. Each quantity has
+an interval that accounts for autocorrelation (`dragchain.statistics.correlated`). The interval of
+a difference follows from the two intervals (method of variance estimates recovery: Zou, Donner
+2008, Stat. Med. 27, 1693), on the logarithms where the difference is a ratio. All intervals
+together contain all true differences in 95 % of comparisons (Bonferroni).
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+from scipy.signal import butter, sosfiltfilt, welch
+from scipy.special import chdtri, ndtri
+
+from dragchain.arrays import Floats
+from dragchain.drag import find_drag_peaks
+from dragchain.figures.panels import legend_below, new_figure, row, row_names
+from dragchain.figures.style import BLUE, COLOURS, GREEN, GREY, RED
+from dragchain.report.values import mean_over_packings
+from dragchain.statistics.correlated import (
+    MIN_SAMPLES,
+    autocovariance,
+    estimate_mean,
+    estimates,
+)
+from dragchain.statistics.estimate import CONFIDENCE, Estimate, flattened, student_quantile
+from dragdeck.study.force_record import RATES_PER_BANDWIDTH
+
+Equivalence = Literal["equivalent", "different", "undecided"]
+"""What an interval says of a relative difference, see `Difference`."""
+
+
+class SignalQuantity(NamedTuple):
+    """What of a signal is compared: a difference is relative to the measured value if `ratio`.
+
+    Else it is relative to the mean of the measured signal, or its standard deviation if larger.
+    """
+
+    label: str
+    unit: str
+    ratio: bool = True
+
+
+_QUANTILES = (0.05, 0.5, 0.95)
+_BANDS = (0.0625, 0.125, 0.25, 0.5, 1.0)
+"""Edges of the octaves of the power spectrum, relative to the bandwidth."""
+
+SIGNAL_QUANTITIES = (
+    SignalQuantity("mean", "N", ratio=False),
+    SignalQuantity("standard deviation", "N"),
+    *(SignalQuantity(f"{100 * part:g} % quantile", "N", ratio=False) for part in _QUANTILES),
+    SignalQuantity("peak rate", "1/s"),
+    SignalQuantity("mean peak height", "N"),
+    SignalQuantity("correlation time", "s"),
+    *(
+        SignalQuantity(f"amplitude in {low:g} to {high:g} of the bandwidth", "N")
+        for low, high in zip(_BANDS, _BANDS[1:], strict=False)
+    ),
+)
+
+JOINT = 1.0 - (1.0 - CONFIDENCE) / len(SIGNAL_QUANTITIES)
+"""Level of a single interval."""
+
+_POWER = float(ndtri(0.95))
+_BEYOND = 0.2
+"""Chance with which packings without scatter of their own are taken to have some."""
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A quantity of both signals, and the relative difference of the simulated one.
+
+    Attributes
+    ----------
+    quantity : SignalQuantity
+    measured, simulated, relative : Estimate
+        Intervals of the level `JOINT`.
+    margin : float
+    between : bool
+        Whether the interval includes scatter between packings beyond that within each.
+    """
+
+    quantity: SignalQuantity
+    measured: Estimate
+    simulated: Estimate
+    relative: Estimate
+    margin: float
+    between: bool
+
+    @property
+    def verdict(self) -> Equivalence:
+        """The interval is within the margin; or excludes zero; or neither, or is not reliable."""
+        one = self.relative
+        if not (one.known and one.reliable):
+            return "undecided"
+        if -self.margin <= one.ci95_low and one.ci95_high <= self.margin:
+            return "equivalent"
+        return "undecided" if one.contains(0.0) else "different"
+
+    @property
+    def needs(self) -> float | None:
+        """How many times the length decides in 95 % of cases on a difference of the margin.
+
+        A difference that large is then found, and one of zero is called equivalent.
+        """
+        if self.verdict != "undecided" or not self.relative.known:
+            return None
+        half = max(
+            self.relative.value - self.relative.ci95_low,
+            self.relative.ci95_high - self.relative.value,
+        )
+        enough = self.margin / (1.0 + _POWER / float(ndtri(0.5 + 0.5 * JOINT)))
+        return (half / enough) ** 2
+
+    @property
+    def said(self) -> str:
+        """The verdict in words."""
+        more = "packings" if self.between else "length"
+        needs = f": needs {self.needs:.2g} times the {more}" if self.needs else ""
+        return self.verdict + needs
+
+
+def compared(
+    measured_n: Floats,
+    simulated_n: Sequence[Floats],
+    *,
+    low_pass_hz: float,
+    separation_s: float,
+    margin: float,
+) -> list[Difference]:
+    """Compare the signals of packings with a measured one.
+
+    Parameters
+    ----------
+    measured_n, simulated_n : (N,) ndarray, sequence of (M,) ndarray
+        Counted samples in N, positive upwards in a peak, at `RATES_PER_BANDWIDTH` per period of
+        the bandwidth.
+    low_pass_hz : float
+    separation_s : float
+        Least time between two peaks, s.
+    margin : float
+        Largest relative difference that counts as equivalent.
+
+    Raises
+    ------
+    SeriesError
+        If a signal is too short.
+    """
+    theirs = _described(measured_n, low_pass_hz, separation_s)
+    each = [_described(force, low_pass_hz, separation_s) for force in simulated_n]
+    scale = max(abs(float(measured_n.mean())), float(measured_n.std()))
+    found = []
+    for number, quantity in enumerate(SIGNAL_QUANTITIES):
+        ours, between = _over_packings([one[number] for one in each])
+        relative = _difference(ours, theirs[number], None if quantity.ratio else scale)
+        found.append(Difference(quantity, theirs[number], ours, relative, margin, between))
+    return found
+
+
+def _difference(ours: Estimate, theirs: Estimate, scale: float | None) -> Estimate:
+    with np.errstate(invalid="ignore", divide="ignore"):
+        a, b = (one.mapped(np.log) if scale is None else one.over(scale) for one in (ours, theirs))
+    value = a.value - b.value
+    below = math.hypot(a.value - a.ci95_low, b.ci95_high - b.value)
+    above = math.hypot(a.ci95_high - a.value, b.value - b.ci95_low)
+    reliable = ours.reliable and theirs.reliable
+    found = Estimate(value, value - below, value + above, reliable=reliable)
+    return found.exp(minus=1.0) if scale is None else found
+
+
+def _over_packings(values: Sequence[Estimate]) -> tuple[Estimate, bool]:
+    """The mean over packings, and whether these scatter by more than their own intervals say.
+
+    The interval then is Student's t between packings, for the difference from one more: the
+    measured signal has a packing of its own.
+    """
+    if len(values) == 1:
+        return values[0], False
+    within, count = mean_over_packings(values), len(values)
+    reliable = all(one.reliable for one in values)
+    own = np.mean([((one.ci95_high - one.ci95_low) / 2) ** 2 for one in values])
+    own /= float(ndtri(0.5 + 0.5 * JOINT)) ** 2
+    variance = float(np.var([one.value for one in values], ddof=1))
+    half = (within.ci95_high - within.ci95_low) / 2
+    between = variance * (count - 1) > own * chdtri(count - 1, _BEYOND)
+    if between:
+        reach = student_quantile(count - 1, JOINT) * math.sqrt(variance * (1 + 1 / count))
+        half = max(half, reach)
+    low, high = within.value - half, within.value + half
+    return Estimate(within.value, low, high, reliable=reliable), bool(between)
+
+
+def _described(force: Floats, low_pass_hz: float, separation_s: float) -> list[Estimate]:
+    """The quantities of a signal in the order of `SIGNAL_QUANTITIES`."""
+    rate, rest = RATES_PER_BANDWIDTH * low_pass_hz, force - force.mean()
+    time = np.arange(len(force)) / rate
+    peaks = find_drag_peaks(time, -force, min_separation_s=separation_s)
+    apart = _mean(np.diff(peaks.time_s))
+    edges = np.array(_BANDS) * low_pass_hz
+    bands = (
+        sosfiltfilt(butter(2, both, "bandpass", fs=rate, output="sos"), rest)
+        for both in zip(edges, edges[1:], strict=False)
+    )
+    return [
+        _mean(force),
+        _rms(rest),
+        *(_quantile(force, part) for part in _QUANTILES),
+        Estimate(1 / apart.value, 1 / apart.ci95_high, 1 / apart.ci95_low, reliable=apart.reliable),
+        _mean(-peaks.drag_n),
+        _correlation_time(rest, rate),
+        *map(_rms, bands),
+    ]
+
+
+def _mean(series: Floats) -> Estimate:
+    """The mean of a series in the order of time, not known if it is too short."""
+    if len(series) < MIN_SAMPLES:
+        return Estimate(math.nan, math.nan, math.nan)
+    return estimate_mean(series, confidence=JOINT).estimate
+
+
+def _rms(series: Floats) -> Estimate:
+    """The root mean square of a series."""
+    return estimates(series[:, None] ** 2, np.sqrt, confidence=JOINT)[0]
+
+
+def _quantile(force: Floats, part: float) -> Estimate:
+    """A quantile; its interval from that of the fraction below it (Woodruff 1952)."""
+    value = float(np.quantile(force, part))
+    below = estimate_mean((force <= value).astype(np.float64), confidence=JOINT)
+    half = below.ci95_high - below.mean
+    low, high = np.quantile(force, np.clip([part - half, part + half], 0.0, 1.0))
+    inside = half <= min(part, 1.0 - part)
+    return Estimate(value, float(low), float(high), reliable=below.reliable and inside)
+
+
+def _correlation_time(rest: Floats, rate_hz: float) -> Estimate:
+    """The time after which the autocorrelation is 1/e, between two lags on a straight line."""
+    covariance = autocovariance(rest)
+    lag = int(np.argmax(covariance < covariance[0] / math.e))
+    lags = range(2 * lag + 2)
+    rows = len(rest) - len(lags)
+    products = np.stack([rest[:rows] * rest[one : one + rows] for one in lags], axis=1)
+
+    def statistic(means: Floats) -> Floats:
+        rho = means / means[..., :1]
+        after = np.maximum(np.argmax(rho < 1 / math.e, axis=-1), 1)[..., None]
+        above, below = (np.take_along_axis(rho, after + shift, -1) for shift in (-1, 0))
+        return np.asarray((after - 1 + (above - 1 / math.e) / (above - below)) / rate_hz)
+
+    return estimates(products, statistic, confidence=JOINT)[0]
