@@ -8,8 +8,11 @@ together contain all true differences in 95 % of comparisons (Bonferroni).
 """
 
 import math
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -19,10 +22,12 @@ from scipy.signal import butter, sosfiltfilt, welch
 from scipy.special import chdtri, ndtri
 
 from dragchain.arrays import Floats
-from dragchain.drag import find_drag_peaks
-from dragchain.figures.panels import legend_below, new_figure, row, row_names
+from dragchain.drag import find_drag_peaks, peak_separation_s
+from dragchain.figures.panels import key, legend_below, new_figure, row, row_names
 from dragchain.figures.style import BLUE, COLOURS, GREEN, GREY, RED
+from dragchain.report.cases import ReportedCase
 from dragchain.report.values import mean_over_packings
+from dragchain.run.kinematics import needed, process_time
 from dragchain.statistics.correlated import (
     MIN_SAMPLES,
     autocovariance,
@@ -30,7 +35,19 @@ from dragchain.statistics.correlated import (
     estimates,
 )
 from dragchain.statistics.estimate import CONFIDENCE, Estimate, flattened, student_quantile
-from dragdeck.study.force_record import RATES_PER_BANDWIDTH
+from dragchain.tables.by_step import read_table
+from dragdeck.errors import DragdeckError
+from dragdeck.records.case import CaseOfRun
+from dragdeck.study.force_record import (
+    RATES_PER_BANDWIDTH,
+    MeasuredSignal,
+    low_passed,
+    measured_signal,
+)
+from dragdeck.study.reference import Signal
+
+# --- statistics ----------------------------------------------------------------------------------
+
 
 Equivalence = Literal["equivalent", "different", "undecided"]
 """What an interval says of a relative difference, see `Difference`."""
@@ -59,8 +76,8 @@ SIGNAL_QUANTITIES = (
     SignalQuantity("mean peak height", "N"),
     SignalQuantity("correlation time", "s"),
     *(
-        SignalQuantity(f"amplitude in {low:g} to {high:g} of the bandwidth", "N")
-        for low, high in zip(_BANDS, _BANDS[1:], strict=False)
+        SignalQuantity(f"amplitude at {low:g} to {high:g} of bandwidth", "N")
+        for low, high in pairwise(_BANDS)
     ),
 )
 
@@ -205,7 +222,7 @@ def _described(force: Floats, low_pass_hz: float, separation_s: float) -> list[E
     edges = np.array(_BANDS) * low_pass_hz
     bands = (
         sosfiltfilt(butter(2, both, "bandpass", fs=rate, output="sos"), rest)
-        for both in zip(edges, edges[1:], strict=False)
+        for both in pairwise(edges)
     )
     return [
         _mean(force),
@@ -255,3 +272,135 @@ def _correlation_time(rest: Floats, rate_hz: float) -> Estimate:
         return np.asarray((after - 1 + (above - 1 / math.e) / (above - below)) / rate_hz)
 
     return estimates(products, statistic, confidence=JOINT)[0]
+
+
+# --- report --------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class SignalComparison:
+    """The measured force signal beside that of a case, or why they are not compared.
+
+    Attributes
+    ----------
+    case : ReportedCase
+    signal : Signal
+    problem : str
+        Empty if they are compared.
+    measured : MeasuredSignal or None
+    simulated : tuple of (N,) ndarray
+        Low-pass filtered force of each packing during the drag, N, at the same rate.
+    transient_s : float
+        Time from the start of the drag that is not compared, s.
+    differences : tuple of Difference
+    """
+
+    case: ReportedCase
+    signal: Signal
+    problem: str = ""
+    measured: MeasuredSignal | None = None
+    simulated: tuple[Floats, ...] = ()
+    transient_s: float = 0.0
+    differences: tuple[Difference, ...] = ()
+
+    @property
+    def joint(self) -> float:
+        """Level of a single interval."""
+        return JOINT
+
+    @property
+    def verdicts(self) -> Counter[Equivalence]:
+        """Number of quantities with each verdict."""
+        return Counter(one.verdict for one in self.differences)
+
+    def counted(self, force_n: Floats) -> Floats:
+        """What of a signal is compared, positive in the direction in which peaks are counted."""
+        sign = -1.0 if self.signal.component == "drag" else 1.0
+        rate = RATES_PER_BANDWIDTH * self.signal.low_pass_hz
+        return sign * force_n[math.ceil(self.transient_s * rate - 1e-9) :]
+
+    def table(self) -> pd.DataFrame:
+        """One row per quantity; the intervals are those of the report."""
+        rows = []
+        for one in self.differences:
+            parts = {"measured": one.measured, "simulated": one.simulated, "relative": one.relative}
+            names = {"case": self.case.name, "quantity": one.quantity.label}
+            verdict = {"verdict": one.verdict, "needs": one.needs}
+            rows.append(flattened({**names, "unit": one.quantity.unit, **parts, **verdict}))
+        return pd.DataFrame(rows)
+
+
+def compare_signal(case: ReportedCase, file: Path | None) -> SignalComparison | None:
+    """Compare the force on the workpiece in a case with a measured signal, if the study has one.
+
+    Times of a faster workpiece are process times: in a slow drag the force follows the path, and
+    its fluctuations take as much longer as the path does.
+    """
+    first = case.first.process.case
+    signal = first.reference.signal if first.reference else None
+    if signal is None:
+        return None
+    if file is None:
+        return SignalComparison(case, signal, f"{signal.file} was not given (option --signal)")
+    factor = first.fidelity.speed_factor
+    transient_s = factor * needed(first.statistics, "statistics").transient_s
+    try:
+        measured = measured_signal(file, signal, transient_s)
+        simulated = tuple(
+            _simulated(study.process.folder, signal, study.process.case) for study in case.studies
+        )
+        found = SignalComparison(case, signal, "", measured, simulated, transient_s)
+        differences = compared(
+            found.counted(measured.force_n),
+            [found.counted(force) for force in simulated],
+            low_pass_hz=signal.low_pass_hz,
+            separation_s=factor * peak_separation_s(first),
+            margin=signal.margin,
+        )
+    except DragdeckError as error:
+        return SignalComparison(case, signal, str(error))
+    return replace(found, differences=tuple(differences))
+
+
+def _simulated(run_dir: Path, signal: Signal, case: CaseOfRun) -> Floats:
+    column = f"{signal.component}_n"
+    file = run_dir / "tables" / "workpiece_force.parquet"
+    table = read_table(file, ["time_s", "phase", column])
+    table = table[table["phase"] == "drag"]
+    time_s, force = (table[name].to_numpy(np.float64) for name in ("time_s", column))
+    return low_passed(process_time(time_s, case), force, signal.low_pass_hz)[1]
+
+
+_MARKS = {"equivalent": GREEN, "different": RED, "undecided": GREY}
+
+
+def draw_signals(found: SignalComparison) -> Figure:
+    """Both signals over time, their power spectra, and the differences with their intervals."""
+    signal, measured = found.signal, needed(found.measured, "measured signal")
+    rate = RATES_PER_BANDWIDTH * signal.low_pass_hz
+    figure = new_figure(6.4)
+    grid = figure.add_gridspec(2, 2, width_ratios=(1, 1.15), height_ratios=(1, 1.2))
+    above, left, right = (figure.add_subplot(part) for part in (grid[0, :], grid[1, 0], grid[1, 1]))
+    every = {
+        "measured": (measured.force_n, COLOURS["experiment"]),
+        "simulated": (found.simulated[0], BLUE),
+    }
+    for name, (force, colour) in every.items():
+        above.plot(np.arange(len(force)) / rate, force, color=colour, lw=0.8, label=name)
+        power = welch(found.counted(force), rate, nperseg=min(len(force) // 4, 512))
+        left.loglog(power[0][1:], power[1][1:], color=colour, label=name)
+    end = min(len(force) for force, _ in every.values()) / rate
+    transient = COLOURS["transient"]
+    above.axvspan(0, found.transient_s, color=transient, alpha=0.6, lw=0, label="transient")
+    above.set(xlabel="process time (s)", ylabel=f"{signal.component} force (N)", xlim=(0, end))
+    left.axvline(signal.low_pass_hz, color=GREY, ls=":", label="bandwidth")
+    left.set(xlabel="frequency (Hz)", ylabel="power spectral density (N²/Hz)")
+    right.axvspan(-100 * signal.margin, 100 * signal.margin, color=GREEN, alpha=0.12, lw=0)
+    for place, one in enumerate(found.differences):
+        relative = one.relative.over(0.01)
+        row(right, place, relative.value, relative, _MARKS[one.verdict])
+    for verdict, colour in _MARKS.items():
+        key(right, verdict, color=colour)
+    row_names(right, [one.quantity.label for one in found.differences])
+    right.set(xlabel="relative difference (%)", xlim=(-60, 60))
+    return legend_below(figure)
