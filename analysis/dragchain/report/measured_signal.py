@@ -24,8 +24,10 @@ from scipy.special import chdtri, ndtri
 from dragchain.arrays import Floats
 from dragchain.drag import find_drag_peaks, peak_separation_s
 from dragchain.figures.panels import key, legend_below, new_figure, row, row_names
-from dragchain.figures.style import BLUE, COLOURS, GREEN, GREY, RED
-from dragchain.report.cases import ReportedCase
+from dragchain.figures.style import COLOURS, GREEN, GREY, RED, drawing, png
+from dragchain.report.cases import ReportedCase, ReportedRun
+from dragchain.report.findings import ProcessFindings
+from dragchain.report.run_data import RunData
 from dragchain.report.values import mean_over_packings
 from dragchain.run.kinematics import needed, process_time
 from dragchain.statistics.correlated import (
@@ -35,9 +37,7 @@ from dragchain.statistics.correlated import (
     estimates,
 )
 from dragchain.statistics.estimate import CONFIDENCE, Estimate, flattened, student_quantile
-from dragchain.tables.by_step import read_table
 from dragdeck.errors import DragdeckError
-from dragdeck.records.case import CaseOfRun
 from dragdeck.study.force_record import (
     RATES_PER_BANDWIDTH,
     MeasuredSignal,
@@ -75,16 +75,13 @@ SIGNAL_QUANTITIES = (
     SignalQuantity("peak rate", "1/s"),
     SignalQuantity("mean peak height", "N"),
     SignalQuantity("correlation time", "s"),
-    *(
-        SignalQuantity(f"amplitude at {low:g} to {high:g} of bandwidth", "N")
-        for low, high in pairwise(_BANDS)
-    ),
+    *(SignalQuantity(f"amplitude, {a:g} to {b:g} of bandwidth", "N") for a, b in pairwise(_BANDS)),
 )
 
 JOINT = 1.0 - (1.0 - CONFIDENCE) / len(SIGNAL_QUANTITIES)
 """Level of a single interval."""
 
-_POWER = float(ndtri(0.95))
+_POWER, _NORMAL = float(ndtri(0.95)), float(ndtri(0.5 + 0.5 * JOINT))
 _BEYOND = 0.2
 """Chance with which packings without scatter of their own are taken to have some."""
 
@@ -126,14 +123,11 @@ class Difference:
 
         A difference that large is then found, and one of zero is called equivalent.
         """
-        if self.verdict != "undecided" or not self.relative.known:
+        one = self.relative
+        if self.verdict != "undecided" or not one.known:
             return None
-        half = max(
-            self.relative.value - self.relative.ci95_low,
-            self.relative.ci95_high - self.relative.value,
-        )
-        enough = self.margin / (1.0 + _POWER / float(ndtri(0.5 + 0.5 * JOINT)))
-        return (half / enough) ** 2
+        half = max(one.value - one.ci95_low, one.ci95_high - one.value)
+        return (half / self.margin * (1.0 + _POWER / _NORMAL)) ** 2
 
     @property
     def said(self) -> str:
@@ -173,10 +167,10 @@ def compared(
     each = [_described(force, low_pass_hz, separation_s) for force in simulated_n]
     scale = max(abs(float(measured_n.mean())), float(measured_n.std()))
     found = []
-    for number, quantity in enumerate(SIGNAL_QUANTITIES):
-        ours, between = _over_packings([one[number] for one in each])
-        relative = _difference(ours, theirs[number], None if quantity.ratio else scale)
-        found.append(Difference(quantity, theirs[number], ours, relative, margin, between))
+    for quantity, one, packings in zip(SIGNAL_QUANTITIES, theirs, zip(*each), strict=True):
+        ours, between = _over_packings(packings)
+        relative = _difference(ours, one, None if quantity.ratio else scale)
+        found.append(Difference(quantity, one, ours, relative, margin, between))
     return found
 
 
@@ -201,16 +195,14 @@ def _over_packings(values: Sequence[Estimate]) -> tuple[Estimate, bool]:
         return values[0], False
     within, count = mean_over_packings(values), len(values)
     reliable = all(one.reliable for one in values)
-    own = np.mean([((one.ci95_high - one.ci95_low) / 2) ** 2 for one in values])
-    own /= float(ndtri(0.5 + 0.5 * JOINT)) ** 2
+    own = np.mean([(one.ci95_high - one.ci95_low) ** 2 for one in values]) / (2 * _NORMAL) ** 2
     variance = float(np.var([one.value for one in values], ddof=1))
     half = (within.ci95_high - within.ci95_low) / 2
     between = variance * (count - 1) > own * chdtri(count - 1, _BEYOND)
     if between:
         reach = student_quantile(count - 1, JOINT) * math.sqrt(variance * (1 + 1 / count))
         half = max(half, reach)
-    low, high = within.value - half, within.value + half
-    return Estimate(within.value, low, high, reliable=reliable), bool(between)
+    return replace(Estimate.around(within.value, half), reliable=reliable), bool(between)
 
 
 def _described(force: Floats, low_pass_hz: float, separation_s: float) -> list[Estimate]:
@@ -220,10 +212,7 @@ def _described(force: Floats, low_pass_hz: float, separation_s: float) -> list[E
     peaks = find_drag_peaks(time, -force, min_separation_s=separation_s)
     apart = _mean(np.diff(peaks.time_s))
     edges = np.array(_BANDS) * low_pass_hz
-    bands = (
-        sosfiltfilt(butter(2, both, "bandpass", fs=rate, output="sos"), rest)
-        for both in pairwise(edges)
-    )
+    filters = (butter(2, both, "bandpass", fs=rate, output="sos") for both in pairwise(edges))
     return [
         _mean(force),
         _rms(rest),
@@ -231,7 +220,7 @@ def _described(force: Floats, low_pass_hz: float, separation_s: float) -> list[E
         Estimate(1 / apart.value, 1 / apart.ci95_high, 1 / apart.ci95_low, reliable=apart.reliable),
         _mean(-peaks.drag_n),
         _correlation_time(rest, rate),
-        *map(_rms, bands),
+        *(_rms(sosfiltfilt(one, rest)) for one in filters),
     ]
 
 
@@ -276,6 +265,8 @@ def _correlation_time(rest: Floats, rate_hz: float) -> Estimate:
 
 # --- report --------------------------------------------------------------------------------------
 
+_COLUMNS = ("measured", "simulated", "relative", "verdict", "needs")
+
 
 @dataclass(frozen=True)
 class SignalComparison:
@@ -304,11 +295,6 @@ class SignalComparison:
     differences: tuple[Difference, ...] = ()
 
     @property
-    def joint(self) -> float:
-        """Level of a single interval."""
-        return JOINT
-
-    @property
     def verdicts(self) -> Counter[Equivalence]:
         """Number of quantities with each verdict."""
         return Counter(one.verdict for one in self.differences)
@@ -323,11 +309,19 @@ class SignalComparison:
         """One row per quantity; the intervals are those of the report."""
         rows = []
         for one in self.differences:
-            parts = {"measured": one.measured, "simulated": one.simulated, "relative": one.relative}
-            names = {"case": self.case.name, "quantity": one.quantity.label}
-            verdict = {"verdict": one.verdict, "needs": one.needs}
-            rows.append(flattened({**names, "unit": one.quantity.unit, **parts, **verdict}))
+            what = {
+                "case": self.case.name,
+                "quantity": one.quantity.label,
+                "unit": one.quantity.unit,
+            }
+            found = {name: getattr(one, name) for name in _COLUMNS}
+            rows.append(flattened({**what, **found}))
         return pd.DataFrame(rows)
+
+    def picture(self) -> bytes:
+        """The figure as PNG."""
+        with drawing():
+            return png(_drawn(self))
 
 
 def compare_signal(case: ReportedCase, file: Path | None) -> SignalComparison | None:
@@ -362,36 +356,31 @@ def compare_signal(case: ReportedCase, file: Path | None) -> SignalComparison | 
     return replace(found, differences=tuple(differences))
 
 
-def _simulated(run_dir: Path, signal: Signal, case: CaseOfRun) -> Floats:
+def _simulated(run: ReportedRun[ProcessFindings], signal: Signal) -> Floats:
     column = f"{signal.component}_n"
-    file = run_dir / "tables" / "workpiece_force.parquet"
-    table = read_table(file, ["time_s", "phase", column])
+    table = RunData(run.folder, run.case).table("workpiece_force", ["time_s", "phase", column])
     table = table[table["phase"] == "drag"]
     time_s, force = (table[name].to_numpy(np.float64) for name in ("time_s", column))
-    return low_passed(process_time(time_s, case), force, signal.low_pass_hz)[1]
+    return low_passed(process_time(time_s, run.case), force, signal.low_pass_hz)[1]
 
 
 _MARKS = {"equivalent": GREEN, "different": RED, "undecided": GREY}
 
 
-def draw_signals(found: SignalComparison) -> Figure:
+def _drawn(found: SignalComparison) -> Figure:
     """Both signals over time, their power spectra, and the differences with their intervals."""
     signal, measured = found.signal, needed(found.measured, "measured signal")
     rate = RATES_PER_BANDWIDTH * signal.low_pass_hz
     figure = new_figure(6.4)
     grid = figure.add_gridspec(2, 2, width_ratios=(1, 1.15), height_ratios=(1, 1.2))
-    above, left, right = (figure.add_subplot(part) for part in (grid[0, :], grid[1, 0], grid[1, 1]))
-    every = {
-        "measured": (measured.force_n, COLOURS["experiment"]),
-        "simulated": (found.simulated[0], BLUE),
-    }
-    for name, (force, colour) in every.items():
-        above.plot(np.arange(len(force)) / rate, force, color=colour, lw=0.8, label=name)
-        power = welch(found.counted(force), rate, nperseg=min(len(force) // 4, 512))
-        left.loglog(power[0][1:], power[1][1:], color=colour, label=name)
-    end = min(len(force) for force, _ in every.values()) / rate
-    transient = COLOURS["transient"]
-    above.axvspan(0, found.transient_s, color=transient, alpha=0.6, lw=0, label="transient")
+    above, left, right = map(figure.add_subplot, (grid[0, :], grid[1, 0], grid[1, 1]))
+    every = {"experiment": measured.force_n, "drag": found.simulated[0]}
+    for (name, force), label in zip(every.items(), ("measured", "simulated"), strict=True):
+        above.plot(np.arange(len(force)) / rate, force, color=COLOURS[name], lw=0.8, label=label)
+        frequency, power = welch(found.counted(force), rate, nperseg=min(len(force) // 4, 512))
+        left.loglog(frequency[1:], power[1:], color=COLOURS[name], label=label)
+    end, grey = min(map(len, every.values())) / rate, COLOURS["transient"]
+    above.axvspan(0, found.transient_s, color=grey, alpha=0.6, lw=0, label="transient")
     above.set(xlabel="process time (s)", ylabel=f"{signal.component} force (N)", xlim=(0, end))
     left.axvline(signal.low_pass_hz, color=GREY, ls=":", label="bandwidth")
     left.set(xlabel="frequency (Hz)", ylabel="power spectral density (N²/Hz)")

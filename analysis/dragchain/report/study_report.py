@@ -332,7 +332,7 @@ def _render(
         checks=[(run, check) for run in runs for check in run.record.checks],
         costs=[(one, row) for one in sections for row in one.costs],
         compared=[(one, row) for one in cases for row in one.values.against],
-        signals=[(one, _signal_picture(one)) for one in signals],
+        signals=[(one, data_uri(one.picture()) if one.differences else None) for one in signals],
         overview=_overview(cases) if len(cases) > 1 else None,
         columns={str(name): table[name].tolist() for name in table},
         shown=_SHOWN,
@@ -358,16 +358,6 @@ def _tables(signals: Sequence[SignalComparison]) -> dict[str, pd.DataFrame]:
     """The comparison with a measured signal, if there is one."""
     found = [one.table() for one in signals if one.differences]
     return {"signal": pd.concat(found, ignore_index=True)} if found else {}
-
-
-def _signal_picture(one: SignalComparison) -> str | None:
-    from dragchain.figures.style import drawing, png
-    from dragchain.report.measured_signal import draw_signals
-
-    if not one.differences:
-        return None
-    with drawing():
-        return data_uri(png(draw_signals(one)))
 
 
 def _overview(cases: Sequence[ReportedCase]) -> str:

@@ -210,26 +210,19 @@ def _signal(study: Study, file: Path) -> Iterator[InputError]:
 
     motion, most = study.motion, study.outputs.workpiece_force_hz / RATES_PER_BANDWIDTH
     if signal.low_pass_hz > most * (1 + 1e-9):
-        yield InputError(
-            "the simulated force is sampled too slowly for this bandwidth",
-            field="reference.signal.low_pass_hz",
-            value=signal.low_pass_hz,
-            limit=f"at most {most:g} Hz, a fifth of outputs.workpiece_force_hz",
-            remedy="reduce it, or increase outputs.workpiece_force_hz",
-        )
+        field, problem = "reference.signal.low_pass_hz", "the simulated force is sampled too slowly"
+        limit = f"at most {most:g} Hz, a fifth of outputs.workpiece_force_hz"
+        yield InputError(problem, field=field, value=signal.low_pass_hz, limit=limit)
     transient_s = motion.uncounted_m / motion.axis_speed_m_s + motion.ramp_s / 2
+    field = "reference.signal.file"
     try:
-        measured_signal(recorded_file(signal.file, file, _SIGNAL_FILE), signal, transient_s)
+        measured_signal(recorded_file(signal.file, file, field), signal, transient_s)
     except RecordError as error:
-        problem, known = f"({error.reason}) {error.problem}", (error.value, error.limit)
-        value, limit = known[0] or signal.file, known[1]
-        field, remedy = _SIGNAL_FILE, error.remedy
+        problem, value = f"({error.reason}) {error.problem}", error.value or signal.file
+        limit, remedy = error.limit, error.remedy
         yield InputError(problem, field=field, value=value, limit=limit, remedy=remedy)
     except InputError as error:
         yield error
-
-
-_SIGNAL_FILE = "reference.signal.file"
 
 
 def _level(value: object) -> float:

@@ -80,12 +80,9 @@ def read_record(file: Path) -> Record:
 def _text(file: Path) -> str:
     try:
         if file.stat().st_size > _MOST_BYTES:
+            value, limit = (f"{size / 1e6:.0f} MB" for size in (file.stat().st_size, _MOST_BYTES))
             raise RecordError(
-                "huge",
-                "the file is too large",
-                value=f"{file.stat().st_size / 1e6:.0f} MB",
-                limit=f"at most {_MOST_BYTES / 1e6:.0f} MB",
-                remedy="export a shorter stretch, or at a lower rate",
+                "huge", "the file is too large", value=value, limit=f"at most {limit}"
             )
         return file.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
@@ -128,13 +125,8 @@ def _unit(column: str) -> float:
     for name, unit in FORCE_COLUMNS.items():
         if column.lower().endswith(name.removeprefix("force")):
             return unit
-    raise RecordError(
-        "columns",
-        "the name of the force column does not end in a unit",
-        value=column,
-        limit="a name that ends in _n, _mn (millinewton) or _kn",
-        remedy="rename the column in the file, for example to fx_n",
-    )
+    problem, limit = "the force column has no unit", "a name that ends in _n, _mn or _kn"
+    raise RecordError("columns", problem, value=column, limit=limit, remedy="rename the column")
 
 
 def _column(names: Sequence[str], known: dict[str, float]) -> str:
@@ -286,13 +278,9 @@ def low_passed(
     """
     rate = (len(time_s) - 1) / (time_s[-1] - time_s[0])
     if rate < RATES_PER_BANDWIDTH * low_pass_hz * (1 - 1e-6):
-        raise RecordError(
-            "slow",
-            "the signal is sampled too slowly for the bandwidth",
-            value=f"{rate:.4g} Hz",
-            limit=f"low_pass_hz of at most {rate / RATES_PER_BANDWIDTH:.3g} Hz",
-            remedy="reduce low_pass_hz, or sample faster",
-        )
+        problem, remedy = "sampled too slowly for the bandwidth", "reduce low_pass_hz"
+        value, limit = f"{rate:.4g} Hz", f"at least {RATES_PER_BANDWIDTH * low_pass_hz:.4g} Hz"
+        raise RecordError("slow", problem, value=value, limit=limit, remedy=remedy)
     smooth = sosfiltfilt(butter(_ORDER, low_pass_hz, fs=rate, output="sos"), force_n)
     grid = np.arange(begin_s, time_s[-1], 1.0 / (RATES_PER_BANDWIDTH * low_pass_hz))
     return grid, np.asarray(CubicSpline(time_s, smooth)(grid))
@@ -312,7 +300,7 @@ def measured_signal(file: Path, signal: Signal, transient_s: float) -> MeasuredS
     Raises
     ------
     RecordError
-        ``huge``, ``file``, ``columns``, ``numbers``, ``time``, ``uneven``, ``short``, ``rest``,
+        ``huge``, ``file``, ``columns``, ``numbers``, ``time``, ``uneven``, ``short``,
         ``start``, ``clipped`` or ``slow``.
     """
     time, raw = parse_record(_text(file), signal.column, signal.rate_hz)
@@ -336,13 +324,10 @@ def _within(time: Floats, span: Span, field: str) -> slice:
     """The samples between two times; at least `_BLOCKS` of them."""
     first, last = np.searchsorted(time, span)
     if last - first < _BLOCKS:
-        raise RecordError(
-            "rest" if field == "rest_s" else "short",
-            f"{field}: too few samples from {span[0]:.6g} to {span[1]:.6g} s",
-            value=str(max(int(last - first), 0)),
-            limit=f"at least {_BLOCKS}; the file is from {time[0]:.6g} to {time[-1]:.6g} s",
-            remedy="correct the times, or record for a longer time",
-        )
+        problem = f"too few samples from {span[0]:.6g} to {span[1]:.6g} s"
+        limit = f"at least {_BLOCKS}; the file is from {time[0]:.6g} to {time[-1]:.6g} s"
+        value, remedy = f"{max(last - first, 0)}", f"correct {field}, or record for a longer time"
+        raise RecordError("short", problem, value=value, limit=limit, remedy=remedy)
     return slice(int(first), int(last))
 
 
@@ -363,23 +348,16 @@ def _start(time: Floats, force: Floats, signal: Signal, interval: float) -> tupl
     """
     if signal.starts_at_s is not None:
         return signal.starts_at_s, interval
+    remedy = "add starts_at_s: the time in the file at which the drag starts"
     if not signal.rest_s:
-        raise RecordError(
-            "start",
-            "the start of the drag is not known",
-            limit="starts_at_s, or rest_s, after which it can be found",
-            remedy="add starts_at_s: the time in the file at which the drag starts",
-        )
+        raise RecordError("start", "neither starts_at_s nor rest_s is given", remedy=remedy)
     rest = force[(time >= signal.rest_s[0][0]) & (time <= signal.rest_s[0][1])]
     size, after = np.abs(force), time > signal.rest_s[0][1]
     onset = np.flatnonzero(after & (size > _ONSET_STDS * rest.std()))
     if not len(onset):
-        raise RecordError(
-            "start",
-            "the force never leaves the noise of rest_s",
-            value=f"standard deviation there {rest.std():.3g} N",
-            remedy="correct rest_s, which must not include the drag; or add starts_at_s",
-        )
+        value = f"standard deviation {rest.std():.3g} N"
+        problem = "the force never leaves the noise of rest_s"
+        raise RecordError("start", problem, value=value, remedy=remedy)
     quiet = np.flatnonzero(size[: onset[0]] < _QUIET_STDS * rest.std())
     last = time[quiet[-1]] if len(quiet) else time[0]
     return float(time[onset[0]]), max(float(time[onset[0]] - last), _RISE / signal.low_pass_hz)
@@ -393,13 +371,10 @@ def _check_clipped(raw: Floats, interval: float, low_pass_hz: float) -> None:
         ends = np.flatnonzero(np.diff(np.pad((raw == extreme).astype(int), 1)))
         longest = int(np.max(ends[1::2] - ends[::2]))
         if longest >= most:
-            raise RecordError(
-                "clipped",
-                "the signal is clipped: sensor or amplifier reached its limit",
-                value=f"{longest} samples in a row of {extreme:.6g} (as in the file, in N)",
-                limit=f"fewer than {most:.0f} equal samples at an extreme",
-                remedy="measure in a wider range",
-            )
+            problem = "the signal is clipped: sensor or amplifier reached its limit"
+            value, limit = f"{longest} samples of {extreme:.6g} in a row", f"fewer than {most:.0f}"
+            remedy = "measure in a wider range"
+            raise RecordError("clipped", problem, value=value, limit=limit, remedy=remedy)
 
 
 def _check_length(force: Floats, low_pass_hz: float) -> None:
@@ -408,11 +383,8 @@ def _check_length(force: Floats, low_pass_hz: float) -> None:
     products = correlate(rest, rest, method="fft")[len(rest) - 1 :]
     lag = max(int(np.argmax(products < products[0] / np.e)), 1)
     if len(force) < _LEAST_LENGTHS * lag or not products[0] > 0.0:
-        seconds = 1.0 / (RATES_PER_BANDWIDTH * low_pass_hz)
-        raise RecordError(
-            "short",
-            "the signal after the transient is too short for its own correlation",
-            value=f"{len(force) * seconds:.3g} s, correlation time {lag * seconds:.3g} s",
-            limit=f"at least {_LEAST_LENGTHS * lag * seconds:.3g} s",
-            remedy="record for a longer time; or subtract a drift with two stretches in rest_s",
-        )
+        step = 1.0 / (RATES_PER_BANDWIDTH * low_pass_hz)
+        problem = "after the transient it is too short for its own correlation"
+        value = f"{len(force) * step:.3g} s, correlation time {lag * step:.3g} s"
+        limit, remedy = f"at least {_LEAST_LENGTHS * lag * step:.3g} s", "record for a longer time"
+        raise RecordError("short", problem, value=value, limit=limit, remedy=remedy)

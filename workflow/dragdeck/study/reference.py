@@ -25,49 +25,29 @@ Span = tuple[Number, Number]
 class Signal(Model):
     """A measured force signal, with which that of the simulation is compared."""
 
-    file: Line = Field(
-        pattern=r"^[^{}]*$",
-        description="CSV file of the force against time, beside the study; at most 64 MB",
-    )
-    column: Line = Field(
-        description="name of the force column, which ends in its unit: `_n`, `_mn` (millinewton) "
-        "or `_kn`"
-    )
+    file: Line = Field(pattern=r"^[^{}]*$", description="CSV file of force against time, <= 64 MB")
+    column: Line = Field(description="name of the force column; ends in `_n`, `_mn` or `_kn`")
     rate_hz: Positive | None = Field(
-        default=None,
-        description="sampling rate, Hz; none: the file has a column `time_s`, `time_ms` or "
-        "`time_us`",
+        default=None, description="sampling rate, Hz; none: a column `time_s`, `_ms` or `_us`"
     )
     component: Literal["drag", "lateral", "vertical"] = Field(
-        default="drag",
-        description="axis of the sensor: along the motion, to its left, or upwards",
+        default="drag", description="axis: along the motion, to its left, or upwards"
     )
     sign: Literal[1, -1] = Field(
-        default=1,
-        description="1: the column is the force on the workpiece, positive along this axis; -1: "
-        "it is positive in the opposite direction, as a resistance is",
+        default=1, description="1: force on the workpiece along this axis; -1: resistance"
     )
     rest_s: Annotated[tuple[Span, ...], Field(max_length=2)] = Field(
-        default=(),
-        description="stretches of the file without load, beginning and end in s: the mean of one "
-        "is the offset, the line through two is offset and drift; none: already subtracted",
+        default=(), description="stretches without load, s: one for the offset, two for a drift too"
     )
     starts_at_s: Number | None = Field(
-        default=None,
-        description="time in the file at which the drag starts, s; none: where the force leaves "
-        "the noise of the first stretch in `rest_s`",
+        default=None, description="start of the drag in the file, s; none: found after `rest_s`"
     )
     ends_at_s: Number | None = Field(
-        default=None,
-        description="time in the file at which the drag ends, s; none: the end of the file, or "
-        "the second stretch in `rest_s`",
+        default=None, description="end of the drag in the file, s; none: of the file, or rest_s.1"
     )
-    low_pass_hz: Positive = Field(
-        description="bandwidth of the comparison, Hz, at most a fifth of both sampling rates"
-    )
+    low_pass_hz: Positive = Field(description="bandwidth, Hz: at most a fifth of both rates")
     margin: Annotated[Number, Field(gt=0, lt=1)] = Field(
-        default=0.1,
-        description="largest relative difference at which a quantity is called equivalent",
+        default=0.1, description="largest relative difference that is called equivalent"
     )
 
 
@@ -80,5 +60,5 @@ class Reference(Model):
     signal: Signal | None = Field(
         default=None,
         exclude_if=lambda value: value is None,
-        description="a measured force signal, with which that of the simulation is compared",
+        description="a measured force signal to compare with",
     )
