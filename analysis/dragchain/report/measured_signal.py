@@ -30,20 +30,11 @@ from dragchain.report.findings import ProcessFindings
 from dragchain.report.run_data import RunData
 from dragchain.report.values import mean_over_packings
 from dragchain.run.kinematics import needed, process_time
-from dragchain.statistics.correlated import (
-    MIN_SAMPLES,
-    autocovariance,
-    estimate_mean,
-    estimates,
-)
+from dragchain.statistics.correlated import MIN_SAMPLES, autocovariance, estimate_mean, estimates
 from dragchain.statistics.estimate import CONFIDENCE, Estimate, flattened, student_quantile
 from dragdeck.errors import DragdeckError
-from dragdeck.study.force_record import (
-    RATES_PER_BANDWIDTH,
-    MeasuredSignal,
-    low_passed,
-    measured_signal,
-)
+from dragdeck.study.force_record import RATES_PER_BANDWIDTH as PER_HZ
+from dragdeck.study.force_record import MeasuredSignal, low_passed, measured_signal
 from dragdeck.study.reference import Signal
 
 # --- statistics ----------------------------------------------------------------------------------
@@ -129,6 +120,11 @@ class Difference:
         half = max(one.value - one.ci95_low, one.ci95_high - one.value)
         return (half / self.margin * (1.0 + _POWER / _NORMAL)) ** 2
 
+    def row(self) -> dict[str, object]:
+        """A row of a table."""
+        names = ("measured", "simulated", "relative", "verdict", "needs")
+        return {**self.quantity._asdict(), **{name: getattr(self, name) for name in names}}
+
     @property
     def said(self) -> str:
         """The verdict in words."""
@@ -164,10 +160,11 @@ def compared(
         If a signal is too short.
     """
     theirs = _described(measured_n, low_pass_hz, separation_s)
-    each = [_described(force, low_pass_hz, separation_s) for force in simulated_n]
+    described = [_described(force, low_pass_hz, separation_s) for force in simulated_n]
+    each = zip(*described, strict=True)
     scale = max(abs(float(measured_n.mean())), float(measured_n.std()))
     found = []
-    for quantity, one, packings in zip(SIGNAL_QUANTITIES, theirs, zip(*each), strict=True):
+    for quantity, one, packings in zip(SIGNAL_QUANTITIES, theirs, each, strict=True):
         ours, between = _over_packings(packings)
         relative = _difference(ours, one, None if quantity.ratio else scale)
         found.append(Difference(quantity, one, ours, relative, margin, between))
@@ -207,7 +204,7 @@ def _over_packings(values: Sequence[Estimate]) -> tuple[Estimate, bool]:
 
 def _described(force: Floats, low_pass_hz: float, separation_s: float) -> list[Estimate]:
     """The quantities of a signal in the order of `SIGNAL_QUANTITIES`."""
-    rate, rest = RATES_PER_BANDWIDTH * low_pass_hz, force - force.mean()
+    rate, rest = PER_HZ * low_pass_hz, force - force.mean()
     time = np.arange(len(force)) / rate
     peaks = find_drag_peaks(time, -force, min_separation_s=separation_s)
     apart = _mean(np.diff(peaks.time_s))
@@ -265,8 +262,6 @@ def _correlation_time(rest: Floats, rate_hz: float) -> Estimate:
 
 # --- report --------------------------------------------------------------------------------------
 
-_COLUMNS = ("measured", "simulated", "relative", "verdict", "needs")
-
 
 @dataclass(frozen=True)
 class SignalComparison:
@@ -302,21 +297,13 @@ class SignalComparison:
     def counted(self, force_n: Floats) -> Floats:
         """What of a signal is compared, positive in the direction in which peaks are counted."""
         sign = -1.0 if self.signal.component == "drag" else 1.0
-        rate = RATES_PER_BANDWIDTH * self.signal.low_pass_hz
+        rate = PER_HZ * self.signal.low_pass_hz
         return sign * force_n[math.ceil(self.transient_s * rate - 1e-9) :]
 
     def table(self) -> pd.DataFrame:
         """One row per quantity; the intervals are those of the report."""
-        rows = []
-        for one in self.differences:
-            what = {
-                "case": self.case.name,
-                "quantity": one.quantity.label,
-                "unit": one.quantity.unit,
-            }
-            found = {name: getattr(one, name) for name in _COLUMNS}
-            rows.append(flattened({**what, **found}))
-        return pd.DataFrame(rows)
+        rows = ({"case": self.case.name, **one.row()} for one in self.differences)
+        return pd.DataFrame(map(flattened, rows))
 
     def picture(self) -> bytes:
         """The figure as PNG."""
@@ -340,9 +327,7 @@ def compare_signal(case: ReportedCase, file: Path | None) -> SignalComparison | 
     transient_s = factor * needed(first.statistics, "statistics").transient_s
     try:
         measured = measured_signal(file, signal, transient_s)
-        simulated = tuple(
-            _simulated(study.process.folder, signal, study.process.case) for study in case.studies
-        )
+        simulated = tuple(_simulated(study.process, signal) for study in case.studies)
         found = SignalComparison(case, signal, "", measured, simulated, transient_s)
         differences = compared(
             found.counted(measured.force_n),
@@ -370,7 +355,7 @@ _MARKS = {"equivalent": GREEN, "different": RED, "undecided": GREY}
 def _drawn(found: SignalComparison) -> Figure:
     """Both signals over time, their power spectra, and the differences with their intervals."""
     signal, measured = found.signal, needed(found.measured, "measured signal")
-    rate = RATES_PER_BANDWIDTH * signal.low_pass_hz
+    rate = PER_HZ * signal.low_pass_hz
     figure = new_figure(6.4)
     grid = figure.add_gridspec(2, 2, width_ratios=(1, 1.15), height_ratios=(1, 1.2))
     above, left, right = map(figure.add_subplot, (grid[0, :], grid[1, 0], grid[1, 1]))
