@@ -1,6 +1,6 @@
 """How often the comparison of two force signals finds a difference that is or is not there.
 
-    python benchmarks/signals.py trials OUT.csv [--trials 400]    # synthetic signals of known truth
+    python benchmarks/signals.py trials OUT.csv [--trials 120]    # synthetic signals of known truth
     python benchmarks/signals.py example RUN_DIR OUT.csv          # a run as a dynamometer shows it
 
 In half of the trials the simulated signal is another realisation of the measured one, in the other
@@ -23,7 +23,7 @@ from dragdeck.study.force_record import low_passed
 BANDWIDTH_HZ, MARGIN, PLANTED = 20.0, 0.1, 0.1
 REVOLUTION_S = 11.9
 """Counted time of a revolution of the study uhlmann2015, s."""
-LENGTHS = (1, 5, 10, 40)
+LENGTHS = (1, 5, 15)
 MEAN_N, SPREAD = 2.6, 0.23
 CORRELATION = ((0.8, 0.05), (0.2, 0.25))
 """Share of the variance and correlation time in s of the parts of the logarithm of the force."""
@@ -58,9 +58,8 @@ def trials(count: int, lengths: tuple[int, ...] = LENGTHS) -> pd.DataFrame:
             verdicts = np.array([[one.verdict for one in each] for each in found])
             needs = np.array([[one.needs or np.nan for one in each] for each in found])
             for at, quantity in enumerate(SIGNAL_QUANTITIES):
-                shares = {
-                    word: (verdicts[:, at] == word).mean() for word in ("different", "equivalent")
-                }
+                words = ("different", "equivalent")
+                shares = {word: (verdicts[:, at] == word).mean() for word in words}
                 needed = float(np.nanmedian(np.append(needs[:, at], np.nan)))
                 rows.append({"revolutions": length, "planted": planted,
                              "quantity": quantity.label, **shares, "needs": needed})  # fmt: skip
@@ -80,15 +79,12 @@ def example(run_dir: Path) -> str:
     shown = np.interp(grid, time, force, 0.0, 0.0) + OFFSET_N + DRIFT_N_S * (grid + REST_S)
     shown += random.normal(0.0, NOISE_N, len(grid))
     head = (
-        f"# SYNTHETIC, no measurement: the drag of another packing times {FACTOR:g}, with offset,"
+        f"# SYNTHETIC, no measurement: the drag of another packing times {FACTOR:g}, with offset,",
+        "# drift and noise of a sensor; made by benchmarks/signals.py",
+        "time_s,fx_n",
     )
     rows = (f"{at + REST_S:.3f},{force:.3f}" for at, force in zip(grid, shown, strict=True))
-    return (
-        "\n".join(
-            [head, "# drift and noise of a sensor; benchmarks/signals.py", "time_s,fx_n", *rows]
-        )
-        + "\n"
-    )
+    return "\n".join([*head, *rows]) + "\n"
 
 
 def main() -> None:
@@ -96,7 +92,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("what", choices=("trials", "example"))
     parser.add_argument("files", type=Path, nargs="+", metavar="FILE")
-    parser.add_argument("--trials", type=int, default=400)
+    parser.add_argument("--trials", type=int, default=120)
     options = parser.parse_args()
     if options.what == "trials":
         trials(options.trials).round(4).to_csv(options.files[-1], index=False)
