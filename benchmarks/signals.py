@@ -15,12 +15,12 @@ import pandas as pd
 from scipy.signal import lfilter
 
 from dragchain.arrays import Floats
-from dragchain.report.measured_signal import SIGNAL_QUANTITIES, compared
+from dragchain.report.measured_signal import SIGNAL_QUANTITIES, Difference, compared
 from dragchain.run.kinematics import process_time
 from dragdeck.records.case import load_case
 from dragdeck.study.force_record import low_passed
 
-BANDWIDTH_HZ, MARGIN, PLANTED = 20.0, 0.1, 0.1
+BANDWIDTH_HZ, FOUND = 20.0, 1.1
 REVOLUTION_S = 11.9
 """Counted time of a revolution of the study uhlmann2015, s."""
 LENGTHS = (1, 5, 15)
@@ -44,29 +44,43 @@ def synthetic(random: np.random.Generator, seconds: float) -> Floats:
 
 
 def trials(count: int, lengths: tuple[int, ...] = LENGTHS) -> pd.DataFrame:
-    """Fractions of verdicts: a row per length, planted difference and quantity; last `any`."""
+    """Fractions of trials by length and quantity, and for `any` of them.
+
+    `found`: called different if every force is 10 % larger; `false`: if the truth is the same;
+    `equivalent`: if the truth is the same; `needs`: median multiple of the length in the latter.
+    """
     rows, random = [], np.random.default_rng(28)
+    labels = [one.label for one in SIGNAL_QUANTITIES]
     for length in lengths:
-        for planted in (0.0, PLANTED):
-            found = []
-            for _ in range(count):
-                a, b = (synthetic(random, length * REVOLUTION_S) for _ in range(2))
-                found.append(
-                    compared(a, [(1 + planted) * b], low_pass_hz=BANDWIDTH_HZ, separation_s=0.327,
-                             margin=MARGIN)
-                )  # fmt: skip
-            verdicts = np.array([[one.verdict for one in each] for each in found])
-            needs = np.array([[one.needs or np.nan for one in each] for each in found])
-            for at, quantity in enumerate(SIGNAL_QUANTITIES):
-                words = ("different", "equivalent")
-                shares = {word: (verdicts[:, at] == word).mean() for word in words}
-                needed = float(np.nanmedian(np.append(needs[:, at], np.nan)))
-                rows.append({"revolutions": length, "planted": planted,
-                             "quantity": quantity.label, **shares, "needs": needed})  # fmt: skip
-            some = (verdicts == "different").any(axis=1).mean()
-            rows.append({"revolutions": length, "planted": planted, "quantity": "any",
-                         "different": some, "trials": count})  # fmt: skip
+        seconds = length * REVOLUTION_S
+        same, larger = (_compared(random, count, seconds, factor) for factor in (1.0, FOUND))
+        needs = np.array([[one.needs or np.nan for one in each] for each in same])
+        null, planted = (
+            np.array([[one.verdict for one in each] for each in some]) for some in (same, larger)
+        )
+        columns = [*zip(labels, np.eye(len(labels), dtype=bool), strict=True), ("any", ...)]
+        for name, which in columns:
+            rows.append(
+                {
+                    "revolutions": length,
+                    "quantity": name,
+                    "found": (planted[:, which] == "different").any(axis=1).mean(),
+                    "false": (null[:, which] == "different").any(axis=1).mean(),
+                    "equivalent": (null[:, which] == "equivalent").all(axis=1).mean(),
+                    "needs": pd.DataFrame(needs[:, which]).median().median(),
+                    "trials": count,
+                }
+            )
     return pd.DataFrame(rows)
+
+
+def _compared(
+    random: np.random.Generator, count: int, seconds: float, factor: float
+) -> list[list[Difference]]:
+    """Comparisons of pairs of realisations, the second times a factor."""
+    pairs = ([synthetic(random, seconds) for _ in "ab"] for _ in range(count))
+    usual = {"low_pass_hz": BANDWIDTH_HZ, "separation_s": 0.327, "margin": FOUND - 1.0}
+    return [compared(one, [factor * other], **usual) for one, other in pairs]
 
 
 def example(run_dir: Path) -> str:

@@ -135,7 +135,7 @@ def _column(names: Sequence[str], known: dict[str, float]) -> str:
         raise RecordError(
             "columns",
             f"{len(found) or 'no'} column(s) with a recognised name",
-            value=", ".join(names)[:200],
+            value=", ".join(names)[:200] if {*names} & {*TIME_COLUMNS, *FORCE_COLUMNS} else None,
             limit=f"one of {', '.join(known)}",
             remedy="name the columns in the first line, for example time_s,force_n",
         )
@@ -255,9 +255,7 @@ class MeasuredSignal:
     start_error_s: float
 
 
-def low_passed(
-    time_s: Floats, force_n: Floats, low_pass_hz: float, begin_s: float = 0.0
-) -> tuple[Floats, Floats]:
+def low_passed(time_s: Floats, force_n: Floats, low_pass_hz: float) -> tuple[Floats, Floats]:
     """A signal at the common rate of a comparison, low-pass filtered without a shift in time.
 
     A Butterworth filter of fourth order is applied forwards and backwards: the power at
@@ -268,8 +266,11 @@ def low_passed(
     time_s, force_n : (N,) ndarray
         Even times, s, and forces, N.
     low_pass_hz : float
-    begin_s : float
-        First time of the result, s; the others follow at the common rate.
+
+    Returns
+    -------
+    (M,) ndarray, (M,) ndarray
+        Times from 0 on, s, and forces, N.
 
     Raises
     ------
@@ -282,7 +283,7 @@ def low_passed(
         value, limit = f"{rate:.4g} Hz", f"at least {RATES_PER_BANDWIDTH * low_pass_hz:.4g} Hz"
         raise RecordError("slow", problem, value=value, limit=limit, remedy=remedy)
     smooth = sosfiltfilt(butter(_ORDER, low_pass_hz, fs=rate, output="sos"), force_n)
-    grid = np.arange(begin_s, time_s[-1], 1.0 / (RATES_PER_BANDWIDTH * low_pass_hz))
+    grid = np.arange(0.0, time_s[-1], 1.0 / (RATES_PER_BANDWIDTH * low_pass_hz))
     return grid, np.asarray(CubicSpline(time_s, smooth)(grid))
 
 
@@ -307,8 +308,7 @@ def measured_signal(file: Path, signal: Signal, transient_s: float) -> MeasuredS
     time, interval = _even(time, raw)
     rests = [_within(time, span, "rest_s") for span in signal.rest_s]
     force = signal.sign * (raw - _baseline(time, raw, rests))
-    smooth_s, smooth = low_passed(time, force, signal.low_pass_hz, float(time[0]))
-    start, error = _start(smooth_s, smooth, signal, interval)
+    start, error = _start(time, force, signal, interval)
     end = float(time[-1]) if signal.ends_at_s is None else signal.ends_at_s
     if signal.ends_at_s is None and len(rests) > 1 and signal.rest_s[1][0] > start:
         end = signal.rest_s[1][0]
@@ -344,7 +344,7 @@ def _start(time: Floats, force: Floats, signal: Signal, interval: float) -> tupl
 
     The force leaves the noise where it first exceeds six standard deviations of the rest. The
     uncertainty is the time since it was last below three of them, at least the rise time of the
-    filter.
+    filter. The filter itself, which spreads a step to both sides, is not applied before.
     """
     if signal.starts_at_s is not None:
         return signal.starts_at_s, interval
