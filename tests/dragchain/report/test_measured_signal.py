@@ -123,7 +123,7 @@ def test_the_report_has_both_signals_and_the_verdicts(process: Path, tmp_path: P
     assert table.loc["mean", "verdict"] == "different"
     assert table.loc["mean", "relative_ci95_low"] < -0.2 < table.loc["mean", "relative_ci95_high"]
     assert table["verdict"].isin(["equivalent", "different", "undecided"]).all()
-    assert len(page_of(tmp_path / "out").images) == len(PICTURES) + 2
+    assert len(page_of(tmp_path / "out").images) == len(PICTURES) + 1
 
 
 def test_a_report_without_the_signal_says_so(process: Path, tmp_path: Path) -> None:
