@@ -1,7 +1,7 @@
 """How often the comparison of two force signals finds a difference that is or is not there.
 
-    python benchmarks/signals.py trials OUT.csv [--trials 120]    # synthetic signals of known truth
-    python benchmarks/signals.py example RUN_DIR OUT.csv          # a run as a dynamometer shows it
+    python benchmarks/signals.py OUT.csv [--trials 120]    # synthetic signals of known truth
+    python benchmarks/signals.py RUN_DIR OUT.csv           # a run as a dynamometer shows it
 
 In half of the trials the simulated signal is another realisation of the measured one, in the other
 half one of which every force is 10 % larger.
@@ -24,6 +24,7 @@ BANDWIDTH_HZ, FOUND = 20.0, 1.1
 REVOLUTION_S = 11.9
 """Counted time of a revolution of the study uhlmann2015, s."""
 LENGTHS = (1, 5, 15)
+COLUMNS = ("revolutions", "quantity", "found", "false", "equivalent", "needs", "trials")
 MEAN_N, SPREAD = 2.6, 0.23
 CORRELATION = ((0.8, 0.05), (0.2, 0.25))
 """Share of the variance and correlation time in s of the parts of the logarithm of the force."""
@@ -54,24 +55,19 @@ def trials(count: int, lengths: tuple[int, ...] = LENGTHS) -> pd.DataFrame:
     for length in lengths:
         seconds = length * REVOLUTION_S
         same, larger = (_compared(random, count, seconds, factor) for factor in (1.0, FOUND))
-        needs = np.array([[one.needs or np.nan for one in each] for each in same])
+        needs = pd.DataFrame([[one.needs for one in each] for each in same], columns=labels)
         null, planted = (
             np.array([[one.verdict for one in each] for each in some]) for some in (same, larger)
         )
-        columns = [*zip(labels, np.eye(len(labels), dtype=bool), strict=True), ("any", ...)]
-        for name, which in columns:
-            rows.append(
-                {
-                    "revolutions": length,
-                    "quantity": name,
-                    "found": (planted[:, which] == "different").any(axis=1).mean(),
-                    "false": (null[:, which] == "different").any(axis=1).mean(),
-                    "equivalent": (null[:, which] == "equivalent").all(axis=1).mean(),
-                    "needs": pd.DataFrame(needs[:, which]).median().median(),
-                    "trials": count,
-                }
-            )
-    return pd.DataFrame(rows)
+        for name, which in (
+            *zip(labels, np.eye(len(labels), dtype=bool), strict=True),
+            ("any", ...),
+        ):
+            shares = [(some[:, which] == "different").any(1).mean() for some in (planted, null)]
+            shares.append((null[:, which] == "equivalent").all(1).mean())
+            needed = needs[name].astype(float).median() if name in labels else np.nan
+            rows.append([length, name, *shares, needed, count])
+    return pd.DataFrame(rows, columns=COLUMNS)
 
 
 def _compared(
@@ -104,14 +100,13 @@ def example(run_dir: Path) -> str:
 def main() -> None:
     """Write the record of the trials, or the example."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("what", choices=("trials", "example"))
     parser.add_argument("files", type=Path, nargs="+", metavar="FILE")
     parser.add_argument("--trials", type=int, default=120)
-    options = parser.parse_args()
-    if options.what == "trials":
-        trials(options.trials).round(4).to_csv(options.files[-1], index=False)
+    *run_dir, out = (options := parser.parse_args()).files
+    if run_dir:
+        out.write_text(example(run_dir[0]), encoding="utf-8")
     else:
-        options.files[-1].write_text(example(options.files[0]), encoding="utf-8")
+        trials(options.trials).round(4).to_csv(out, index=False)
 
 
 if __name__ == "__main__":

@@ -120,11 +120,6 @@ class Difference:
         half = max(one.value - one.ci95_low, one.ci95_high - one.value)
         return (half / self.margin * (1.0 + _POWER / _NORMAL)) ** 2
 
-    def row(self) -> dict[str, object]:
-        """A row of a table."""
-        names = ("measured", "simulated", "relative", "verdict", "needs")
-        return {**self.quantity._asdict(), **{name: getattr(self, name) for name in names}}
-
     @property
     def said(self) -> str:
         """The verdict in words."""
@@ -302,7 +297,11 @@ class SignalComparison:
 
     def table(self) -> pd.DataFrame:
         """One row per quantity; the intervals are those of the report."""
-        rows = ({"case": self.case.name, **one.row()} for one in self.differences)
+        names = ("measured", "simulated", "relative", "verdict", "needs")
+        rows = (
+            {"case": self.case.name, **one.quantity._asdict()} | {k: getattr(one, k) for k in names}
+            for one in self.differences
+        )
         return pd.DataFrame(map(flattened, rows))
 
     def picture(self) -> bytes:
