@@ -28,7 +28,7 @@ COLUMNS = ("revolutions", "quantity", "found", "false", "equivalent", "needs", "
 MEAN_N, SPREAD = 2.6, 0.23
 CORRELATION = ((0.8, 0.05), (0.2, 0.25))
 """Share of the variance and correlation time in s of the parts of the logarithm of the force."""
-FACTOR, OFFSET_N, DRIFT_N_S, NOISE_N, REST_S = 1.25, 0.8, 0.02, 0.05, 1.5
+FACTOR, OFFSET_N, DRIFT_N_S, NOISE_N, REST_S = 2.0, 0.8, 0.02, 0.05, 1.5
 
 
 def synthetic(random: np.random.Generator, seconds: float) -> Floats:
@@ -64,9 +64,11 @@ def trials(count: int, lengths: tuple[int, ...] = LENGTHS) -> pd.DataFrame:
             ("any", ...),
         ):
             shares = [(some[:, which] == "different").any(1).mean() for some in (planted, null)]
-            shares.append((null[:, which] == "equivalent").all(1).mean())
-            needed = needs[name].astype(float).median() if name in labels else np.nan
-            rows.append([length, name, *shares, needed, count])
+            more = [np.nan, np.nan]
+            if name in labels:
+                equivalent = (null[:, which] == "equivalent").mean()
+                more = [equivalent, needs[name].astype(float).median()]
+            rows.append([length, name, *shares, *more, count])
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
