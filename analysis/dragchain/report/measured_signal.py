@@ -73,6 +73,7 @@ JOINT = 1.0 - (1.0 - CONFIDENCE) / len(SIGNAL_QUANTITIES)
 """Level of a single interval."""
 
 _POWER, _NORMAL = float(ndtri(0.95)), float(ndtri(0.5 + 0.5 * JOINT))
+_MOST_SAID = 100
 _BEYOND = 0.2
 """Chance with which packings without scatter of their own are taken to have some."""
 
@@ -123,9 +124,9 @@ class Difference:
     @property
     def said(self) -> str:
         """The verdict in words."""
-        more = "packings" if self.between else "length"
-        needs = f": needs {self.needs:.2g} times the {more}" if self.needs else ""
-        return self.verdict + needs
+        more, times = "packings" if self.between else "length", self.needs or 0.0
+        size = f"{times:.2g}" if times < _MOST_SAID else f"more than {_MOST_SAID}"
+        return self.verdict + (f": needs {size} times the {more}" if times else "")
 
 
 def compared(
@@ -375,5 +376,5 @@ def _drawn(found: SignalComparison) -> Figure:
     for verdict, colour in _MARKS.items():
         key(right, verdict, color=colour)
     row_names(right, [one.quantity.label for one in found.differences])
-    right.set(xlabel="relative difference (%)", xlim=(-60, 60))
+    right.set(xlabel="relative difference (%)", xlim=(-100, 100))
     return legend_below(figure)
