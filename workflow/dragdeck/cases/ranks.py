@@ -10,7 +10,7 @@ CORES_VARIABLE = "DRAGDECK_CORES"
 
 FEWEST_PARTICLES_A_RANK = 5000
 """``ranks: auto`` assigns no rank fewer particles. Two ranks of this size cost little more CPU time
-than one rank with all particles (docs/evidence/scale.md). Smaller runs are short in any case, and
+than one rank with all particles (docs/development/benchmarks.md). Smaller runs are short in any case, and
 on a shared machine their ranks wait for each other."""
 
 _ALWAYS_ACCEPTED = 2
