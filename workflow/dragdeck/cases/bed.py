@@ -195,7 +195,7 @@ def skin(study: Study) -> float:
 
 
 def widest_skin(study: Study) -> float:
-    """Widest neighbour skin without a measurable cost, m (docs/evidence/costs.md)."""
+    """Widest neighbour skin without a measurable cost, m (docs/development/benchmarks.md)."""
     return round_to(0.3 * study.media.typical_radius_m, 3)
 
 
