@@ -17,7 +17,7 @@ from dragchain.figures.panels import depth_bars, head, new_panels
 from dragchain.figures.rendering import Camera, Image, check_rendering, new_plotter, photograph
 from dragchain.figures.style import GREY, WIDTH_IN, force_map
 from dragchain.loading.document import Loading, Profile
-from dragchain.loading.samples import Sampled, as_polydata
+from dragchain.loading.samples import Sampled, as_polydata, patches
 from dragchain.loading.summary import DEPTH_BINS
 from dragchain.run.kinematics import motion_of, needed, spins
 from dragchain.run.workpiece import Surface
@@ -143,13 +143,9 @@ def _render(mesh: Any, eye: tuple[float, float], scale: Normalize, case: CaseOfR
 def averaged_load(surface: Surface, facets: pd.DataFrame, case: CaseOfRun) -> Floats:
     """Load of each facet, (N,) in Pa: the mean over the area of those that lie beside it.
 
-    Facets are beside each other in a cube of a particle's radius, if they face the same way.
-    Single ones are hit by chance: a map of them shows the mesh instead of the load.
+    They are those of a patch of the size of a particle's radius.
     """
-    cells = np.floor(surface.corners.mean(axis=1) / case.media.radius_mean_m)
-    faced = np.round(surface.normals)
-    _, group = np.unique(np.column_stack([cells, faced]), axis=0, return_inverse=True)
-    group = group.ravel()
+    group = patches(surface, case.media.radius_mean_m)
     area = facets["area_m2"].to_numpy(np.float64)
     load = np.bincount(group, facets[_QUANTITY].to_numpy(np.float64) * area)
     mean: Floats = load[group] / np.bincount(group, area)[group]

@@ -81,6 +81,8 @@ class Stop:
         Whether the outputs of the drag begin here.
     mark : str
         File into which the state is written then; empty for none.
+    wakes : bool
+        Whether the outputs that wait begin here.
     """
 
     step: int
@@ -88,6 +90,7 @@ class Stop:
     first: bool = False
     writes: bool = False
     mark: str = ""
+    wakes: bool = False
 
 
 def plunge_point(motion: Motion) -> Point:

@@ -36,6 +36,7 @@ from dragdeck.scenes.motion import (
     Course,
     Periods,
     ProcessDeck,
+    Stop,
     course,
     moved_workpiece,
     output_periods,
@@ -58,6 +59,7 @@ from dragdeck.scenes.workpiece import (
 )
 from dragdeck.study.base import Json
 from dragdeck.study.contact_law import coefficient_words
+from dragdeck.study.drive import Drive
 from dragdeck.study.model import Study
 from dragdeck.study.workpiece import CylinderShape, MeshShape, Shape
 
@@ -98,6 +100,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         check_headroom(one, way.start_m[2] - reference_height(one), top)
     types, parts = study.type_names(), rank_split(whole)
     materials = material_table(study, types, fidelity.youngs_modulus_scale, whole)
+    touches = _touches(study, drag, steps, facets or len(moved) > 1)
     deck = ProcessDeck(
         title=study.title,
         study=whole.study_name,
@@ -112,7 +115,10 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         timestep_s=dt,
         rayleigh_time_s=bed_rayleigh_time(study),
         neighbours=max(ENGINE_NEIGHBOURS, _bowl_neighbours(study), *counts),
-        outputs=_outputs(periods, drag.start, steps, [one.name for one in moved], facets),
+        outputs=(
+            *_outputs(periods, drag.start, steps, [one.name for one in moved], facets),
+            *touches,
+        ),
         thermo_steps=periods.network,
         checkpoint_steps=_checkpoint_steps(study, steps.end - steps.entry),
         processors=parts.line,
@@ -122,7 +128,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         bowl_rad_s=courses[0].driven.bowl_rad_s,
         workpiece_type=types.index(study.workpiece.material) + 1,
         workpieces=moved,
-        stops=list(stops(whole, drag, steps, materials)),
+        stops=_waking(list(stops(whole, drag, steps, materials)), touches),
         entry_step=steps.entry,
     )
     number = max(case.number, 1) - 1
@@ -195,6 +201,31 @@ def _outputs(
     )
 
 
+def _touches(study: Study, drag: Drive, steps: Covered, several: bool) -> tuple[Output, ...]:
+    """What is written in the last part of a drag, if a study asks for it and the run ends with it.
+
+    Transient and ramps are never part of it.
+    """
+    asked = study.outputs.first_touch
+    if asked is None or steps.end != drag.end:
+        return ()
+    period = asked.period_steps
+    begin = max(steps.counted, steps.end - math.ceil(asked.fraction * drag.steps))
+    first = math.ceil(begin / period) * period
+    return outputs.first_touch(period, first, steps.end - steps.end % period, several)
+
+
+def _waking(found: Sequence[Stop], touches: Sequence[Output]) -> list[Stop]:
+    """Stops of a run, with one where the outputs that wait begin."""
+    if not touches:
+        return list(found)
+    first = touches[0].first_step
+    at = next(number for number, stop in enumerate(found) if stop.step > first)
+    rest = replace(found[at], properties=None, first=False, writes=False, wakes=True)
+    before = replace(found[at], step=first, mark="")
+    return [*found[:at], before, rest, *found[at + 1 :]]
+
+
 def _checkpoint_steps(study: Study, last: int) -> int:
     count = study.outputs.n_checkpoints
     return math.ceil(last / (count + 1)) if count else 0
@@ -222,6 +253,7 @@ def _process_case(
         bed_rayleigh_time(study),
         settings=study.chosen_fidelity().model_dump(include={"timestep_fraction", "speed_factor"}),
         asked=case.advised,
+        removal=study.removal,
         unsafe_timestep=study.accepted.unsafe_timestep,
         case=case.name,
         upstream={scene.name: scene.run_id(case) for scene in (FILLING, DROP_TEST)},

@@ -29,6 +29,7 @@ from dragdeck.study.paths.path import turned
 from dragdeck.study.paths.rest import RestPath
 from dragdeck.study.paths.waypoints import WaypointsPath
 from dragdeck.study.reference import Reference
+from dragdeck.study.removal import Removal
 from dragdeck.study.superposed.motion import SuperposedMotion
 from dragdeck.study.superposed.oscillation import Oscillation
 from dragdeck.study.superposed.spin import Spin, SpinStage
@@ -264,6 +265,17 @@ class Filling(Model):
     )
 
 
+class FirstTouch(Model):
+    """Contacts on the workpiece at so short intervals that each is seen when it begins."""
+
+    fraction: Annotated[Number, Field(gt=0, le=1)] = Field(
+        default=0.02, description="part of the drag, at its end, in which they are written"
+    )
+    period_steps: Annotated[Whole, Field(ge=1, le=1000)] = Field(
+        default=1, description="time steps between two samples"
+    )
+
+
 class Outputs(Model):
     """Sampling rates of a process run; each is a lower bound, in process time."""
 
@@ -278,6 +290,12 @@ class Outputs(Model):
     )
     n_checkpoints: Annotated[Whole, Field(ge=0, le=1000)] = Field(
         default=50, description="number of checkpoints of a run, from which it can be resumed"
+    )
+    first_touch: FirstTouch | None = Field(
+        default=None,
+        description="contacts on the workpiece at every step, for velocities of impact; none: "
+        "not written",
+        exclude_if=lambda value: value is None,
     )
 
     @model_validator(mode="after")
@@ -544,6 +562,7 @@ class Study(Model):
     accepted: Accepted = Accepted()
     assumptions: list[Assumption] = Field(default_factory=list)
     reference: Reference | None = None
+    removal: Removal | None = Field(default=None, exclude_if=lambda value: value is None)
 
     def of_each_workpiece(self) -> Sequence["Study"]:
         """The study of each workpiece alone, its path and its place of immersion turned.
