@@ -1,5 +1,6 @@
 """The picture of a workpiece: where particles press and slide on it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -75,11 +76,39 @@ def workpiece_figure(
         _unrolled(panels[2], bins, scale, case)
     _profile(panels[-1], loading.profiles["depth"])
     panels[0].set(ylabel="depth (mm)", ylim=_depths(case)[::-1])
-    colours = ScalarMappable(scale, force_map())
-    style: dict[str, Any] = {"location": "bottom", "extend": "max", "shrink": 0.6, "aspect": 40}
-    figure.colorbar(colours, ax=panels, label=_LABEL, **style)
+    _bar(figure, panels, scale, _LABEL)
     head(figure, _title(loading, case))
     return figure
+
+
+def surface_figure(
+    case: CaseOfRun, surface: Surface, values: Floats, label: str, title: str
+) -> Figure:
+    """The workpiece from its four sides by a value of each facet, (M,).
+
+    Raises
+    ------
+    RenderError
+        If pictures cannot be rendered here.
+    """
+    check_rendering()
+    mesh = as_polydata(surface)
+    mesh.cell_data[_QUANTITY] = values
+    scale = Normalize(0.0, _largest(pd.DataFrame({_QUANTITY: values, "area_m2": surface.areas})))
+    figure, panels = new_panels(_height_in(case, 1 / len(_VIEWS)), len(_VIEWS), sharey=True)
+    for axes, name in zip(panels, _VIEWS, strict=True):
+        _view(axes, mesh, name, scale, case)
+    panels[0].set(ylabel="depth (mm)", ylim=_depths(case)[::-1])
+    _bar(figure, panels, scale, label)
+    head(figure, title)
+    return figure
+
+
+def _bar(figure: Figure, panels: Sequence[Axes], scale: Normalize, label: str) -> None:
+    """Draw the colour scale below the panels."""
+    colours = ScalarMappable(scale, force_map())
+    style: dict[str, Any] = {"location": "bottom", "extend": "max", "shrink": 0.6, "aspect": 40}
+    figure.colorbar(colours, ax=panels, label=label, **style)
 
 
 def _height_in(case: CaseOfRun, fraction: float) -> float:

@@ -4,7 +4,8 @@ An action is what a law multiplies by its coefficient (`dragdeck.study.removal`)
 time: a workpiece that is f times as fast takes 1/f of the time for the same path.
 """
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -15,7 +16,7 @@ import pandas as pd
 from dragchain.arrays import Floats, Ints
 from dragchain.errors import TableError
 from dragchain.loading.contact_events import POINT, SLIP, find_events
-from dragchain.loading.document import Quantiles
+from dragchain.loading.document import Loading, Quantiles
 from dragchain.loading.samples import TOUCHED, Sampled, patches, sample, standard_errors
 from dragchain.loading.summary import quantiles
 from dragchain.run.kinematics import needed
@@ -26,7 +27,7 @@ from dragchain.tables.by_step import read_table
 from dragdeck.decks.outputs import TOUCHES, load_outputs
 from dragdeck.documents import Document, Part
 from dragdeck.records.case import CaseOfRun
-from dragdeck.study.removal import Law, Wearing
+from dragdeck.study.removal import LAWS, Law, Wearing
 
 FILE = Path("tables") / "wear.json"
 
@@ -50,22 +51,6 @@ TOUCH_QUANTITIES: Mapping[str, tuple[str, float]] = {
     "friction_work_j": ("friction work (\N{MICRO SIGN}J)", 1e6),
 }
 """What a report tells of contact events: label with unit, and factor from SI."""
-
-
-class Action(Part):
-    """Action of a law per process time.
-
-    Attributes
-    ----------
-    total_w : Estimate
-        Of the whole workpiece, W, with the scatter over time.
-    patch_w_m2, patch_se_w_m2 : tuple of float
-        By facet: mean over its patch, and its standard error, W/m2.
-    """
-
-    total_w: Estimate
-    patch_w_m2: tuple[float, ...]
-    patch_se_w_m2: tuple[float, ...]
 
 
 class TouchesOfRun(Part):
@@ -119,18 +104,17 @@ class Wear(Document):
 
     Attributes
     ----------
-    time_s : float
-        Process time of the statistics, s.
     area_m2 : tuple of float
         Of each facet.
     immersed : tuple of bool
         Whether a facet's centre is below the settled surface.
-    patch_m : float
-        Size of the patches that facets are averaged over.
-    sliding : Action
-        Normal force times sliding distance.
-    impact : Action or None
-        Of the impact law of the study, if it has one.
+    action_w : Estimate
+        Of the law of the study on the whole workpiece per process time, W: of laws that are added
+        up, each times its coefficient over that of the study. Without a law that of Archard.
+    patch_w_m2, patch_se_w_m2 : tuple of float
+        By facet: the same per area, a mean over its patch, and its standard error, W/m2.
+    impact_share : Estimate
+        Part of it from the law of impact, or else from contact events of the type impact.
     touches : TouchesOfRun or None
     edges : EdgeBands or None
         None if the workpiece has no sharp edge below the settled surface.
@@ -139,12 +123,12 @@ class Wear(Document):
     remedy = "make it with: dragchain loading"
 
     run: str
-    time_s: float
     area_m2: tuple[float, ...]
     immersed: tuple[bool, ...]
-    patch_m: float
-    sliding: Action
-    impact: Action | None
+    action_w: Estimate
+    patch_w_m2: tuple[float, ...]
+    patch_se_w_m2: tuple[float, ...]
+    impact_share: Estimate
     touches: TouchesOfRun | None
     edges: EdgeBands | None
 
@@ -155,7 +139,7 @@ def asks_for_wear(run_dir: Path, case: CaseOfRun) -> bool:
 
 
 def compute_wear(
-    run_dir: Path, case: CaseOfRun, sampled: Sampled, surface: Surface
+    run_dir: Path, case: CaseOfRun, sampled: Sampled, surface: Surface, loading: Loading
 ) -> tuple[Wear, pd.DataFrame | None]:
     """What laws of removal read of a run, and its contact events from first touch if written.
 
@@ -165,50 +149,68 @@ def compute_wear(
         If ``touches.parquet`` is missing or has no contact.
     """
     factor, size = case.fidelity.speed_factor, case.media.radius_mean_m
-    group = patches(surface, size)
-    seconds = factor * sampled.interval_s
     immersion = needed(case.workpiece, "workpiece").immersion_depth_m
-    touched = events = impact = None
+    loads = sampled.rows[["frame", "facet_id"]].assign(action=sampled.rows["force_slide_n_m"])
+    sampled_actions = {False: replace(sampled, rows=loads)}
+    touched = events = None
+    laws = case.removal.laws if case.removal else [LAWS["archard"]]
     if TOUCHES[1] in load_outputs(run_dir):
         part = sample(run_dir, case, TOUCHED)
         events = first_touches(run_dir, part, case)
         touched = _touches(part, events, factor)
-        for law in case.removal.laws if case.removal else ():
+        for law in laws:
             if law.impact:
-                action = impact_action(law, events, case)
-                rows = events[["frame", "facet_id"]].assign(action=action)
-                impact = _action(replace(part, rows=rows), surface, group, factor * part.interval_s)
-    loads = sampled.rows[["frame", "facet_id"]].assign(action=sampled.rows["force_slide_n_m"])
+                rows = events[["frame", "facet_id"]].assign(action=impact_action(law, events, case))
+                sampled_actions[True] = replace(part, rows=rows)
+    group = patches(surface, size)
+    each = [_action(sampled_actions[law.impact], surface, group, factor) for law in laws]
+    total, density, error = (list(part) for part in zip(*each, strict=True))
+    share = loading.types["impact"].fraction_of["force_slide_n_m"]
+    if laws[-1].impact:
+        share = _share(total[-1], total[:-1])
     wear = Wear(
         run=case.run,
-        time_s=sampled.frames * seconds,
         area_m2=tuple(surface.areas.tolist()),
         immersed=tuple((surface.centres[:, 2] <= immersion).tolist()),
-        patch_m=size,
-        sliding=_action(replace(sampled, rows=loads), surface, group, seconds),
-        impact=impact,
+        action_w=_sum(total),
+        patch_w_m2=tuple(np.sum(density, axis=0)[group].tolist()),
+        patch_se_w_m2=tuple(np.linalg.norm(error, axis=0)[group].tolist()),
+        impact_share=share,
         touches=touched,
-        edges=_edge_bands(sampled, surface, immersion, size, seconds),
+        edges=_edge_bands(sampled, surface, immersion, size, factor),
     )
     return wear, None if events is None else events.drop(columns="frame")
 
 
-def _action(sampled: Sampled, surface: Surface, group: Ints, seconds: float) -> Action:
-    """The action of rows with ``frame``, ``facet_id`` and ``action``; `seconds` from frame to
-    frame.
+def _action(
+    sampled: Sampled, surface: Surface, group: Ints, factor: float
+) -> tuple[Estimate, Floats, Floats]:
+    """The action of rows with ``frame``, ``facet_id`` and ``action`` per process time.
+
+    In all, W, and of each patch with its standard error, W/m2.
     """
-    rows, count = sampled.rows, int(group.max()) + 1
-    at = rows["facet_id"].to_numpy()
-    grouped = replace(sampled, rows=rows.assign(facet_id=group[at]))
+    rows, count, seconds = sampled.rows, int(group.max()) + 1, factor * sampled.interval_s
+    at = group[rows["facet_id"].to_numpy()]
     per_patch = np.bincount(group, surface.areas) * sampled.frames * seconds
-    sums = np.bincount(group[at], rows["action"], count) / per_patch
-    errors = standard_errors(grouped, "action", count) / per_patch
+    errors = standard_errors(replace(sampled, rows=rows.assign(facet_id=at)), "action", count)
     series = sampled.per_frame(rows["action"])[:, None]
-    return Action(
-        total_w=estimates(series, lambda means: means / seconds)[0],
-        patch_w_m2=tuple(sums[group].tolist()),
-        patch_se_w_m2=tuple(errors[group].tolist()),
-    )
+    total = estimates(series, lambda means: means / seconds)[0]
+    return total, np.bincount(at, rows["action"], count) / per_patch, errors / per_patch
+
+
+def _sum(parts: Sequence[Estimate]) -> Estimate:
+    """The sum of independent estimates."""
+    halves = ((one.ci95_high - one.ci95_low) / 2 for one in parts)
+    return Estimate.around(math.fsum(one.value for one in parts), math.hypot(*halves))
+
+
+def _share(one: Estimate, others: Sequence[Estimate]) -> Estimate:
+    """The part of one of independent estimates in the sum of all."""
+    if not others:
+        return Estimate(1.0, 1.0, 1.0)
+    rest = _sum(others)
+    half = math.hypot(one.relative_half_width, rest.relative_half_width)
+    return Estimate(*(1 / (1 + rest.value / one.value * math.exp(half * s)) for s in (0, 1, -1)))
 
 
 # --- first touch ---------------------------------------------------------------------------------
@@ -247,7 +249,7 @@ def first_touches(run_dir: Path, part: Sampled, case: CaseOfRun) -> pd.DataFrame
 
 
 def impact_action(law: Law, events: pd.DataFrame, case: CaseOfRun) -> Floats:
-    """The action of an impact law of the study in each of (E,) events, J."""
+    """The action of an impact law of the study in each of (E,) events, J, times its weight."""
     radius = events["radius_m"].to_numpy()
     density = case.density_of(events["particle_id"].to_numpy(np.int64))
     wearing = Wearing(
@@ -257,7 +259,8 @@ def impact_action(law: Law, events: pd.DataFrame, case: CaseOfRun) -> Floats:
         normal_m_s=events["touch_normal_m_s"].to_numpy(),
         tangential_m_s=events["touch_tangential_m_s"].to_numpy(),
     )
-    return law.action(wearing, needed(case.removal, "removal"))
+    removal = needed(case.removal, "removal")
+    return removal.weight(law) * law.action(wearing, removal)
 
 
 def _touches(part: Sampled, events: pd.DataFrame, factor: float) -> TouchesOfRun:
@@ -343,7 +346,7 @@ def strewn(surface: Surface, count: int = _SPREAD) -> tuple[Floats, Ints]:
 
 
 def _edge_bands(
-    sampled: Sampled, surface: Surface, highest_m: float, radius_m: float, seconds: float
+    sampled: Sampled, surface: Surface, highest_m: float, radius_m: float, factor: float
 ) -> EdgeBands | None:
     edges = sharp_edges(surface, highest_m)
     if not len(edges.ends_m):
@@ -356,6 +359,7 @@ def _edge_bands(
     band = np.searchsorted(limits, away, side="right") - 1
     sums = np.zeros((sampled.frames, count + 1))
     np.add.at(sums, (sampled.rows["frame"], band), sampled.rows["force_slide_n_m"])
+    seconds = factor * sampled.interval_s
     found = estimates(sums[:, :count], lambda means: means / seconds)
     lengths = edges.lengths_m
     return EdgeBands(

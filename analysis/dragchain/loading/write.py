@@ -113,7 +113,7 @@ def compute_loading(run_dir: Path) -> WorkpieceLoading:
     summary = summarise_loading(sampled, facets, events, event, case, off_m)
     wear = touched = None
     if asks_for_wear(run_dir, case):
-        wear, touched = compute_wear(run_dir, case, sampled, surface)
+        wear, touched = compute_wear(run_dir, case, sampled, surface, summary)
     if wear is not None and wear.touches is not None and touched is not None:
         facets = facets.assign(**touch_maps(touched, surface, wear.touches.time_s))
     drawn = replace(sampled, rows=sampled.rows[DRAWN].copy())

@@ -126,7 +126,7 @@ class Output:
     purpose : str
         For the comment in the input script: content, and the result made from it.
     waits : bool
-        Whether it is written from a later stop of the run on.
+        Whether it is not written before `first_step`, although its dump is defined.
     """
 
     name: str
@@ -272,18 +272,15 @@ def workpiece_contacts(period: int, first: int, last: int, several: bool) -> Out
 
 
 TOUCHES = ("touch_particles", "touch_contacts")
-"""Outputs as those of the workpiece, at intervals so short that each contact is seen to begin."""
+"""Outputs as those of the workpiece, at every step, so that each contact is seen to begin."""
 
 
-def first_touch(period: int, first: int, last: int, several: bool) -> tuple[Output, ...]:
-    """Contacts on the workpiece, and their particles, in a part of the drag."""
-    found = (
-        workpiece_particles(period, first, last),
-        workpiece_contacts(period, first, last, several),
-    )
-    purpose = "the same at short intervals in a part of the drag, for touches.parquet"
+def first_touch(first: int, last: int, several: bool) -> tuple[Output, ...]:
+    """Contacts on the workpiece, and their particles, at every step of a part of the drag."""
+    found = (workpiece_particles(1, first, last), workpiece_contacts(1, first, last, several))
+    why = "the same at every step of a part of the drag, for touches.parquet"
     return tuple(
-        replace(one, name=name, purpose=purpose, waits=True, rows_per_particle=0.05)
+        replace(one, name=name, purpose=why, waits=True, rows_per_particle=0.05)
         for name, one in zip(TOUCHES, found, strict=True)
     )
 

@@ -81,8 +81,6 @@ class Stop:
         Whether the outputs of the drag begin here.
     mark : str
         File into which the state is written then; empty for none.
-    wakes : bool
-        Whether the outputs that wait begin here.
     """
 
     step: int
@@ -90,7 +88,6 @@ class Stop:
     first: bool = False
     writes: bool = False
     mark: str = ""
-    wakes: bool = False
 
 
 def plunge_point(motion: Motion) -> Point:

@@ -36,7 +36,6 @@ from dragdeck.scenes.motion import (
     Course,
     Periods,
     ProcessDeck,
-    Stop,
     course,
     moved_workpiece,
     output_periods,
@@ -100,7 +99,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         check_headroom(one, way.start_m[2] - reference_height(one), top)
     types, parts = study.type_names(), rank_split(whole)
     materials = material_table(study, types, fidelity.youngs_modulus_scale, whole)
-    touches = _touches(study, drag, steps, facets or len(moved) > 1)
+    touching = study.outputs.first_touch_fraction if steps.end == drag.end else 0.0
     deck = ProcessDeck(
         title=study.title,
         study=whole.study_name,
@@ -115,10 +114,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         timestep_s=dt,
         rayleigh_time_s=bed_rayleigh_time(study),
         neighbours=max(ENGINE_NEIGHBOURS, _bowl_neighbours(study), *counts),
-        outputs=(
-            *_outputs(periods, drag.start, steps, [one.name for one in moved], facets),
-            *touches,
-        ),
+        outputs=_outputs(periods, drag, steps, [one.name for one in moved], facets, touching),
         thermo_steps=periods.network,
         checkpoint_steps=_checkpoint_steps(study, steps.end - steps.entry),
         processors=parts.line,
@@ -128,7 +124,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         bowl_rad_s=courses[0].driven.bowl_rad_s,
         workpiece_type=types.index(study.workpiece.material) + 1,
         workpieces=moved,
-        stops=_waking(list(stops(whole, drag, steps, materials)), touches),
+        stops=list(stops(whole, drag, steps, materials)),
         entry_step=steps.entry,
     )
     number = max(case.number, 1) - 1
@@ -180,10 +176,16 @@ def _source(case: Case) -> str:
 
 
 def _outputs(
-    periods: Periods, drag_start: int, steps: Covered, workpieces: Sequence[str], facets: bool
+    periods: Periods,
+    drag: Drive,
+    steps: Covered,
+    workpieces: Sequence[str],
+    facets: bool,
+    touching: float,
 ) -> tuple[Output, ...]:
     several = facets or len(workpieces) > 1
-    begin = max(drag_start, steps.ramp_end)
+    begin = max(drag.start, steps.ramp_end)
+    last_part = max(steps.counted, steps.end - math.ceil(touching * drag.steps))
     first_touching, first = (
         math.ceil(begin / period) * period for period in (periods.contacts, periods.network)
     )
@@ -198,32 +200,8 @@ def _outputs(
         outputs.workpiece_contacts(periods.contacts, first_touching, touching, several),
         outputs.particles(periods.network, first, network, facets),
         outputs.contacts(periods.network, first, network),
+        *(outputs.first_touch(last_part, steps.end, several) if touching else ()),
     )
-
-
-def _touches(study: Study, drag: Drive, steps: Covered, several: bool) -> tuple[Output, ...]:
-    """What is written in the last part of a drag, if a study asks for it and the run ends with it.
-
-    Transient and ramps are never part of it.
-    """
-    asked = study.outputs.first_touch
-    if asked is None or steps.end != drag.end:
-        return ()
-    period = asked.period_steps
-    begin = max(steps.counted, steps.end - math.ceil(asked.fraction * drag.steps))
-    first = math.ceil(begin / period) * period
-    return outputs.first_touch(period, first, steps.end - steps.end % period, several)
-
-
-def _waking(found: Sequence[Stop], touches: Sequence[Output]) -> list[Stop]:
-    """Stops of a run, with one where the outputs that wait begin."""
-    if not touches:
-        return list(found)
-    first = touches[0].first_step
-    at = next(number for number, stop in enumerate(found) if stop.step > first)
-    rest = replace(found[at], properties=None, first=False, writes=False, wakes=True)
-    before = replace(found[at], step=first, mark="")
-    return [*found[:at], before, rest, *found[at + 1 :]]
 
 
 def _checkpoint_steps(study: Study, last: int) -> int:

@@ -172,9 +172,9 @@ def _removal(study: Study) -> _Found:
     removal = study.removal
     if removal is None:
         return
-    if any(law.impact for law in removal.laws) and study.outputs.first_touch is None:
+    if any(law.impact for law in removal.laws) and not study.outputs.first_touch_fraction:
         problem = f"the law {removal.law} reads impacts, but no run writes them"
-        yield "removal.law", problem, "outputs.first_touch: {}, or the law archard"
+        yield "removal.law", problem, "outputs.first_touch_fraction: 0.05, or the law archard"
     several = study.workpieces is not None or {*study.sweep} - {"seed"}
     if removal.calibrate and several:
         problem = "a weighed trial is of one process, but the study has several cases"

@@ -265,17 +265,6 @@ class Filling(Model):
     )
 
 
-class FirstTouch(Model):
-    """Contacts on the workpiece at so short intervals that each is seen when it begins."""
-
-    fraction: Annotated[Number, Field(gt=0, le=1)] = Field(
-        default=0.02, description="part of the drag, at its end, in which they are written"
-    )
-    period_steps: Annotated[Whole, Field(ge=1, le=1000)] = Field(
-        default=1, description="time steps between two samples"
-    )
-
-
 class Outputs(Model):
     """Sampling rates of a process run; each is a lower bound, in process time."""
 
@@ -291,11 +280,11 @@ class Outputs(Model):
     n_checkpoints: Annotated[Whole, Field(ge=0, le=1000)] = Field(
         default=50, description="number of checkpoints of a run, from which it can be resumed"
     )
-    first_touch: FirstTouch | None = Field(
-        default=None,
-        description="contacts on the workpiece at every step, for velocities of impact; none: "
-        "not written",
-        exclude_if=lambda value: value is None,
+    first_touch_fraction: Annotated[Number, Field(ge=0, le=1)] = Field(
+        default=0,
+        description="part of the drag, at its end, in which the contacts on the workpiece are "
+        "written at every step, for the velocity at first touch; 0: none",
+        exclude_if=lambda value: value == 0,
     )
 
     @model_validator(mode="after")

@@ -115,9 +115,7 @@ _RANGES = {
     "removal.impact_ratio": _Range(1e-9, 1e-6, 1e9, 1e12, {}),
     "removal.hardness_pa": _Range(1e6, 1e8, 1e11, 1e12, _MODULUS),
     "removal.target_depth_m": _Range(1e-10, 1e-9, 1e-3, 0.1, _LENGTH),
-    "removal.project.smoothing_m": _Range(1e-6, 1e-5, 0.02, 0.1, _LENGTH),
-    "outputs.first_touch.fraction": _Range(1e-6, 1e-5, 1, 1, {"%": 0.01}),
-    "outputs.first_touch.period_steps": _Range(1, 1, 100, 1000, {}),
+    "outputs.first_touch_fraction": _Range(0, 0, 1, 1, {"%": 0.01}),
     "reference.*_n": _Range(-1e5, -1e3, 1e3, 1e5, {"mN": 1e-3}),
 }
 """By dotted field, every number of a study; the first that fits counts. Assumptions: they span

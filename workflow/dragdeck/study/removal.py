@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
 from dragdeck.errors import choices
-from dragdeck.study.base import Line, Model, Positive
+from dragdeck.study.base import Model, Positive
 
 _Floats = NDArray[np.float64]
 
@@ -36,16 +36,6 @@ class WeighedTrial(Model):
                 "interval of the coefficient would include zero; use a longer trial"
             )
         return self
-
-
-class Projection(Model):
-    """A mesh of the user's own on which the load map is shown as well."""
-
-    mesh: Line = Field(description="STL file in the workpiece's own frame; relative to the study")
-    smoothing_m: Positive = Field(
-        description="standard deviation of the Gaussian over which a contact is spread, m; the "
-        "mesh must not be farther than this from any contact"
-    )
 
 
 class Removal(Model):
@@ -77,7 +67,6 @@ class Removal(Model):
     target_depth_m: Positive | None = Field(
         default=None, description="depth of removal whose time is reported, m"
     )
-    project: Projection | None = None
 
     @field_validator("calibrate", mode="before")
     @classmethod
@@ -92,7 +81,7 @@ class Removal(Model):
         for part in parts:
             if part not in LAWS:
                 raise ValueError(f"no such law {part!r}: {choices(part, LAWS)}, or a sum of two")
-        if len({LAWS[part].impact for part in parts}) < len(parts):
+        if [LAWS[part].impact for part in parts] not in ([False], [True], [False, True]):
             raise ValueError("a sum has one law of sliding and one of impact: archard+oka")
         return law
 
@@ -117,6 +106,11 @@ class Removal(Model):
     def laws(self) -> Sequence["Law"]:
         """The laws that are added up."""
         return [LAWS[part] for part in self.law.split("+")]
+
+    @property
+    def corrected(self) -> bool:
+        """Whether windows give what the law reads at the physical Young's modulus: sliding only."""
+        return not any(law.impact for law in self.laws)
 
     def weight(self, law: "Law") -> float:
         """Coefficient of a law over `coefficient_m2_n`."""
