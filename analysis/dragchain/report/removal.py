@@ -18,7 +18,13 @@ from dragchain.loading.wear import TOUCH_QUANTITIES, Wear
 from dragchain.report.cases import ReportedCase
 from dragchain.run.kinematics import axis_speed
 from dragchain.statistics.correlated import SLOW_WAVES
-from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate, mean_of, student_quantile
+from dragchain.statistics.estimate import (
+    CONFIDENCE,
+    NORMAL_QUANTILE,
+    Estimate,
+    mean_of,
+    student_quantile,
+)
 from dragdeck.study.removal import Removal
 
 IGNORED = (
@@ -76,7 +82,7 @@ class Fit(NamedTuple):
     ----------
     rate_kg_s, half : float
         Slope, and relative half-width of its interval; wider by Birge's ratio (1932) if the
-        trials scatter by more than their uncertainties.
+        trials scatter significantly more than by their uncertainties.
     residuals : sequence of float
         Measured minus fitted mass loss of each trial in its standard uncertainties.
     """
@@ -90,12 +96,15 @@ def fit_trials(removal: Removal) -> Fit | None:
     """The fit to the trials of a study, None if its coefficient is given."""
     if removal.calibrate is None:
         return None
+    from scipy.special import chdtri
+
     trials = [(one.mass_loss_kg, one.time_s, one.sd_kg) for one in removal.calibrate]
     mass, time, sd = np.array(trials).T
     information = float(((time / sd) ** 2).sum())
     rate = float((mass * time / sd**2).sum()) / information
     residuals = (mass - rate * time) / sd
-    birge = max(1.0, math.sqrt(float((residuals**2).sum()) / max(len(trials) - 1, 1)))
+    square, degrees = float((residuals**2).sum()), max(len(trials) - 1, 1)
+    birge = math.sqrt(square / degrees) if square > chdtri(degrees, 1 - CONFIDENCE) else 1.0
     half = NORMAL_QUANTILE * birge / math.sqrt(information) / rate
     return Fit(rate, half, residuals.tolist())
 

@@ -99,7 +99,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         check_headroom(one, way.start_m[2] - reference_height(one), top)
     types, parts = study.type_names(), rank_split(whole)
     materials = material_table(study, types, fidelity.youngs_modulus_scale, whole)
-    touching = study.outputs.first_touch_fraction if steps.end == drag.end else 0.0
+    touches = study.outputs.first_touch_fraction if steps.end == drag.end else 0.0
     deck = ProcessDeck(
         title=study.title,
         study=whole.study_name,
@@ -114,7 +114,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         timestep_s=dt,
         rayleigh_time_s=bed_rayleigh_time(study),
         neighbours=max(ENGINE_NEIGHBOURS, _bowl_neighbours(study), *counts),
-        outputs=_outputs(periods, drag, steps, [one.name for one in moved], facets, touching),
+        outputs=_outputs(periods, drag, steps, [one.name for one in moved], facets, touches),
         thermo_steps=periods.network,
         checkpoint_steps=_checkpoint_steps(study, steps.end - steps.entry),
         processors=parts.line,
@@ -181,11 +181,11 @@ def _outputs(
     steps: Covered,
     workpieces: Sequence[str],
     facets: bool,
-    touching: float,
+    touches: float,
 ) -> tuple[Output, ...]:
     several = facets or len(workpieces) > 1
     begin = max(drag.start, steps.ramp_end)
-    last_part = max(steps.counted, steps.end - math.ceil(touching * drag.steps))
+    last_part = max(steps.counted, steps.end - math.ceil(touches * drag.steps))
     first_touching, first = (
         math.ceil(begin / period) * period for period in (periods.contacts, periods.network)
     )
@@ -200,7 +200,7 @@ def _outputs(
         outputs.workpiece_contacts(periods.contacts, first_touching, touching, several),
         outputs.particles(periods.network, first, network, facets),
         outputs.contacts(periods.network, first, network),
-        *(outputs.first_touch(last_part, steps.end, several) if touching else ()),
+        *(outputs.first_touch(last_part, steps.end, several) if touches else ()),
     )
 
 
