@@ -8,21 +8,21 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from dragchain.arrays import Floats, Ints
 from dragchain.errors import TableError
-from dragchain.loading.contact_events import POINT, SLIP, find_events
+from dragchain.loading.contact_events import SLIP, find_events
 from dragchain.loading.document import Loading, Quantiles
+from dragchain.loading.edges import EdgeBands, edge_bands
 from dragchain.loading.samples import TOUCHED, Sampled, patches, sample, standard_errors
 from dragchain.loading.summary import quantiles
 from dragchain.run.kinematics import needed
 from dragchain.run.workpiece import Surface
 from dragchain.statistics.correlated import estimates
-from dragchain.statistics.estimate import Estimate, EstimateColumns
+from dragchain.statistics.estimate import Estimate
 from dragchain.tables.by_step import read_table
 from dragdeck.decks.outputs import TOUCHES, load_outputs
 from dragdeck.documents import Document, Part
@@ -31,15 +31,6 @@ from dragdeck.study.removal import LAWS, Law, Wearing
 
 FILE = Path("tables") / "wear.json"
 
-FEATURE_DEG = 30.0
-"""Facets that meet at a convex edge with a larger angle between their normals make a sharp edge."""
-
-_BANDS = (0.0, 0.0625, 0.125, 0.25, 0.5, 1.0)
-"""Edges of the bands along sharp edges, in mean radii of a particle."""
-
-_SPREAD = 400_000
-"""Points that are strewn over a surface to tell the area of bands."""
-
 TOUCH_QUANTITIES: Mapping[str, tuple[str, float]] = {
     "touch_normal_m_s": ("normal velocity at first touch (mm/s)", 1e3),
     "touch_tangential_m_s": ("tangential velocity at first touch (mm/s)", 1e3),
@@ -47,10 +38,10 @@ TOUCH_QUANTITIES: Mapping[str, tuple[str, float]] = {
     "peak_normal_force_n": ("peak normal force (N)", 1.0),
     "peak_pressure_pa": ("peak Hertz pressure (MPa)", 1e-6),
     "duration_s": ("duration (ms)", 1e3),
-    "sliding_m": ("sliding distance (\N{MICRO SIGN}m)", 1e6),
-    "friction_work_j": ("friction work (\N{MICRO SIGN}J)", 1e6),
+    "sliding_m": ("sliding distance (µm)", 1e6),
+    "friction_work_j": ("friction work (µJ)", 1e6),
 }
-"""What a report tells of contact events: label with unit, and factor from SI."""
+"""Columns of events whose distribution is told: label with unit, and factor from SI."""
 
 
 class TouchesOfRun(Part):
@@ -73,30 +64,6 @@ class TouchesOfRun(Part):
     interval_s: float
     per_s: Estimate
     quantities: Mapping[str, Quantiles]
-
-
-class EdgeBands(Part):
-    """Action of sliding in bands along the sharp edges of the immersed workpiece.
-
-    Attributes
-    ----------
-    length_m : float
-        Length of all of them.
-    angle_rad : float
-        Mean interior angle.
-    distance_m : tuple of float
-        Edges of the bands.
-    area_m2 : tuple of float
-        Of the surface in each band.
-    action_w : EstimateColumns
-        Per process time in each band, W.
-    """
-
-    length_m: float
-    angle_rad: float
-    distance_m: tuple[float, ...]
-    area_m2: tuple[float, ...]
-    action_w: EstimateColumns
 
 
 class Wear(Document):
@@ -146,28 +113,37 @@ def compute_wear(
     Raises
     ------
     TableError
-        If ``touches.parquet`` is missing or has no contact.
+        If ``touches.parquet`` is missing or has no contact, or the law reads impacts and the run
+        has not written first touches.
     """
     factor, size = case.fidelity.speed_factor, case.media.radius_mean_m
     immersion = needed(case.workpiece, "workpiece").immersion_depth_m
     loads = sampled.rows[["frame", "facet_id"]].assign(action=sampled.rows["force_slide_n_m"])
-    sampled_actions = {False: replace(sampled, rows=loads)}
-    touched = events = None
-    laws = case.removal.laws if case.removal else [LAWS["archard"]]
+    group, laws = patches(surface, size), case.removal.laws if case.removal else [LAWS["archard"]]
+    of_laws, touched, events = [replace(sampled, rows=loads)], None, None
     if TOUCHES[1] in load_outputs(run_dir):
         part = sample(run_dir, case, TOUCHED)
         events = first_touches(run_dir, part, case)
-        touched = _touches(part, events, factor)
-        for law in laws:
-            if law.impact:
-                rows = events[["frame", "facet_id"]].assign(action=impact_action(law, events, case))
-                sampled_actions[True] = replace(part, rows=rows)
-    group = patches(surface, size)
-    each = [_action(sampled_actions[law.impact], surface, group, factor) for law in laws]
-    total, density, error = (list(part) for part in zip(*each, strict=True))
+        begun = np.bincount(events["frame"], minlength=part.frames).astype(np.float64)[:, None]
+        per_s = estimates(begun, lambda means: means / (factor * part.interval_s))[0]
+        touched = TouchesOfRun(
+            events=len(events),
+            time_s=part.frames * part.interval_s,
+            interval_s=part.interval_s,
+            per_s=per_s,
+            quantities={name: quantiles(events[name]) for name in TOUCH_QUANTITIES},
+        )
+        if laws[-1].impact:
+            action = impact_action(laws[-1], events, case)
+            impacts = replace(part, rows=events[["frame", "facet_id"]].assign(action=action))
+            of_laws = [*of_laws, impacts][-len(laws) :]
+    elif laws[-1].impact:
+        raise TableError(
+            f"{run_dir}: the law of removal reads impacts, which the run has not written"
+        )
+    each = [_action(one, surface, group, factor * one.interval_s) for one in of_laws]
+    total, density, error = zip(*each, strict=True)
     share = loading.types["impact"].fraction_of["force_slide_n_m"]
-    if laws[-1].impact:
-        share = _share(total[-1], total[:-1])
     wear = Wear(
         run=case.run,
         area_m2=tuple(surface.areas.tolist()),
@@ -175,21 +151,21 @@ def compute_wear(
         action_w=_sum(total),
         patch_w_m2=tuple(np.sum(density, axis=0)[group].tolist()),
         patch_se_w_m2=tuple(np.linalg.norm(error, axis=0)[group].tolist()),
-        impact_share=share,
+        impact_share=_share(total[-1], total[:-1]) if laws[-1].impact else share,
         touches=touched,
-        edges=_edge_bands(sampled, surface, immersion, size, factor),
+        edges=edge_bands(sampled, surface, immersion, size, factor * sampled.interval_s),
     )
     return wear, None if events is None else events.drop(columns="frame")
 
 
 def _action(
-    sampled: Sampled, surface: Surface, group: Ints, factor: float
+    sampled: Sampled, surface: Surface, group: Ints, seconds: float
 ) -> tuple[Estimate, Floats, Floats]:
-    """The action of rows with ``frame``, ``facet_id`` and ``action`` per process time.
+    """The action of rows with ``frame``, ``facet_id`` and ``action`` at so many s between frames.
 
     In all, W, and of each patch with its standard error, W/m2.
     """
-    rows, count, seconds = sampled.rows, int(group.max()) + 1, factor * sampled.interval_s
+    rows, count = sampled.rows, int(group.max()) + 1
     at = group[rows["facet_id"].to_numpy()]
     per_patch = np.bincount(group, surface.areas) * sampled.frames * seconds
     errors = standard_errors(replace(sampled, rows=rows.assign(facet_id=at)), "action", count)
@@ -260,112 +236,17 @@ def impact_action(law: Law, events: pd.DataFrame, case: CaseOfRun) -> Floats:
         tangential_m_s=events["touch_tangential_m_s"].to_numpy(),
     )
     removal = needed(case.removal, "removal")
-    return removal.weight(law) * law.action(wearing, removal)
-
-
-def _touches(part: Sampled, events: pd.DataFrame, factor: float) -> TouchesOfRun:
-    begun = np.bincount(events["frame"], minlength=part.frames).astype(np.float64)[:, None]
-    seconds = factor * part.interval_s
-    return TouchesOfRun(
-        events=len(events),
-        time_s=part.frames * part.interval_s,
-        interval_s=part.interval_s,
-        per_s=estimates(begun, lambda means: means / seconds)[0],
-        quantities={name: quantiles(events[name]) for name in TOUCH_QUANTITIES},
-    )
+    return (removal.impact_ratio or 1.0) * law.action(wearing, removal)
 
 
 def touch_maps(events: pd.DataFrame, surface: Surface, time_s: float) -> dict[str, Floats]:
     """First touches on each facet, (M,) each: frequency, mean velocity, largest pressure."""
-    count, facet = len(surface.corners), events["facet_id"].to_numpy()
-    number = np.bincount(facet, minlength=count)
-    speed = np.bincount(facet, events["touch_normal_m_s"], count) / np.maximum(number, 1)
-    pressure = np.zeros(count)
-    np.maximum.at(pressure, facet, events["peak_pressure_pa"])
-    return {
-        "touches_per_m2_s": number / (surface.areas * time_s),
-        "touch_normal_m_s": np.where(number > 0, speed, 0.0),
-        "peak_pressure_pa": pressure,
+    facets = events.groupby("facet_id")
+    each = {
+        "touches_per_m2_s": facets.size().astype(np.float64),
+        "touch_normal_m_s": facets["touch_normal_m_s"].mean(),
+        "peak_pressure_pa": facets["peak_pressure_pa"].max(),
     }
-
-
-# --- edges ---------------------------------------------------------------------------------------
-
-
-class SharpEdges(NamedTuple):
-    """E convex sharp edges: ends, (E, 2, 3) in m, and interior angles, (E,) in rad."""
-
-    ends_m: Floats
-    angle_rad: Floats
-
-    @property
-    def lengths_m(self) -> Floats:
-        """Lengths, (E,)."""
-        return np.asarray(np.linalg.norm(self.ends_m[:, 1] - self.ends_m[:, 0], axis=1))
-
-    def distance(self, points_m: Floats, spacing_m: float) -> Floats:
-        """Distance of (N, 3) points from the nearest edge, which is cut into such pieces, (N,)."""
-        from scipy.spatial import KDTree
-
-        number = np.maximum(2, np.ceil(self.lengths_m / spacing_m).astype(np.int64))
-        parts = [
-            begin + np.linspace(0.0, 1.0, count)[:, None] * (end - begin)
-            for (begin, end), count in zip(self.ends_m, number, strict=True)
-        ]
-        return np.asarray(KDTree(np.concatenate(parts)).query(points_m)[0])
-
-
-def sharp_edges(surface: Surface, highest_m: float) -> SharpEdges:
-    """The convex edges of a surface at which facets meet at more than `FEATURE_DEG`.
-
-    Only those below a height.
-    """
-    points, at = np.unique(surface.corners.reshape(-1, 3), axis=0, return_inverse=True)
-    facets = at.reshape(-1, 3)
-    pairs = np.sort(np.stack([facets, np.roll(facets, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
-    _, edge, count = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
-    order = np.argsort(edge.ravel(), kind="stable")
-    order = order[count[edge.ravel()[order]] == 2].reshape(-1, 2)
-    one, other = (order // 3).T
-    normals, centres = surface.normals, surface.centres
-    turn = np.arccos(np.einsum("ij,ij->i", normals[one], normals[other]).clip(-1.0, 1.0))
-    convex = np.einsum("ij,ij->i", centres[other] - centres[one], normals[one]) < 0.0
-    ends = points[pairs[order[:, 0]]]
-    low = ends[:, :, 2].max(axis=1) <= highest_m
-    sharp = convex & low & (turn > np.radians(FEATURE_DEG))
-    return SharpEdges(ends[sharp], np.pi - turn[sharp])
-
-
-def strewn(surface: Surface, count: int = _SPREAD) -> tuple[Floats, Ints]:
-    """Points at random over a surface, (count, 3), and their facets; always the same ones."""
-    random = np.random.default_rng(0)
-    facet = random.choice(len(surface.areas), count, p=surface.areas / surface.areas.sum())
-    root, along = np.sqrt(random.random(count)), random.random(count)
-    weights = np.stack([1 - root, root * (1 - along), root * along], axis=1)
-    return np.einsum("ij,ijk->ik", weights, surface.corners[facet]), facet
-
-
-def _edge_bands(
-    sampled: Sampled, surface: Surface, highest_m: float, radius_m: float, factor: float
-) -> EdgeBands | None:
-    edges = sharp_edges(surface, highest_m)
-    if not len(edges.ends_m):
-        return None
-    limits = radius_m * np.array(_BANDS)
-    spacing, count = limits[1] / 5, len(_BANDS) - 1
-    points, _ = strewn(surface)
-    spread = np.histogram(edges.distance(points, spacing), limits)[0]
-    away = edges.distance(sampled.rows[POINT].to_numpy(np.float64), spacing)
-    band = np.searchsorted(limits, away, side="right") - 1
-    sums = np.zeros((sampled.frames, count + 1))
-    np.add.at(sums, (sampled.rows["frame"], band), sampled.rows["force_slide_n_m"])
-    seconds = factor * sampled.interval_s
-    found = estimates(sums[:, :count], lambda means: means / seconds)
-    lengths = edges.lengths_m
-    return EdgeBands(
-        length_m=float(lengths.sum()),
-        angle_rad=float(np.average(edges.angle_rad, weights=lengths)),
-        distance_m=tuple(limits.tolist()),
-        area_m2=tuple((spread * surface.areas.sum() / len(points)).tolist()),
-        action_w=EstimateColumns.of(found),
-    )
+    every, per = range(len(surface.corners)), surface.areas * time_s
+    maps = {name: one.reindex(every, fill_value=0.0).to_numpy() for name, one in each.items()}
+    return maps | {"touches_per_m2_s": maps["touches_per_m2_s"] / per}

@@ -7,6 +7,7 @@ half-widths of 95 % intervals add up as squares do (``benchmarks/removal_coverag
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -27,52 +28,32 @@ from dragchain.statistics.estimate import (
 )
 from dragdeck.study.removal import Removal
 
-IGNORED = (
-    "the change of the workpiece's shape and roughness as material is removed",
-    "wear of the media",
-    "compound, water and abrasive, which are part of the coefficient",
-)
-"""What every law ignores, in words."""
-
 UM_PER_H = 3600e6
 """A depth per time in micrometres per hour over that in m/s."""
-
-_SLOW_AREA = 0.05
-"""Part of the area that a target depth reaches last."""
 
 _ROUNDED_S = 1800.0
 """Time after which the radius of an edge is reported."""
 
 
-@dataclass(frozen=True)
-class Parted:
+class Parted(NamedTuple):
     """A positive number with the relative half-widths of its two 95 % intervals."""
 
     value: float
     scatter: float
     coefficient: float
 
-    def _within(self, half: float) -> Estimate:
+    def within(self, half: float) -> Estimate:
+        """With an interval of this relative half-width, not below zero."""
         return Estimate(self.value, self.value * max(0.0, 1 - half), self.value * (1 + half))
 
     @property
     def combined(self) -> Estimate:
         """With both together."""
-        return self._within(math.hypot(self.scatter, self.coefficient))
-
-    @property
-    def of_scatter(self) -> Estimate:
-        """With the scatter of the load alone."""
-        return self._within(self.scatter)
-
-    @property
-    def of_coefficient(self) -> Estimate:
-        """With the uncertainty of the coefficient alone."""
-        return self._within(self.coefficient)
+        return self.within(math.hypot(self.scatter, self.coefficient))
 
     def times(self, factor: float) -> "Parted":
         """A multiple."""
-        return Parted(factor * self.value, self.scatter, self.coefficient)
+        return self._replace(value=factor * self.value)
 
 
 class Fit(NamedTuple):
@@ -143,82 +124,50 @@ class RemovalOfCase:
     Attributes
     ----------
     removal : Removal
-    wears : sequence of Wear
-        Of its packings.
+    fit : Fit or None
+        To the trials, if there are any.
+    edges : sequence of (str, Estimate, float)
+        Of each band along sharp edges: its distances in mm, depth per hour and, after half an
+        hour, the radius of the edge, both in micrometres.
+    edge_length_m : float
     facets : DataFrame
         ``area_m2``, ``immersed``, and of the patch of each facet the depth of removal per time
         ``depth_m_s``, its standard error by the scatter of the load ``depth_m_s_se``, and the ends
         of its combined 95 % interval.
-    edges : sequence of (str, Estimate, float)
-        Of each band along sharp edges: its distances in mm, depth per hour and, after half an
-        hour, the radius of the edge, both in micrometres.
     impact_share : Estimate
         Part of the removal that comes from impacts.
-    coefficient, rate : Parted
-        m2/N, and removed volume per process time, m3/s.
-    density_kg_m3 : float
+    depth_um_h, mass_mg_h, coefficient_m2_n : Parted
+        Mean depth over the immersed surface and mass loss per process time, and the coefficient.
+    variation : (float, float)
+        Coefficient of variation of the depth over the immersed area, and that without the scatter.
+    percentiles_um_h : (float, float)
+        Depths below which 5 % and 95 % of the immersed area stay.
     """
 
     removal: Removal
-    wears: Sequence[Wear]
-    facets: pd.DataFrame
+    fit: Fit | None
     edges: Sequence[tuple[str, Estimate, float]]
+    edge_length_m: float
+    facets: pd.DataFrame
     impact_share: Estimate
-    coefficient: Parted
-    rate: Parted
-    density_kg_m3: float
-
-    @property
-    def fit(self) -> Fit | None:
-        """The fit to the trials, if there are any."""
-        return fit_trials(self.removal)
-
-    @property
-    def _immersed(self) -> pd.DataFrame:
-        found = self.facets[self.facets["immersed"]]
-        return found.assign(part=found["area_m2"] / found["area_m2"].sum())
-
-    @property
-    def depth(self) -> Parted:
-        """Mean depth of removal over the immersed surface, micrometres per hour."""
-        return self.rate.times(UM_PER_H / self._immersed["area_m2"].sum())
-
-    @property
-    def rows(self) -> list[tuple[str, Parted]]:
-        """What a report shows with both intervals."""
-        return [
-            ("mean depth over the immersed surface (\N{MICRO SIGN}m/h)", self.depth),
-            ("mass loss (mg/h)", self.rate.times(UM_PER_H * self.density_kg_m3)),
-            ("coefficient (m\N{SUPERSCRIPT TWO}/N)", self.coefficient),
-        ]
-
-    @property
-    def variation(self) -> tuple[float, float]:
-        """Coefficient of variation over the immersed area, and that without the scatter."""
-        names = ("depth_m_s", "depth_m_s_se", "part")
-        depth, error, part = (self._immersed[name].to_numpy(np.float64) for name in names)
-        mean = float(part @ depth)
-        square, scatter = float(part @ (depth - mean) ** 2), float(part @ error**2)
-        return math.sqrt(square) / mean, math.sqrt(max(0.0, square - scatter)) / mean
-
-    def percentile(self, fraction: float) -> float:
-        """Depth below which this part of the immersed area stays, micrometres per hour."""
-        depth, weights = (self._immersed[name].to_numpy() for name in ("depth_m_s", "part"))
-        found = np.quantile(depth, fraction, weights=weights, method="inverted_cdf")
-        return UM_PER_H * float(found)
+    depth_um_h: Parted
+    mass_mg_h: Parted
+    coefficient_m2_n: Parted
+    variation: tuple[float, float]
+    percentiles_um_h: tuple[float, float]
 
     @property
     def minutes(self) -> Mapping[str, Estimate]:
         """Minutes to the target depth, on average and where it takes longest."""
-        target_um, depth = 1e6 * (self.removal.target_depth_m or 0.0), self.depth
-        slow = depth.times(self.percentile(_SLOW_AREA) / depth.value)
-        found = {"mean depth": depth, f"{1 - _SLOW_AREA:.0%} of the immersed area": slow}
+        target_um, mean = 1e6 * (self.removal.target_depth_m or 0.0), self.depth_um_h
+        slow = mean.times(self.percentiles_um_h[0] / mean.value)
+        found = {"mean depth": mean, "95 % of the immersed area": slow}
         return {name: _minutes(target_um, one.combined) for name, one in found.items() if target_um}
 
 
-def _minutes(target_um: float, depth: Estimate) -> Estimate:
+def _minutes(target_um: float, depth_um_h: Estimate) -> Estimate:
     """Time to a depth; without limit if the depth per time may be zero."""
-    ends = (depth.value, depth.ci95_high, depth.ci95_low)
+    ends = (depth_um_h.value, depth_um_h.ci95_high, depth_um_h.ci95_low)
     return Estimate(*(60 * target_um / one if one else math.inf for one in ends))
 
 
@@ -231,10 +180,9 @@ def removal_of(case: ReportedCase) -> RemovalOfCase | None:
         If a run of it lacks ``wear.json``.
     """
     first, load = case.first.process.case, case.values.of("force_slide")
-    removal = first.removal
+    removal, wears = first.removal, [study.wear for study in case.studies if study.wear]
     if removal is None or load is None:
         return None
-    wears = [study.wear for study in case.studies if study.wear]
     if len(wears) < len(case.studies):
         folder = case.first.process.folder
         raise TableError(f"{folder}: no wear.json: make it with: dragchain loading {folder}")
@@ -245,12 +193,38 @@ def removal_of(case: ReportedCase) -> RemovalOfCase | None:
     density = first.inputs[f"materials.{first.inputs['workpiece.material']}.density_kg_m3"]
     assert isinstance(density, float | int)
     coefficient, rate = predict(removal, action, density)
-    scale = coefficient.value * factor
-    means, errors = (scale * np.array([getattr(one, name) for one in wears])
-                     for name in ("patch_w_m2", "patch_se_w_m2"))  # fmt: skip
-    mean, error, quantile = patch_means(means, errors)
-    half = np.hypot(quantile * error, mean * rate.coefficient)
-    facets = {
+    facets = _facets(wears, coefficient.value * factor, rate.coefficient)
+    own = facets[facets["immersed"]]
+    depth, error, area = (own[name].to_numpy(np.float64) for name in _OF_MAP)
+    mean = float(np.average(depth, weights=area))
+    square, scatter = (float(np.average(x**2, weights=area)) for x in (depth - mean, error))
+    ends = np.quantile(UM_PER_H * depth, (0.05, 0.95), weights=area, method="inverted_cdf")
+    edges = wears[0].edges
+    return RemovalOfCase(
+        removal=removal,
+        fit=fit_trials(removal),
+        edges=() if removal.laws[0].impact else _bands(wears, coefficient.value * factor, rate),
+        edge_length_m=edges.length_m if edges else 0.0,
+        facets=facets,
+        impact_share=_over_packings([one.impact_share for one in wears]),
+        depth_um_h=rate.times(UM_PER_H / float(area.sum())),
+        mass_mg_h=rate.times(UM_PER_H * density),
+        coefficient_m2_n=coefficient,
+        variation=(math.sqrt(square) / mean, math.sqrt(max(0.0, square - scatter)) / mean),
+        percentiles_um_h=(float(ends[0]), float(ends[1])),
+    )
+
+
+_OF_MAP = ("depth_m_s", "depth_m_s_se", "area_m2")
+
+
+def _facets(wears: Sequence[Wear], scale: float, uncertainty: float) -> pd.DataFrame:
+    """The map of the depth of removal per time; see `RemovalOfCase`."""
+    found = [np.array([one.patch_w_m2, one.patch_se_w_m2]) for one in wears]
+    densities, errors = scale * np.swapaxes(found, 0, 1)
+    mean, error, quantile = patch_means(densities, errors)
+    half = np.hypot(quantile * error, mean * uncertainty)
+    columns = {
         "area_m2": wears[0].area_m2,
         "immersed": wears[0].immersed,
         "depth_m_s": mean,
@@ -258,25 +232,14 @@ def removal_of(case: ReportedCase) -> RemovalOfCase | None:
         "depth_ci95_low_m_s": np.maximum(mean - half, 0.0),
         "depth_ci95_high_m_s": mean + half,
     }
-    return RemovalOfCase(
-        removal=removal,
-        wears=wears,
-        facets=pd.DataFrame(facets),
-        edges=_bands(wears, scale, rate.coefficient),
-        impact_share=_over_packings([one.impact_share for one in wears]),
-        coefficient=coefficient,
-        rate=rate,
-        density_kg_m3=density,
-    )
+    return pd.DataFrame(columns)
 
 
 def _over_packings(values: Sequence[Estimate]) -> Estimate:
     return values[0] if len(values) == 1 else mean_of([one.value for one in values])
 
 
-def _bands(
-    wears: Sequence[Wear], scale: float, uncertainty: float
-) -> list[tuple[str, Estimate, float]]:
+def _bands(wears: Sequence[Wear], scale: float, rate: Parted) -> list[tuple[str, Estimate, float]]:
     """The bands along sharp edges; see `RemovalOfCase`.
 
     By volume balance, all removal nearer to the edge than the far side of a band rounds it: an edge
@@ -286,23 +249,22 @@ def _bands(
     if (edges := several[0]) is None:
         return found
     lacks = 1 / math.tan(edges.angle_rad / 2) - (math.pi - edges.angle_rad) / 2
-    for band, area in enumerate(edges.area_m2):
+    for band, (near, far) in enumerate(pairwise(edges.distance_m)):
         own = _over_packings([one.action_w.at(band) for one in several if one])
         summed += scale * own.value
         half = own.relative_half_width if own.value else 0.0
-        depth = Parted(UM_PER_H * scale * own.value / area, half, uncertainty).combined
-        near, far = (1e3 * one for one in edges.distance_m[band : band + 2])
+        depth = Parted(UM_PER_H * scale * own.value / edges.area_m2[band], half, rate.coefficient)
         radius = 1e6 * math.sqrt(summed * _ROUNDED_S / edges.length_m / lacks)
-        found.append((f"{near:.2g} to {far:.2g}", depth, radius))
+        found.append((f"{1e3 * near:.2g} to {1e3 * far:.2g}", depth.combined, radius))
     return found
 
 
 def touch_rows(case: ReportedCase) -> list[tuple[str, Estimate, Estimate]]:
     """Median and 95th percentile over the first touches, means over packings, in report units."""
-    found = [one.wear.touches for one in case.studies if one.wear and one.wear.touches]
+    found = [one.wear.touches.quantities for one in case.studies if one.wear and one.wear.touches]
 
     def over(name: str, end: str, factor: float) -> Estimate:
-        return mean_of([factor * getattr(one.quantities[name], end) for one in found])
+        return mean_of([factor * getattr(one[name], end) for one in found])
 
     return [
         (label, over(name, "p50", factor), over(name, "p95", factor))

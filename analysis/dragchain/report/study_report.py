@@ -27,7 +27,7 @@ from dragchain.report.page import (
     render_page,
     write_bundle,
 )
-from dragchain.report.removal import IGNORED, UM_PER_H, RemovalOfCase, removal_of, touch_rows
+from dragchain.report.removal import UM_PER_H, RemovalOfCase, removal_of, touch_rows
 from dragchain.report.spreadsheet import summary_workbook
 from dragchain.report.summary import summary
 from dragchain.run.case import upstream_folders
@@ -338,7 +338,6 @@ def _render(
         asked=[(one, answer) for one in cases for answer in answers(one)],
         removed=removed,
         touched=[(one, rows) for one in cases if (rows := touch_rows(one))],
-        ignored=IGNORED,
     )
 
 

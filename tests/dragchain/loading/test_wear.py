@@ -23,7 +23,8 @@ from loading_files import (
 )
 from made_run import output
 
-from dragchain.loading.wear import FILE, Wear, sharp_edges, strewn
+from dragchain.loading.edges import edge_distance, sharp_edges, strewn
+from dragchain.loading.wear import FILE, Wear
 from dragchain.loading.write import write_loading
 from dragchain.run.workpiece import Surface
 
@@ -125,18 +126,17 @@ def box(groove: bool = False) -> Surface:
 
 
 def test_sharp_edges_are_convex_and_below_the_surface_of_the_bed() -> None:
-    edges = sharp_edges(box(), 0.015)
-    assert len(edges.ends_m) == 4  # those of the lower face; the others reach up to 20 mm
-    assert edges.lengths_m.sum() == pytest.approx(0.08)
-    np.testing.assert_allclose(edges.angle_rad, math.pi / 2)
-    assert len(sharp_edges(box(), 0.03).ends_m) == 12
-    assert not len(sharp_edges(box(groove=True), 0.03).ends_m)
+    ends, angles = sharp_edges(box(), 0.015)
+    assert len(ends) == 4  # those of the lower face; the others reach up to 20 mm
+    assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() == pytest.approx(0.08)
+    np.testing.assert_allclose(angles, math.pi / 2)
+    assert len(sharp_edges(box(), 0.03)[0]) == 12
+    assert not len(sharp_edges(box(groove=True), 0.03)[0])
     points = np.array([[0.01, 0.0, 0.0], [0.007, 0.0, 0.0], [0.01, 0.0, 0.004]])
-    np.testing.assert_allclose(edges.distance(points, 1e-5), [0.0, 0.003, 0.004], atol=1e-5)
+    np.testing.assert_allclose(edge_distance(ends, points, 1e-5), [0.0, 0.003, 0.004], atol=1e-5)
 
 
 def test_the_area_along_edges_is_that_of_strips() -> None:
     """Within 1 mm of the 12 edges of a cube of 20 mm lies all but six squares of 18 mm."""
-    points, _ = strewn(box())
-    near = sharp_edges(box(), 0.03).distance(points, 5e-5) <= 1e-3
+    near = edge_distance(sharp_edges(box(), 0.03)[0], strewn(box()), 5e-5) <= 1e-3
     assert near.mean() * 6 * 4e-4 == pytest.approx(6 * (4e-4 - 0.018**2), rel=0.01)

@@ -66,7 +66,7 @@ REFUSED = [
     ({"law": "archard"}, "either coefficient_m2_n, or calibrate"),
     ({"coefficient_m2_n": 1e-15, "calibrate": TRIAL}, "either coefficient_m2_n, or calibrate"),
     ({"coefficient_m2_n": 0}, "removal.coefficient_m2_n.*greater than 0"),
-    ({"coefficient_m2_n": 1e-15, "sd_m2_n": 6e-16}, "sd_m2_n is half"),
+    ({"coefficient_m2_n": 1e-15, "sd_m2_n": 6e-16}, "sd_m2_n 6e-16 is half"),
     ({"calibrate": TRIAL, "sd_m2_n": 1e-16}, "sd_m2_n belongs to"),
     ({"calibrate": TRIAL | {"mass_loss_kg": 0}}, "mass_loss_kg.*greater than 0"),
     ({"calibrate": TRIAL | {"mass_loss_kg": -1e-5}}, "mass_loss_kg.*greater than 0"),
