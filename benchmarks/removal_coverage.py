@@ -1,6 +1,6 @@
 """How often 95 % intervals of removal contain the true value of simulated processes.
 
-    python benchmarks/removal_coverage.py docs/data/loading/removal_coverage.csv [--trials 2000]
+    python benchmarks/removal_coverage.py docs/data/loading/removal_coverage.csv 1000
 
 A process has 12 patches with different loads; in each packing its loads differ by 5 % together and
 by 10 % each, and vary over time with a correlation of 20 samples. The coefficient is known with an
@@ -8,11 +8,10 @@ uncertainty of 10 %, or from a trial weighed to 5 %, or three. With one packing 
 that of the packing, since its interval excludes the scatter between packings.
 """
 
-import argparse
-import csv
-from pathlib import Path
+import sys
 
 import numpy as np
+import pandas as pd
 from scipy.signal import lfilter
 
 from dragchain.report.removal import patch_means, predict
@@ -27,25 +26,21 @@ SETUPS = [(1, 0), (1, 1), (3, 0), (5, 1), (5, 3)]
 
 def contained(random: np.random.Generator, packings: int, trials: int) -> dict[str, bool]:
     """Whether the intervals of one simulated process contain the truth."""
-    loads = np.exp(random.normal(0.0, 0.7, PATCHES))
-    levels = 1 + 0.05 * random.normal(size=(packings, 1)) + 0.1 * random.normal(
-        size=(packings, PATCHES))  # fmt: skip
-    noise = lfilter([1.0], [1.0, -0.95], random.normal(size=(packings, PATCHES, FRAMES)))
+    loads, shape = np.exp(random.normal(0.0, 0.7, PATCHES)), (packings, PATCHES)
+    levels = 1 + 0.05 * random.normal(size=(packings, 1)) + 0.1 * random.normal(size=shape)
+    noise = lfilter([1.0], [1.0, -0.95], random.normal(size=(*shape, FRAMES)))
     series = (loads * levels)[..., None] * (1 + 0.25 * noise)
     true = loads * levels[0] if packings == 1 else loads
     totals = series.sum(axis=1)
-    action = estimate_mean(totals[0]).estimate
-    if packings > 1:
-        action = mean_of(totals.mean(axis=1))
+    action = mean_of(totals.mean(axis=1)) if packings > 1 else estimate_mean(totals[0]).estimate
     lost = TRUE_M2_N * DENSITY * true.sum() * TIME_S
-    weighed = [{"mass_loss_kg": lost * (1 + 0.05 * random.normal()), "time_s": TIME_S,
-                "sd_kg": 0.05 * lost} for _ in range(trials)]  # fmt: skip
-    given = {
-        "coefficient_m2_n": TRUE_M2_N * (1 + 0.1 * random.normal()),
-        "sd_m2_n": 0.1 * TRUE_M2_N,
-    }
-    law = Removal.model_validate({"calibrate": weighed} if trials else given)
-    coefficient, rate = predict(law, action, DENSITY)
+    weighed = lost * (1 + 0.05 * random.normal(size=trials))
+    block = [{"mass_loss_kg": m, "time_s": TIME_S, "sd_kg": 0.05 * lost} for m in weighed]
+    known = TRUE_M2_N * (1 + 0.1 * random.normal())
+    given = (
+        {"calibrate": block} if trials else {"coefficient_m2_n": known, "sd_m2_n": TRUE_M2_N / 10}
+    )
+    coefficient, rate = predict(Removal.model_validate(given), action, DENSITY)
     errors = np.array([[slow_error(one)[0] for one in each] for each in series])
     mean, error, quantile = patch_means(series.mean(axis=2), errors)
     depth = Estimate.around(mean[0], np.hypot(quantile * error[0], mean[0] * rate.coefficient))
@@ -56,25 +51,15 @@ def contained(random: np.random.Generator, packings: int, trials: int) -> dict[s
     }
 
 
-def rows(trials: int, seed: int = 1) -> list[dict[str, object]]:
-    """Coverage of each quantity in each set-up."""
-    random, found = np.random.default_rng(seed), list[dict[str, object]]()
+def coverage(trials: int, seed: int = 1) -> pd.DataFrame:
+    """How often each quantity's interval contains the truth, in each set-up."""
+    random, rows = np.random.default_rng(seed), []
     for packings, weighed in SETUPS:
-        every = [contained(random, packings, weighed) for _ in range(trials)]
-        for name in every[0]:
-            coverage = float(np.mean([one[name] for one in every]))
-            found.append({"packings": packings, "weighed_trials": weighed, "quantity": name,
-                          "coverage": coverage, "trials": trials})  # fmt: skip
-    return found
+        found = pd.DataFrame([contained(random, packings, weighed) for _ in range(trials)]).mean()
+        key = {"packings": packings, "weighed_trials": weighed, "trials": trials}
+        rows += [{**key, "quantity": name, "coverage": each} for name, each in found.items()]
+    return pd.DataFrame(rows)
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("out", type=Path)
-    parser.add_argument("--trials", type=int, default=2000)
-    asked = parser.parse_args()
-    with asked.out.open("w", newline="", encoding="utf-8") as stream:
-        table = rows(asked.trials)
-        writer = csv.DictWriter(stream, table[0].keys(), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(table)
+    coverage(int(sys.argv[2])).to_csv(sys.argv[1], index=False, lineterminator="\n")

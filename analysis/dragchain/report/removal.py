@@ -177,25 +177,28 @@ def removal_of(case: ReportedCase) -> RemovalOfCase | None:
     Raises
     ------
     TableError
-        If a run of it lacks ``wear.json``.
+        If a run of it lacks ``wear.json``, or nothing that the law reads has happened.
     """
     first, load = case.first.process.case, case.values.of("force_slide")
     removal, wears = first.removal, [study.wear for study in case.studies if study.wear]
     if removal is None or load is None:
         return None
+    folder, factor = case.first.process.folder, 1.0
     if len(wears) < len(case.studies):
-        folder = case.first.process.folder
         raise TableError(f"{folder}: no wear.json: make it with: dragchain loading {folder}")
-    action, factor = _over_packings([one.action_w for one in wears]), 1.0
+    action = _over_packings([one.action_w for one in wears])
     if removal.corrected:
         factor = load.shown.value / load.run.value
         action = load.shown.over(first.fidelity.speed_factor / axis_speed(first))
+    if not action.value:
+        raise TableError(f"{folder}: the law {removal.law} finds no action: use a longer path or a "
+                         "larger outputs.first_touch_fraction")  # fmt: skip
     density = first.inputs[f"materials.{first.inputs['workpiece.material']}.density_kg_m3"]
     assert isinstance(density, float | int)
     coefficient, rate = predict(removal, action, density)
     facets = _facets(wears, coefficient.value * factor, rate.coefficient)
     own = facets[facets["immersed"]]
-    depth, error, area = (own[name].to_numpy(np.float64) for name in _OF_MAP)
+    depth, error, area = own[["depth_m_s", "depth_m_s_se", "area_m2"]].to_numpy(np.float64).T
     mean = float(np.average(depth, weights=area))
     square, scatter = (float(np.average(x**2, weights=area)) for x in (depth - mean, error))
     ends = np.quantile(UM_PER_H * depth, (0.05, 0.95), weights=area, method="inverted_cdf")
@@ -213,9 +216,6 @@ def removal_of(case: ReportedCase) -> RemovalOfCase | None:
         variation=(math.sqrt(square) / mean, math.sqrt(max(0.0, square - scatter)) / mean),
         percentiles_um_h=(float(ends[0]), float(ends[1])),
     )
-
-
-_OF_MAP = ("depth_m_s", "depth_m_s_se", "area_m2")
 
 
 def _facets(wears: Sequence[Wear], scale: float, uncertainty: float) -> pd.DataFrame:
@@ -262,12 +262,9 @@ def _bands(wears: Sequence[Wear], scale: float, rate: Parted) -> list[tuple[str,
 def touch_rows(case: ReportedCase) -> list[tuple[str, Estimate, Estimate]]:
     """Median and 95th percentile over the first touches, means over packings, in report units."""
     found = [one.wear.touches.quantities for one in case.studies if one.wear and one.wear.touches]
-
-    def over(name: str, end: str, factor: float) -> Estimate:
-        return mean_of([factor * getattr(one[name], end) for one in found])
-
-    return [
-        (label, over(name, "p50", factor), over(name, "p95", factor))
-        for name, (label, factor) in TOUCH_QUANTITIES.items()
-        if found
-    ]
+    rows = list[tuple[str, Estimate, Estimate]]()
+    for name, (label, factor) in TOUCH_QUANTITIES.items() if found else ():
+        p50, p95 = (mean_of([factor * getattr(one[name], end) for one in found])
+                    for end in ("p50", "p95"))  # fmt: skip
+        rows.append((label, p50, p95))
+    return rows
