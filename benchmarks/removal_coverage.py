@@ -14,9 +14,9 @@ import numpy as np
 import pandas as pd
 from scipy.signal import lfilter
 
-from dragchain.report.removal import patch_means, predict
+from dragchain.report.removal import joined, patch_means, predict
 from dragchain.statistics.correlated import estimate_mean, slow_error
-from dragchain.statistics.estimate import Estimate, mean_of
+from dragchain.statistics.estimate import Estimate, mean_of, student_quantile
 from dragdeck.study.removal import Removal
 
 TRUE_M2_N, DENSITY, TIME_S, PATCHES, FRAMES = 1e-15, 7800.0, 3600.0, 12, 1500
@@ -40,10 +40,13 @@ def contained(random: np.random.Generator, packings: int, trials: int) -> dict[s
     given = (
         {"calibrate": block} if trials else {"coefficient_m2_n": known, "sd_m2_n": TRUE_M2_N / 10}
     )
-    coefficient, rate = predict(Removal.model_validate(given), action, DENSITY)
+    coefficient, rate = predict(
+        Removal.model_validate(given), action, DENSITY, packings - 1 if packings > 1 else np.inf
+    )
     errors = np.array([[slow_error(one)[0] for one in each] for each in series])
-    mean, error, quantile = patch_means(series.mean(axis=2), errors)
-    depth = Estimate.around(mean[0], np.hypot(quantile * error[0], mean[0] * rate.coefficient))
+    mean, error, degrees = patch_means(series.mean(axis=2), errors)
+    half = joined(student_quantile(degrees) * error, mean * rate.coefficient, degrees)
+    depth = Estimate.around(mean[0], half[0])
     return {
         "volume": rate.combined.contains(TRUE_M2_N * true.sum()),
         "coefficient": coefficient.combined.contains(TRUE_M2_N),

@@ -1,7 +1,7 @@
 """Removal from a workpiece: what the loads of its packings and the coefficient of a law predict.
 
-The scatter of the load and the uncertainty of the coefficient are kept apart; their relative
-half-widths of 95 % intervals add up as squares do (``benchmarks/removal_coverage.py``).
+The scatter of the load and the uncertainty of the coefficient are kept apart, and joined by the
+approximation of Welch (1947) and Satterthwaite (1946); see ``benchmarks/removal_coverage.py``.
 """
 
 import math
@@ -12,6 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
+from scipy.special import chdtri, stdtrit
 
 from dragchain.arrays import Floats
 from dragchain.errors import TableError
@@ -35,12 +37,23 @@ _ROUNDED_S = 1800.0
 """Time after which the radius of an edge is reported."""
 
 
+def joined(scatter: ArrayLike, known: ArrayLike, degrees: float) -> Floats:
+    """Half-widths of 95 % intervals, (...,), of which one has such degrees of freedom, as one."""
+    square = np.maximum(np.asarray(scatter) / student_quantile(degrees), 1e-60) ** 2
+    total = square + (np.asarray(known) / NORMAL_QUANTILE) ** 2
+    return np.asarray(stdtrit(degrees * (total / square) ** 2, 0.5 + CONFIDENCE / 2) * total**0.5)
+
+
 class Parted(NamedTuple):
-    """A positive number with the relative half-widths of its two 95 % intervals."""
+    """A positive number with the relative half-widths of its two 95 % intervals.
+
+    `degrees`: degrees of freedom of that by the scatter of the load.
+    """
 
     value: float
     scatter: float
     coefficient: float
+    degrees: float = math.inf
 
     def within(self, half: float) -> Estimate:
         """With an interval of this relative half-width, not below zero."""
@@ -49,7 +62,7 @@ class Parted(NamedTuple):
     @property
     def combined(self) -> Estimate:
         """With both together."""
-        return self.within(math.hypot(self.scatter, self.coefficient))
+        return self.within(float(joined(self.scatter, self.coefficient, self.degrees)))
 
     def times(self, factor: float) -> "Parted":
         """A multiple."""
@@ -77,8 +90,6 @@ def fit_trials(removal: Removal) -> Fit | None:
     """The fit to the trials of a study, None if its coefficient is given."""
     if removal.calibrate is None:
         return None
-    from scipy.special import chdtri
-
     trials = [(one.mass_loss_kg, one.time_s, one.sd_kg) for one in removal.calibrate]
     mass, time, sd = np.array(trials).T
     information = float(((time / sd) ** 2).sum())
@@ -90,31 +101,34 @@ def fit_trials(removal: Removal) -> Fit | None:
     return Fit(rate, half, residuals.tolist())
 
 
-def predict(removal: Removal, action_w: Estimate, density_kg_m3: float) -> tuple[Parted, Parted]:
+def predict(
+    removal: Removal, action_w: Estimate, density_kg_m3: float, degrees: float = math.inf
+) -> tuple[Parted, Parted]:
     """The coefficient, m2/N, and the removed volume per time, m3/s.
 
     The volume that a trial of the same process has lost does not depend on the simulated load; the
-    coefficient does then, and otherwise the volume.
+    coefficient does then, and otherwise the volume. `degrees` are those of the interval of the
+    action.
     """
     load = action_w.relative_half_width
     if fit := fit_trials(removal):
         rate = Parted(fit.rate_kg_s / density_kg_m3, 0.0, fit.half)
-        return Parted(rate.value / action_w.value, load, fit.half), rate
+        return Parted(rate.value / action_w.value, load, fit.half, degrees), rate
     value = removal.coefficient_m2_n or math.nan
     half = NORMAL_QUANTILE * (removal.sd_m2_n or 0.0) / value
-    return Parted(value, 0.0, half), Parted(value * action_w.value, load, half)
+    return Parted(value, 0.0, half), Parted(value * action_w.value, load, half, degrees)
 
 
-def patch_means(densities: Floats, errors: Floats) -> tuple[Floats, Floats, float]:
-    """Means over P packings of (P, M) values, their standard errors, and Student's quantile.
+def patch_means(densities: Floats, errors: Floats) -> tuple[Floats, Floats, int]:
+    """Means over P packings of (P, M) values, their standard errors, and degrees of freedom.
 
     Between packings; of one packing by its own standard errors, (P, M).
     """
     packings = len(densities)
     if packings == 1:
-        return densities[0], errors[0], student_quantile(SLOW_WAVES)
+        return densities[0], errors[0], SLOW_WAVES
     error = densities.std(axis=0, ddof=1) / math.sqrt(packings)
-    return densities.mean(axis=0), error, student_quantile(packings - 1)
+    return densities.mean(axis=0), error, packings - 1
 
 
 @dataclass(frozen=True)
@@ -195,7 +209,9 @@ def removal_of(case: ReportedCase) -> RemovalOfCase | None:
                          "larger outputs.first_touch_fraction")  # fmt: skip
     density = first.inputs[f"materials.{first.inputs['workpiece.material']}.density_kg_m3"]
     assert isinstance(density, float | int)
-    coefficient, rate = predict(removal, action, density)
+    between = len(wears) > 1 and not load.corrected
+    degrees = len(wears) - 1 if between else math.inf
+    coefficient, rate = predict(removal, action, density, degrees)
     facets = _facets(wears, coefficient.value * factor, rate.coefficient)
     own = facets[facets["immersed"]]
     depth, error, area = own[["depth_m_s", "depth_m_s_se", "area_m2"]].to_numpy(np.float64).T
@@ -222,8 +238,8 @@ def _facets(wears: Sequence[Wear], scale: float, uncertainty: float) -> pd.DataF
     """The map of the depth of removal per time; see `RemovalOfCase`."""
     found = [np.array([one.patch_w_m2, one.patch_se_w_m2]) for one in wears]
     densities, errors = scale * np.swapaxes(found, 0, 1)
-    mean, error, quantile = patch_means(densities, errors)
-    half = np.hypot(quantile * error, mean * uncertainty)
+    mean, error, degrees = patch_means(densities, errors)
+    half = joined(student_quantile(degrees) * error, mean * uncertainty, degrees)
     columns = {
         "area_m2": wears[0].area_m2,
         "immersed": wears[0].immersed,
@@ -253,7 +269,7 @@ def _bands(wears: Sequence[Wear], scale: float, rate: Parted) -> list[tuple[str,
         own = _over_packings([one.action_w.at(band) for one in several if one])
         summed += scale * own.value
         half = own.relative_half_width if own.value else 0.0
-        depth = Parted(UM_PER_H * scale * own.value / edges.area_m2[band], half, rate.coefficient)
+        depth = Parted(UM_PER_H * scale * own.value / edges.area_m2[band], half, *rate[2:])
         radius = 1e6 * math.sqrt(summed * _ROUNDED_S / edges.length_m / lacks)
         found.append((f"{1e3 * near:.2g} to {1e3 * far:.2g}", depth.combined, radius))
     return found

@@ -15,7 +15,7 @@ from report_files import PICTURES, case_json, make_run, page_of, process_finding
 from dragchain.errors import TableError
 from dragchain.loading.document import Loading
 from dragchain.loading.write import write_loading
-from dragchain.report.removal import Parted, fit_trials, patch_means, predict
+from dragchain.report.removal import Parted, fit_trials, joined, patch_means, predict
 from dragchain.report.study_report import write_study_report
 from dragchain.statistics.estimate import Estimate, student_quantile
 from dragdeck.study.removal import Removal
@@ -40,6 +40,15 @@ def test_a_trial_gives_the_volume_and_with_the_load_the_coefficient() -> None:
     assert rate == Parted(pytest.approx(volume), 0.0, pytest.approx(0.05 * Z))
     assert coefficient.value == pytest.approx(volume / 4e-3)
     assert (coefficient.scatter, coefficient.coefficient) == pytest.approx((0.25, 0.05 * Z))
+
+
+def test_intervals_join_by_welch_and_satterthwaite() -> None:
+    """Equal standard errors, one with 2 degrees of freedom: 8 in all."""
+    halves = student_quantile(2) * 0.1, Z * 0.1
+    assert joined(*halves, 2) == pytest.approx(student_quantile(8) * 0.1 * math.sqrt(2), rel=1e-6)
+    assert joined(halves[0], 0.0, 2) == pytest.approx(halves[0])
+    assert joined(0.0, halves[1], 2) == pytest.approx(halves[1])
+    np.testing.assert_allclose(joined([0.3, 0.0], [0.4, 0.4], math.inf), [0.5, 0.4])
 
 
 @pytest.mark.parametrize(("off", "birge"), [(0.5, 1.0), (6.0, 6.0)])
@@ -67,12 +76,12 @@ def test_longer_and_better_trials_count_more() -> None:
 
 def test_patches_have_the_scatter_between_packings_or_else_over_time() -> None:
     values, errors = np.array([[1.0, 5.0], [3.0, 5.0]]), np.array([[0.1, 0.2]] * 2)
-    mean, error, quantile = patch_means(values, errors)
+    mean, error, degrees = patch_means(values, errors)
     np.testing.assert_allclose([mean, error], [[2.0, 5.0], [1.0, 0.0]])
-    assert quantile == student_quantile(1)
-    mean, error, quantile = patch_means(values[:1], errors[:1])
+    assert degrees == 1
+    mean, error, degrees = patch_means(values[:1], errors[:1])
     np.testing.assert_allclose([mean, error], [[1.0, 5.0], [0.1, 0.2]])
-    assert quantile == student_quantile(8)
+    assert degrees == 8
 
 
 # --- report --------------------------------------------------------------------------------------
