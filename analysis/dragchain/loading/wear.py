@@ -205,9 +205,7 @@ def first_touches(run_dir: Path, part: Sampled, case: CaseOfRun) -> pd.DataFrame
     first = rows.iloc[order[np.diff(event[order], prepend=-1) > 0]]
     particles = read_table(run_dir / "tables" / "particles.parquet", ["particle_id", "radius_m"])
     radius_of = particles.drop_duplicates("particle_id").set_index("particle_id")["radius_m"]
-    radius = radius_of.reindex(events["particle_id"]).to_numpy(np.float64)
-    if np.isnan(radius).any():
-        raise TableError(f"{run_dir}: particles.parquet lacks particles of touches.parquet")
+    radius = radius_of.loc[events["particle_id"]].to_numpy(np.float64)
     normal = first["normal_velocity_m_s"].to_numpy()
     tangential = np.linalg.norm(first[SLIP], axis=1)
     modulus = case.contact_moduli["workpiece"].modulus_pa / case.fidelity.youngs_modulus_scale

@@ -97,11 +97,6 @@ class Removal(Model):
         """The laws that are added up."""
         return [LAWS[part] for part in self.law.split("+")]
 
-    @property
-    def corrected(self) -> bool:
-        """Whether windows give what the law reads at the physical Young's modulus: sliding only."""
-        return not any(law.impact for law in self.laws)
-
 
 # --- laws ----------------------------------------------------------------------------------------
 
