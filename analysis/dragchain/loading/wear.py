@@ -100,15 +100,12 @@ class Wear(Document):
     edges: EdgeBands | None
 
 
-def asks_for_wear(run_dir: Path, case: CaseOfRun) -> bool:
-    """Whether a run has a law of removal, or has written first touches."""
-    return case.removal is not None or TOUCHES[1] in load_outputs(run_dir)
-
-
 def compute_wear(
     run_dir: Path, case: CaseOfRun, sampled: Sampled, surface: Surface, loading: Loading
-) -> tuple[Wear, pd.DataFrame | None]:
+) -> tuple[Wear | None, pd.DataFrame | None]:
     """What laws of removal read of a run, and its contact events from first touch if written.
+
+    None of a run without a law of removal and first touches.
 
     Raises
     ------
@@ -116,12 +113,15 @@ def compute_wear(
         If ``touches.parquet`` is missing or has no contact, or the law reads impacts and the run
         has not written first touches.
     """
+    written = TOUCHES[1] in load_outputs(run_dir)
+    if case.removal is None and not written:
+        return None, None
     factor, size = case.fidelity.speed_factor, case.media.radius_mean_m
     immersion = needed(case.workpiece, "workpiece").immersion_depth_m
     loads = sampled.rows[["frame", "facet_id"]].assign(action=sampled.rows["force_slide_n_m"])
     group, laws = patches(surface, size), case.removal.laws if case.removal else [LAWS["archard"]]
     of_laws, touched, events = [replace(sampled, rows=loads)], None, None
-    if TOUCHES[1] in load_outputs(run_dir):
+    if written:
         part = sample(run_dir, case, TOUCHED)
         events = first_touches(run_dir, part, case)
         begun = np.bincount(events["frame"], minlength=part.frames).astype(np.float64)[:, None]

@@ -14,7 +14,7 @@ from dragchain.loading.figure import workpiece_figure
 from dragchain.loading.samples import DRAWN, Sampled, as_polydata, check_facets, facet_table, sample
 from dragchain.loading.summary import summarise_loading
 from dragchain.loading.wear import FILE as WEAR
-from dragchain.loading.wear import Wear, asks_for_wear, compute_wear, touch_maps
+from dragchain.loading.wear import Wear, compute_wear, touch_maps
 from dragchain.run.workpiece import Surface, read_surface
 from dragchain.tables.parquet import write_parquet
 from dragdeck.files import write_vtp
@@ -111,9 +111,7 @@ def compute_loading(run_dir: Path) -> WorkpieceLoading:
     events["type"] = event_types(events, case, sampled.interval_s)
     facets = facet_table(sampled, surface, events)
     summary = summarise_loading(sampled, facets, events, event, case, off_m)
-    wear = touched = None
-    if asks_for_wear(run_dir, case):
-        wear, touched = compute_wear(run_dir, case, sampled, surface, summary)
+    wear, touched = compute_wear(run_dir, case, sampled, surface, summary)
     if wear is not None and wear.touches is not None and touched is not None:
         facets = facets.assign(**touch_maps(touched, surface, wear.touches.time_s))
     drawn = replace(sampled, rows=sampled.rows[DRAWN].copy())

@@ -176,13 +176,13 @@ class RemovalOfCase:
         target_um, mean = 1e6 * (self.removal.target_depth_m or 0.0), self.depth_um_h
         slow = mean.times(self.percentiles_um_h[0] / mean.value)
         found = {"mean depth": mean, "95 % of the immersed area": slow}
-        return {name: _minutes(target_um, one.combined) for name, one in found.items() if target_um}
+        return {name: _time_to(target_um, one.combined) for name, one in found.items() if target_um}
 
 
-def _minutes(target_um: float, depth_um_h: Estimate) -> Estimate:
-    """Time to a depth; without limit if the depth per time may be zero."""
-    ends = (depth_um_h.value, depth_um_h.ci95_high, depth_um_h.ci95_low)
-    return Estimate(*(60 * target_um / one if one else math.inf for one in ends))
+def _time_to(depth_um: float, um_h: Estimate) -> Estimate:
+    """Minutes to a depth; without limit if the depth per time may be zero."""
+    ends = (um_h.value, um_h.ci95_high, um_h.ci95_low)
+    return Estimate(*(60 * depth_um / one if one else math.inf for one in ends))
 
 
 def removal_of(case: ReportedCase) -> RemovalOfCase | None:
