@@ -47,8 +47,9 @@ from dragchain.tables.network_contacts import (
     count_corrections,
 )
 from dragchain.tables.parquet import Rows, category, table_writer
-from dragchain.tables.run_folder import Run
+from dragchain.tables.run_folder import ON_WORKPIECE, Run
 from dragchain.tables.workpiece_contacts import WallContacts
+from dragdeck.decks.outputs import TOUCHES
 from dragdeck.dumps.frame import Columns
 from dragdeck.errors import RejectedRunError
 from dragdeck.records.case import CaseOfRun
@@ -181,6 +182,11 @@ class WorkpieceSamples:
         force, place = np.split(self._values[rows], 2, axis=1)
         return np.where((steps < self._steps[0])[:, None], np.nan, force), place
 
+    def places_between(self, steps: Ints) -> Floats:
+        """Places at N steps, (N, 3), on the straight line between the samples around each."""
+        columns = (np.interp(steps, self._steps, column) for column in self._values[:, 3:].T)
+        return np.stack(list(columns), axis=1)
+
 
 # --- contacts on the workpiece ---------------------------------------------------------------
 
@@ -202,6 +208,16 @@ def _write_workpiece_contacts(run: Run, file: Path) -> None:
                 f"{run.folder}: the check of force closure failed: {problem};"
                 " workpiece_contacts.parquet was not written; closure.json contains the values"
             )
+
+
+def _write_touches(run: Run, file: Path) -> None:
+    samples = WorkpieceSamples(run.prints("workpiece_force"))
+    own = WORKPIECE_CONTACTS + ((ATTRACTION,) if attracts(run.case) else ())
+    with table_writer(file, _with_classes(own, "workpiece_contacts", run.case)) as table:
+        for frames in run.workpiece_frames(TOUCHES):
+            steps = frames.step[frames.workpiece_at]
+            place = samples.places_between(steps)
+            table.write(workpiece_contact_rows(steps, frames.workpiece, place, run.case))
 
 
 def workpiece_contact_rows(
@@ -359,7 +375,6 @@ def _write_packing(run: Run, file: Path) -> None:
 
 _THERMO = Table("thermo.parquet", ("thermo",), _write_thermo)
 _PARTICLES = Table("particles.parquet", ("particles",), _write_particles)
-_ON_WORKPIECE = ("workpiece_particles", "workpiece_contacts")
 
 _TABLES: Mapping[str, tuple[Table, ...]] = {
     "drop_test": (_THERMO, Table("impacts.parquet", ("impacts",), _write_impacts)),
@@ -370,10 +385,11 @@ _TABLES: Mapping[str, tuple[Table, ...]] = {
         _PARTICLES,
         Table(
             "workpiece_contacts.parquet",
-            ("workpiece_force", *_ON_WORKPIECE),
+            ("workpiece_force", *ON_WORKPIECE),
             _write_workpiece_contacts,
         ),
-        Table("contacts.parquet", ("contacts", "particles", *_ON_WORKPIECE), _write_contacts),
+        Table("touches.parquet", ("workpiece_force", *TOUCHES), _write_touches),
+        Table("contacts.parquet", ("contacts", "particles", *ON_WORKPIECE), _write_contacts),
     ),
 }
 """What is made of a run of each scene, in this order."""

@@ -131,6 +131,8 @@ class SceneType:
         include = {"title", "assumptions", "reference"}
         if case.study.accepted.unsafe_timestep:
             include.add("accepted")
+        if case.study.removal and self.loading:
+            include.add("removal")
         remarks = case.study.model_dump(mode="json", include=include)
         asked = case.advised.model_dump(mode="json") if case.advised and self.needs_bed else None
         return digest({"study": remarks, "content": dict(self.content(case)), "asked": asked})

@@ -115,6 +115,13 @@ _RANGES = {
     "reference.signal.*_s*": _Range(-1e10, -1e3, 1e5, 1e10, {"ms": 1e-3}),
     "reference.signal.margin": _Range(1e-4, 1e-3, 0.5, 1, {"%": 0.01}),
     "reference.signal.sign": _Range(-1, -1, 1, 1, {}),
+    "removal.*_m2_n": _Range(1e-22, 1e-19, 1e-9, 1e-6, {"mm3/(N m)": 1e-9}),
+    "removal.calibrate*_kg": _Range(1e-12, 1e-9, 0.1, 10, {"g": 1e-3, "mg": 1e-6}),
+    "removal.calibrate*time_s": _Range(0.01, 1, 1e6, 1e8, {"min": 60}),
+    "removal.impact_ratio": _Range(1e-9, 1e-6, 1e9, 1e12, {}),
+    "removal.hardness_pa": _Range(1e6, 1e8, 1e11, 1e12, _MODULUS),
+    "removal.target_depth_m": _Range(1e-10, 1e-9, 1e-3, 0.1, _LENGTH),
+    "outputs.first_touch_fraction": _Range(0, 0, 1, 1, {"%": 0.01}),
     "reference.*_n": _Range(-1e5, -1e3, 1e3, 1e5, {"mN": 1e-3}),
 }
 """By dotted field, every number of a study; the first that fits counts. Assumptions: they span
