@@ -14,6 +14,7 @@ from pydantic_core import ErrorDetails
 
 from dragdeck.errors import Caution, InputError, choices, near, together
 from dragdeck.study.base import Json, Model, flat
+from dragdeck.study.calibration import FEWEST, MOST
 from dragdeck.study.model import BUILT_IN_FIDELITIES, AnyPath, Scaling, Study
 from dragdeck.study.plausible import implausible
 from dragdeck.study.recorded import Places, with_recording
@@ -40,6 +41,7 @@ def contradictions(study: Study, whole: bool) -> Iterator[InputError]:
         _names,
         _pairs,
         _media,
+        _angles,
         _shape,
         _motion,
         _assumptions,
@@ -76,6 +78,12 @@ def _pairs(study: Study) -> _Found:
                 f"differs from {key}, which is the same pair",
                 "one entry per pair",
             )
+        model, field = study.contact.rolling_model, f"pairs.{key}.rolling_damping"
+        if model == "epsd" and pair.rolling_friction and not pair.rolling_damping:
+            problem = "is missing, which the rolling model epsd requires"
+            yield field, problem, "a damping ratio above 0, such as 0.3"
+        if model != "epsd" and pair.rolling_damping:
+            yield field, f"the rolling model {model} has no damping", "contact.rolling_model epsd"
     for one, other in product(study.media.materials, study.type_names()):
         key, back = f"{one}-{other}", f"{other}-{one}"
         if key in every and not {key, back} & set(study.pairs):
@@ -95,6 +103,30 @@ def _media(study: Study) -> _Found:
             if not count:
                 field = f"media.classes.{name}" if name else "media"
                 yield field, "not one particle of it", "a larger total or fraction"
+
+
+def _angles(study: Study) -> _Found:
+    angles, media = study.calibration and study.calibration.angles, study.media
+    if angles is None or media.main_material not in study.materials:
+        return
+    if media.classes:
+        problem = "the media have several classes: whose friction would it be?"
+        yield "calibration.angles", problem, "a study of one class"
+        return
+    for name, rig in angles.rigs.items():
+        field, wall = f"calibration.angles.{name}", rig.material or study.bowl.material
+        found = [*_known("material", wall, study.materials, "no such material")]
+        if not found and not {f"{media.main_material}-{wall}", f"{wall}-{media.main_material}"} & {
+            *study.pairs
+        }:
+            problem = f"pairs has no entry {media.main_material}-{wall}"
+            found.append(("material", problem, "every pair in contact"))
+        found += rig.problems(media.typical_radius_m, study.gravity_m_s2)
+        count = study.model_copy(update={"media": rig.filled(media)}).particle_count
+        if not found and not FEWEST <= count <= MOST:
+            limit = f"{FEWEST} to {MOST} particles"
+            found.append(("count" if name == "repose" else "width_m", f"{count} particles", limit))
+        yield from ((f"{field}.{part}", problem, limit) for part, problem, limit in found)
 
 
 def _shape(study: Study) -> _Found:

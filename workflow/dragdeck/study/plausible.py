@@ -45,6 +45,17 @@ class _Range:
 
 _ANGLE = _Range(-1e5, -36e3, 36e3, 1e5, {})
 _RANGES = {
+    "calibration.angles.*friction.*": _Range(0, 0, 2, 10, {}),
+    "calibration.angles.points": _Range(8, 8, 200, 200, {}),
+    "calibration.angles.*angle_deg": _Range(0, 5, 60, 90, {"rad": 180 / math.pi}),
+    "calibration.angles.*angle_std_deg": _Range(0, 0.05, 10, 45, {"rad": 180 / math.pi}),
+    "calibration.angles.*radius_m": _Range(1e-4, 2e-3, 1, 5, _LENGTH),
+    "calibration.angles.drum.width_m": _Range(1e-4, 2e-3, 1, 5, _LENGTH),
+    "calibration.angles.drum.fill_fraction": _Range(0.1, 0.1, 0.5, 0.5, {"%": 0.01}),
+    "calibration.angles.drum.rpm": _Range(1e-3, 0.1, 100, 1e4, {"rad/s": 30 / math.pi}),
+    "calibration.angles.repose.count": _Range(1, 1, 2e4, 4e6, {}),
+    "calibration.angles.repose.mass_kg": _Range(1e-6, 1e-4, 10, 1e3, {"g": 1e-3}),
+    "calibration.angles.repose.lift_speed_m_s": _Range(1e-4, 1e-3, 0.1, 1, _SPEED),
     "media.count": _Range(1, 1, 1e6, 4e6, {}),
     "media*.radius_mean_m": _Range(1e-5, 1e-4, 0.02, 0.1, _LENGTH),
     "media*.radius_std_m": _Range(0, 0, 0.006, 0.03, _LENGTH),
@@ -88,6 +99,7 @@ _RANGES = {
     "materials.*.poissons_ratio": _Range(-0.9, 0, 0.49, 0.499, {}),
     "materials.*.density_kg_m3": _Range(50, 300, 2.3e4, 3e4, {"g/cm3": 1e3}),
     "pairs.*.restitution": _Range(0.05, 0.05, 1, 1, {}),
+    "pairs.*.rolling_damping": _Range(0, 0, 1, 10, {"%": 0.01}),
     "pairs.*friction": _Range(0, 0, 2, 10, {}),
     "pairs.*.cohesion_j_m3": _Range(0, 0, 1e9, 1e12, {"kJ/m3": 1e3, "MJ/m3": 1e6}),
     "gravity_m_s2": _Range(0.01, 1, 30, 500, {"cm/s2": 0.01, "mm/s2": 1e-3}),
