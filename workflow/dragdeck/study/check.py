@@ -14,7 +14,6 @@ from pydantic_core import ErrorDetails
 
 from dragdeck.errors import Caution, InputError, choices, near, together
 from dragdeck.study.base import Json, Model, flat
-from dragdeck.study.calibration import FEWEST, MOST
 from dragdeck.study.model import BUILT_IN_FIDELITIES, AnyPath, Scaling, Study
 from dragdeck.study.plausible import implausible
 from dragdeck.study.recorded import Places, with_recording
@@ -107,26 +106,11 @@ def _media(study: Study) -> _Found:
 
 def _angles(study: Study) -> _Found:
     angles, media = study.calibration and study.calibration.angles, study.media
-    if angles is None or media.main_material not in study.materials:
-        return
-    if media.classes:
-        problem = "the media have several classes: whose friction would it be?"
-        yield "calibration.angles", problem, "a study of one class"
-        return
-    for name, rig in angles.rigs.items():
-        field, wall = f"calibration.angles.{name}", rig.material or study.bowl.material
-        found = [*_known("material", wall, study.materials, "no such material")]
-        if not found and not {f"{media.main_material}-{wall}", f"{wall}-{media.main_material}"} & {
-            *study.pairs
-        }:
-            problem = f"pairs has no entry {media.main_material}-{wall}"
-            found.append(("material", problem, "every pair in contact"))
-        found += rig.problems(media.typical_radius_m, study.gravity_m_s2)
-        count = study.model_copy(update={"media": rig.filled(media)}).particle_count
-        if not found and not FEWEST <= count <= MOST:
-            limit = f"{FEWEST} to {MOST} particles"
-            found.append(("count" if name == "repose" else "width_m", f"{count} particles", limit))
-        yield from ((f"{field}.{part}", problem, limit) for part, problem, limit in found)
+    if angles and media.classes:
+        yield "calibration.angles", "the media have several classes", "media of one class"
+    elif angles:
+        for field, *rest in angles.problems(media.typical_radius_m, study.gravity_m_s2):
+            yield f"calibration.angles.{field}", *rest
 
 
 def _shape(study: Study) -> _Found:
