@@ -19,13 +19,13 @@ from dragdeck.records.run import read_accepted
 _SECTORS = 8
 """Sectors of a heap; the scatter of its angle is that without one of them."""
 
-_TIP, _TOE = 0.15, 0.8
-"""Part of a heap's radius whose surface counts: tip and toe are rounded."""
+_TIP, _TOE = 0.15, 0.7
+"""Part of a heap's radius whose surface counts: the tip is rounded, the toe a single layer."""
 
 _CENTRAL = 0.5
 """Half of the counted length of a drum's surface, over its radius: it bends near the wall."""
 
-_ROUNDS = 4
+_ROUNDS = 5
 
 _LEAST = 12
 """Particles of a surface."""
@@ -91,17 +91,17 @@ def heap_angle(centre: Floats, radius: Floats) -> tuple[float, float]:
 def drum_angle(centre: Floats, radius: Floats, drum_m: float) -> float:
     """Angle of the middle of the surface in a drum about z, gravity along -y, degrees.
 
-    A straight line through the tops of exposed particles, from which those near the wall are
-    left out again and again.
+    A straight line through the tops of exposed particles, as seen along the normal of the surface
+    that the line of the round before gives.
     """
-    top = centre[:, 1] + radius
-    seen, x = exposed(centre[:, [0, 2]], centre[:, 1], radius), centre[:, 0]
-    angle = _slope(x[seen], top[seen])
+    angle = 0.0
     for _ in range(_ROUNDS):
         turn = np.radians(angle)
-        along = x * np.cos(turn) + top * np.sin(turn)
-        middle = seen & (np.abs(along) < _CENTRAL * drum_m)
-        angle = _slope(x[middle], top[middle])
+        along = centre[:, 0] * np.cos(turn) + centre[:, 1] * np.sin(turn)
+        above = centre[:, 1] * np.cos(turn) - centre[:, 0] * np.sin(turn)
+        seen = exposed(np.column_stack([along, centre[:, 2]]), above, radius)
+        seen &= np.abs(along) < _CENTRAL * drum_m
+        angle += _slope(along[seen], (above + radius)[seen])
     return angle
 
 

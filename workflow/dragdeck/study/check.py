@@ -109,8 +109,8 @@ def _angles(study: Study) -> _Found:
     if angles and media.classes:
         yield "calibration.angles", "the media have several classes", "media of one class"
     elif angles:
-        for field, *rest in angles.problems(media.typical_radius_m, study.gravity_m_s2):
-            yield f"calibration.angles.{field}", *rest
+        found = angles.problems(media.typical_radius_m, study.gravity_m_s2)
+        yield from ((f"calibration.angles.{field}", what, limit) for field, what, limit in found)
 
 
 def _shape(study: Study) -> _Found:
