@@ -145,7 +145,8 @@ class Posterior:
         cls, models: Mapping[Rig, AngleModel], measured: Mapping[Rig, tuple[float, float]]
     ) -> "Posterior":
         """From measured angles and their standard uncertainties, degrees."""
-        axes = np.linspace(*next(iter(models.values())).ranges.T, GRID, axis=1)
+        ranges = next(iter(models.values())).ranges
+        axes = np.stack([np.linspace(low, high, GRID) for low, high in ranges])
         pairs = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
         misfit, log = dict[Rig, Floats](), dict[str, Floats]()
         for name, model in models.items():

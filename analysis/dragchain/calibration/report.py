@@ -132,7 +132,7 @@ def write_calibration_report(folder: Path, record: Path | None, angles: bool = F
     DragdeckError
         A file is missing, or the record cannot be used.
     """
-    drops = _of_drops(folder, record) if record else {"result": None}
+    drops = _of_drops(folder, record) if record else None
     friction = FrictionFile.read(folder / "angles.json") if angles else None
 
     def draw() -> Mapping[str, Figure]:
@@ -147,7 +147,7 @@ def write_calibration_report(folder: Path, record: Path | None, angles: bool = F
         return found
 
     template = "calibration/calibration.html.j2"
-    write_report(folder, template, draw=draw, friction=friction, **drops)
+    write_report(folder, template, draw=draw, friction=friction, drops=drops)
 
 
 _DROPS = ("sweep", "confirm")

@@ -47,7 +47,7 @@ _LIFT, _SETTLE_S = 0.06, 0.4
 _TRANSIENT, _REVOLUTIONS, _FRAMES = 0.4, 1.1, 120
 """Revolutions of a drum before its angle is read, and altogether; frames in them."""
 
-_FLATTEST = math.tan(math.radians(10))
+_FLATTEST = math.tan(math.radians(13))
 """Slope of a heap that the glued layer still carries as a whole."""
 
 
