@@ -63,7 +63,7 @@ class AngleModel:
         if spare < _SPARE:
             least = terms.shape[1] + _SPARE
             raise TableError(f"{len(terms)} runs of a measured angle succeeded, not {least}")
-        inverse = np.linalg.inv(terms.T @ terms)
+        inverse = np.asarray(np.linalg.inv(terms.T @ terms), dtype=np.float64)
         factors = inverse @ terms.T @ angle_deg
         variance = float(((angle_deg - terms @ factors) ** 2).sum() / spare)
         return cls(ranges, factors, variance * inverse, variance**0.5)

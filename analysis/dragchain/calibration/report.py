@@ -132,31 +132,27 @@ def write_calibration_report(folder: Path, record: Path | None, angles: bool = F
     DragdeckError
         A file is missing, or the record cannot be used.
     """
-    drops = _of_drops(folder, record) if record else None
-    friction = FrictionFile.read(folder / "angles.json") if angles else None
+    figures, drops, friction = dict[str, Figure](), None, None
+    if record:
+        sweep, confirm = (read_drops(folder / name / "drops.json") for name in ("sweep", "confirm"))
+        found = calibrate_file(record, sweep)
+        drops = _of_drops(found, sweep, confirm)
+    if angles:
+        friction = FrictionFile.read(folder / "angles.json")
 
     def draw() -> Mapping[str, Figure]:
-        found: dict[str, Figure] = {}
         if record:
-            sweep, confirm = (read_drops(folder / name / "drops.json") for name in _DROPS)
-            found["impacts"] = draw_impacts(
-                read_record(record), calibrate_file(record, sweep), confirm
-            )
+            figures["impacts"] = draw_impacts(read_record(record), found, confirm)
         if friction:
-            found["angles"] = draw_angles(friction, pd.read_csv(folder / "angles.csv"))
-        return found
+            figures["angles"] = draw_angles(friction, pd.read_csv(folder / "angles.csv"))
+        return figures
 
     template = "calibration/calibration.html.j2"
     write_report(folder, template, draw=draw, friction=friction, drops=drops)
 
 
-_DROPS = ("sweep", "confirm")
-
-
-def _of_drops(folder: Path, record: Path) -> Mapping[str, object]:
+def _of_drops(found: RecordFit, sweep: Drops, confirm: Drops) -> Mapping[str, object]:
     """What the page shows of a drop test."""
-    sweep, confirm = (read_drops(folder / name / "drops.json") for name in _DROPS)
-    found = calibrate_file(record, sweep)
     observed = found.observed
     names = [f"time of impact {k + 2}" for k in range(len(observed.times_s))]
     names += [f"peak {k + 2} / peak 1" for k in range(len(observed.log_peaks))]

@@ -86,7 +86,7 @@ def law(rig: Rig, pairs: Floats) -> Floats:
 
 
 def design() -> Floats:
-    part = (0.5 + np.arange(1, 25)[:, None] * np.array([0.75487767, 0.56984029])) % 1
+    part = (0.5 + np.arange(1, 21)[:, None] * np.array([0.75487767, 0.56984029])) % 1
     pairs = RANGES[:, 0] + np.ptp(RANGES, axis=1) * part**2
     return np.concatenate([pairs, pairs[3::4]])
 

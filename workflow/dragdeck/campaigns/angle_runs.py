@@ -12,7 +12,7 @@ from dragdeck.records.calibration import AngleRun, AnglesFile
 from dragdeck.scenes.angles import angle_scene
 from dragdeck.study.calibration import Angles
 
-_POINTS, _REPEATED, _OTHER_SEED = 24, 4, 1000
+_POINTS, _REPEATED, _OTHER_SEED = 20, 4, 1000
 """Pairs of coefficients; every so many are simulated again, with another seed."""
 
 _STEPS = (0.7548776662466927, 0.5698402909980532)

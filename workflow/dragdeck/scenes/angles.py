@@ -38,10 +38,10 @@ STIFFNESS = 1e4
 """Young's modulus over density, gravity, and radius of the cylinder or drum: soft, but the angles
 do not depend on it (docs/evidence/calibration.md)."""
 
-_STEP = 0.3
+_STEP = 0.5
 """Time step over the Rayleigh time."""
 
-_LIFT, _SETTLE_S = 0.06, 0.4
+_LIFT, _SETTLE_S = 0.1, 0.3
 """Speed of the cylinder over the root of g d; time to settle before and after it is lifted, s."""
 
 _TRANSIENT, _REVOLUTIONS, _FRAMES = 0.4, 1.1, 120
@@ -105,31 +105,23 @@ def angle_scene(case: Case, run: AngleRun, stiffness: float = STIFFNESS) -> Scen
     dt, rayleigh = bed_timestep(study, "timestep_fraction"), bed_rayleigh_time(study)
     start, stop, end = (round(time / dt) for time in placed.times_s)
     period, glued, of = -(-end // _FRAMES), len(placed.glued), Case(case.file, {}, study)
-    of_run = run.model_copy(
-        update={
-            "glued": glued,
-            "drum_radius_m": drum.radius_m if drum else 0.0,
-            "counted_from": stop,
-        }
-    )
-    names, scale = study.type_names()[:2], study.chosen_fidelity().youngs_modulus_scale
+    steps, fidelity = _FRAMES * period, study.chosen_fidelity()
+    read_with = {"glued": glued, "drum_radius_m": drum.radius_m if drum else 0.0}
+    names = [study.media.main_material, study.bowl.material]
     deck = AngleDeck(
         title=f"{run.rig}: {study.title}",
         study=case.study_name,
         scene="angles",
         run=run.rig,
         source="particles.data",
-        materials=material_table(study, names, scale, of),
+        materials=material_table(study, names, fidelity.youngs_modulus_scale, of),
         limit_force=study.contact.limit_force,
         gravity_m_s2=study.gravity_m_s2,
         gravity_direction=(0, -1, 0) if drum else (0, 0, -1),
         skin_m=widest_skin(study),
         timestep_s=dt,
         rayleigh_time_s=rayleigh,
-        outputs=(
-            outputs.thermo(period, _FRAMES * period),
-            outputs.particles(period, 0, _FRAMES * period, True),
-        ),
+        outputs=(outputs.thermo(period, steps), outputs.particles(period, 0, steps, True)),
         thermo_steps=period,
         glued=glued,
         edge_m=placed.edge_m,
@@ -137,21 +129,21 @@ def angle_scene(case: Case, run: AngleRun, stiffness: float = STIFFNESS) -> Scen
         drum_rad_s=drum.rad_s if drum else 0.0,
         lift_speed_m_s=speed,
         lift_steps=(start, stop),
-        steps=_FRAMES * period,
+        steps=steps,
     )
     density = particle_material(study).density_kg_m3
     rows = np.concatenate([placed.glued, placed.media]).tolist()
     bodies = [Body(1, radius, density, (x, y, z)) for x, y, z, radius in rows]
     side = -placed.edge_m - size, placed.edge_m + size
     box = side, side, (placed.bottom_m - size, placed.top_m + size)
-    inputs = {**of_run.model_dump(), "measured": rig.plain()}
+    inputs = {**run.model_dump(), **read_with, "counted_from": stop, "measured": rig.plain()}
     content = case_of_study(CaseOfRun, of, run.rig, inputs, dt, rayleigh, scene="angles")
     media = content.media.model_copy(update={"count": len(bodies)})
     files = {
         "particles.data": lambda: data_file(deck.title, len(names), box, bodies),
         "rig.stl": lambda: placed.mesh,
     }
-    return Scene(deck, content.model_copy(update={"media": media}), deck.steps, files)
+    return Scene(deck, content.model_copy(update={"media": media}), steps, files)
 
 
 def _study(study: Study, rig: Repose | Drum, run: AngleRun, stiffness: float) -> Study:

@@ -25,7 +25,7 @@ class Repose(Model):
     angle_deg: Measured = Field(description="angle of the heap to the horizontal, degrees")
     angle_std_deg: Positive = Field(description="its standard uncertainty, degrees")
     cylinder_radius_m: Positive = Field(description="inner radius of the cylinder, m")
-    count: Annotated[Whole, Field(ge=100, le=20_000)] = Field(description="number of particles")
+    count: Annotated[Whole, Field(ge=300, le=20_000)] = Field(description="number of particles")
 
 
 class Drum(Model):
