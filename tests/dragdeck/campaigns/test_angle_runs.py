@@ -87,6 +87,12 @@ def test_the_coefficients_fill_their_ranges(measured_case: Case, case: Case) -> 
     assert all(SCENES[name].run_id(case) == SCENES[name].run_id(measured_case) for name in SCENES)
 
 
+def test_another_measured_angle_needs_no_other_runs(measured_case: Case, made: Made) -> None:
+    one = AngleRun(rig="drum", friction=0.3, rolling_friction=0.1, seed=1)
+    other = made({"calibration": {"angles": {"drum": {**DRUM, "angle_deg": 35}}}})
+    assert angle_scene(measured_case, one).case == angle_scene(other, one).case
+
+
 @pytest.mark.engine
 @pytest.mark.parametrize("rig", ["repose", "drum"])
 def test_the_angle_grows_with_the_coefficients(

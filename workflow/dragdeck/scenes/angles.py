@@ -136,7 +136,8 @@ def angle_scene(case: Case, run: AngleRun, stiffness: float = STIFFNESS) -> Scen
     bodies = [Body(1, radius, density, (x, y, z)) for x, y, z, radius in rows]
     side = -placed.edge_m - size, placed.edge_m + size
     box = side, side, (placed.bottom_m - size, placed.top_m + size)
-    inputs = {**run.model_dump(), **read_with, "counted_from": stop, "measured": rig.plain()}
+    inputs = {**run.model_dump(), **read_with, "counted_from": stop}
+    inputs["geometry"] = rig.model_dump(exclude={"angle_deg", "angle_std_deg"})
     content = case_of_study(CaseOfRun, of, run.rig, inputs, dt, rayleigh, scene="angles")
     media = content.media.model_copy(update={"count": len(bodies)})
     files = {
