@@ -97,7 +97,7 @@ def draw_angles(found: FrictionFile, runs: pd.DataFrame) -> Figure:
     joint.contourf(x, y, weights, [*inside, np.inf], colors=[LIGHT, GREY])
     for axes, name in zip(others, models, strict=True):
         label, colour = _RIGS[name]
-        joint.contour(x, y, posterior.misfit[name].T, [-1.0, 1.0], colors=colour)
+        joint.contour(x, y, posterior.misfit[name].T, [-1.0, 1.0], colors=colour, linestyles="-")
         key(joint, f"{label}, within one standard uncertainty", color=colour, ls="-", marker="")
         own = runs[runs["rig"] == name]
         dots = axes.scatter(own["friction"], own["angle_deg"], c=own["rolling_friction"], s=14)
