@@ -49,7 +49,7 @@ def _waypoints(path: Any, study: Path, places: dict[str | None, _Place]) -> Any:
     name = path.get("file")
     if not isinstance(name, str):
         return path
-    file = _found(name, study, "motion.path.file")
+    file = recorded_file(name, study, "motion.path.file")
     points = _read(file, Waypoint, MOST_POINTS, "motion.path.points", places)
     return {**path, "file": None, "points": points}
 
@@ -59,12 +59,18 @@ def _sieved(grains: Any, field: str, study: Path, places: dict[str | None, _Plac
     name = grains.get("sieve") if isinstance(grains, dict) else None
     if not isinstance(name, str):
         return grains
-    file = _found(name, study, f"{field}.sieve")
+    file = recorded_file(name, study, f"{field}.sieve")
     return {**grains, "sieve": _read(file, Sieve, MOST_SIEVES, f"{field}.sieve", places)}
 
 
-def _found(name: str, study: Path, field: str) -> Path:
-    """The file beside the study, or beside one that it extends."""
+def recorded_file(name: str, study: Path, field: str) -> Path:
+    """The file beside the study, or beside one that it extends.
+
+    Raises
+    ------
+    InputError
+        There is none, or the path leaves the folder.
+    """
     folders = study_folders(study)
     inside = not Path(name).is_absolute() and ".." not in Path(name).parts
     for folder in folders if inside else ():
