@@ -2,7 +2,6 @@
 
 from functools import partial
 
-from dragdeck.campaigns.restitution_drops import settings
 from dragdeck.cases.case import Case
 from dragdeck.decks import RUN_FILE
 from dragdeck.engine.batch import Batch
@@ -62,9 +61,10 @@ def run_angles(case: Case, batch: Batch, report: Report, cores: int = 1) -> None
     EngineError
         No LIGGGHTS, or it was interrupted.
     """
-    angles, material = settings(case).angles, case.study.media.main_material
-    if angles is None:
+    calibration, material = case.study.calibration, case.study.media.main_material
+    if calibration is None or calibration.angles is None:
         raise InputError("no measured angle", file=case.file, field="calibration.angles")
+    angles = calibration.angles
     runs = angle_runs(angles)
     for one in {one.rig: one for one in runs.values()}.values():
         angle_scene(case, one)  # what cannot be simulated is refused before all runs
