@@ -10,16 +10,18 @@ import numpy as np
 from dragdeck.cases.bed import (
     JUST_BEYOND,
     bed_classes,
-    bed_density,
     bed_radii,
     bed_rayleigh_time,
     bed_timestep,
     bed_volume,
+    buoyancy_density,
     media_classes,
     outrun,
     particle_material,
     skin,
     smallest_radius,
+    weight_acceleration,
+    weight_density,
 )
 from dragdeck.cases.case import Case, materials_content
 from dragdeck.decks import outputs
@@ -44,7 +46,15 @@ from dragdeck.physics.rounding import rounded
 from dragdeck.physics.run_limits import RunLimits, run_limits
 from dragdeck.records.case import FillingCase
 from dragdeck.records.run import SettlingCriterion
-from dragdeck.scenes.scene import SceneType, case_of_study, material_table
+from dragdeck.scenes.scene import (
+    SceneType,
+    case_of_study,
+    liquid,
+    liquid_leaves_out,
+    liquid_models,
+    material_table,
+    media_of_run,
+)
 from dragdeck.study.base import Json
 from dragdeck.study.media import SOLID_FRACTION_ESTIMATE, Media
 from dragdeck.study.model import Study
@@ -100,6 +110,7 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
         materials=material_table(study, types, fidelity.youngs_modulus_scale, case),
         limit_force=study.contact.limit_force,
         gravity_m_s2=study.gravity_m_s2,
+        liquid=liquid(study),
         skin_m=skin(study),
         timestep_s=dt,
         rayleigh_time_s=rayleigh,
@@ -124,6 +135,7 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
             filling_content(case),
             dt,
             rayleigh,
+            media=media_of_run(study, buoyancy_density(study)),
             settled=SettlingCriterion(
                 energy_ratio=study.filling.energy_ratio, highest_m=study.bowl.height_m
             ),
@@ -136,8 +148,10 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
             "settling by a criterion": f"kinetic energy below {study.filling.energy_ratio:g} m "
             f"g d per particle",
             "a separate time step": "falling particles collide faster than a packing at rest",
+            **liquid_models(study),
         },
         leaves_out={
+            **liquid_leaves_out(study),
             "the workpiece": LeftOut("added later; cases with other workpieces share this filling"),
             "contact output": LeftOut(
                 "contacts before the drag are not analysed", "filling_contacts"
@@ -245,7 +259,7 @@ def floor_overlap(study: Study) -> float:
     An estimate.
     """
     particle, scale = particle_material(study), study.chosen_fidelity().youngs_modulus_scale
-    pressure = bed_pressure(bed_density(study), study.gravity_m_s2, expected_surface(study))
+    pressure = bed_pressure(weight_density(study), study.gravity_m_s2, expected_surface(study))
     return bed_overlap(effective_modulus(particle, particle, scale), pressure)
 
 
@@ -284,7 +298,7 @@ def _cohesion_caution(study: Study) -> Iterator[Caution]:
     one, half = np.ones(1), np.full(1, radius / 2)
     slope = float(FrictionLimit(0.0, pair.attractive(), wall=False).attraction_n(half, one)[0])
     largest = pull_off_force(slope, effective_modulus(particle, particle), radius / 2)
-    bond = largest / (particle_mass(particle, radius) * study.gravity_m_s2)
+    bond = largest / (particle_mass(particle, radius) * weight_acceleration(study))
     if bond > 1:
         yield Caution(
             "cohesion",
@@ -326,7 +340,7 @@ def bed_limits(study: Study, top_m: float, speed_m_s: float) -> RunLimits:
 def _energy_unit(study: Study) -> float:
     """Number of particles times m g d of the mean particle, J."""
     radius, count = study.media.typical_radius_m, study.particle_count
-    return fall_energy(count, bed_density(study), radius, study.gravity_m_s2)
+    return fall_energy(count, weight_density(study), radius, study.gravity_m_s2)
 
 
 def expected_time(study: Study) -> float:
@@ -381,6 +395,7 @@ def filling_content(case: Case) -> Json:
         "gravity_m_s2": study.gravity_m_s2,
         "contact": study.contact.plain(),
         "filling": study.filling.plain(),
+        **{name: value for name, value in study.plain().items() if name == "compound"},
         "seed": study.seed,
         "fidelity": {name: fidelity[name] for name in settings if name in fidelity},
     }

@@ -40,6 +40,7 @@ def contradictions(study: Study, whole: bool) -> Iterator[InputError]:
         _names,
         _pairs,
         _media,
+        _compound,
         _angles,
         _shape,
         _motion,
@@ -102,6 +103,20 @@ def _media(study: Study) -> _Found:
             if not count:
                 field = f"media.classes.{name}" if name else "media"
                 yield field, "not one particle of it", "a larger total or fraction"
+
+
+def _compound(study: Study) -> _Found:
+    compound, rim = study.compound, study.bowl.height_m
+    if compound is None:
+        return
+    if study.liquid_level_m > rim:
+        problem = "the liquid stands above the rim of the bowl"
+        yield "compound.level_m", problem, f"at most {rim:g} m"
+    for name in sorted({*study.media.materials} & {*study.materials}):
+        lightest = study.materials[name].density_kg_m3
+        if compound.density_kg_m3 >= lightest:
+            problem = f"particles of {name} float, so that there is no bed at the floor"
+            yield "compound.density_kg_m3", problem, f"below {lightest:g} kg/m3"
 
 
 def _angles(study: Study) -> _Found:

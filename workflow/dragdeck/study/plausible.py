@@ -59,6 +59,8 @@ _RANGES = {
     "media.fill_height_m": _Range(1e-4, 1e-3, 2, 10, _LENGTH),
     "bowl.radius_m": _Range(1e-3, 5e-3, 2, 10, _LENGTH),
     "bowl.height_m": _Range(1e-3, 5e-3, 2, 10, _LENGTH),
+    "compound.density_kg_m3": _Range(50, 500, 2e3, 2e4, {"g/cm3": 1e3}),
+    "compound.level_m": _Range(1e-4, 1e-3, 2, 10, _LENGTH),
     "workpiece*.shape.radius_m": _Range(1e-5, 2e-4, 0.3, 2, _LENGTH),
     "*facet_*_m": _Range(1e-6, 5e-5, 0.1, 1, _LENGTH),
     "workpiece*.shape.offset_m.*": _Range(-10, -2, 2, 10, _LENGTH),
