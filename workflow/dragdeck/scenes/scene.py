@@ -350,7 +350,7 @@ def material_table(
         other = names[-1] if one_particle and high == 0 else names[high]
         return study.pair(first, other).softened(scale)
 
-    law = contact_law([[pair(i, j) for j in size] for i in size])
+    law = contact_law([[pair(i, j) for j in size] for i in size], study.contact)
     return Materials(
         names=names,
         youngs_moduli_pa=moduli,

@@ -41,6 +41,7 @@ def contradictions(study: Study, whole: bool) -> Iterator[InputError]:
         _pairs,
         _media,
         _compound,
+        _angles,
         _shape,
         _motion,
         _assumptions,
@@ -78,6 +79,12 @@ def _pairs(study: Study) -> _Found:
                 f"differs from {key}, which is the same pair",
                 "one entry per pair",
             )
+        model, field = study.contact.rolling_model, f"pairs.{key}.rolling_damping"
+        if model == "epsd" and pair.rolling_friction and not pair.rolling_damping:
+            problem = "is missing, which the rolling model epsd requires"
+            yield field, problem, "a damping ratio above 0, such as 0.3"
+        if model != "epsd" and pair.rolling_damping:
+            yield field, f"the rolling model {model} has no damping", "contact.rolling_model epsd"
     for one, other in product(study.media.materials, study.type_names()):
         key, back = f"{one}-{other}", f"{other}-{one}"
         if key in every and not {key, back} & set(study.pairs):
@@ -111,6 +118,15 @@ def _compound(study: Study) -> _Found:
         if compound.density_kg_m3 >= lightest:
             problem = f"particles of {name} float, so that there is no bed at the floor"
             yield "compound.density_kg_m3", problem, f"below {lightest:g} kg/m3"
+
+
+def _angles(study: Study) -> _Found:
+    angles, media = study.calibration and study.calibration.angles, study.media
+    if angles and media.classes:
+        yield "calibration.angles", "the media have several classes", "media of one class"
+    elif angles:
+        found = angles.problems(media.typical_radius_m, study.gravity_m_s2)
+        yield from ((f"calibration.angles.{field}", what, limit) for field, what, limit in found)
 
 
 def _shape(study: Study) -> _Found:

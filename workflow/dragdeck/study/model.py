@@ -20,6 +20,7 @@ from dragdeck.study.base import (
     Positive,
     Whole,
 )
+from dragdeck.study.calibration import Calibration
 from dragdeck.study.contact_law import Contact, Pair
 from dragdeck.study.media import Media, class_counts
 from dragdeck.study.paths.circle import CirclePath
@@ -245,22 +246,6 @@ class DropTest(Model):
     )
     timestep_fraction: Annotated[Number, Field(gt=0, le=1)] = Field(
         default=0.02, description="time step of the drop test as a fraction of the Rayleigh time"
-    )
-
-
-class Calibration(Model):
-    """A measured drop test, to find the restitution of particle on workpiece material."""
-
-    record: Line = Field(
-        pattern=r"^[^{}]*$", description="CSV file of force against time; relative to the study"
-    )
-    height_std_m: Positive = Field(
-        default=1e-4, description="standard uncertainty of drop_test.height_m in the test, m"
-    )
-    peaks: Literal["auto", "yes", "no"] = Field(
-        default="auto",
-        description="whether to fit the ratios of the peak forces too; auto: if the "
-        "sensor is fast enough",
     )
 
 

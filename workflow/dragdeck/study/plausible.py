@@ -45,6 +45,10 @@ class _Range:
 
 _ANGLE = _Range(-1e5, -36e3, 36e3, 1e5, {})
 _RANGES = {
+    "calibration.angles.*friction.*": _Range(0, 0, 2, 10, {}),
+    "calibration.angles.*_deg": _Range(0, 0.05, 60, 90, {"rad": 180 / math.pi}),
+    "calibration.angles.*_m": _Range(1e-4, 2e-3, 1, 5, _LENGTH),
+    "calibration.angles.*": _Range(1e-3, 0.1, 2e4, 2e4, {}),
     "media.count": _Range(1, 1, 1e6, 4e6, {}),
     "media*.radius_mean_m": _Range(1e-5, 1e-4, 0.02, 0.1, _LENGTH),
     "media*.radius_std_m": _Range(0, 0, 0.006, 0.03, _LENGTH),
@@ -90,6 +94,7 @@ _RANGES = {
     "materials.*.poissons_ratio": _Range(-0.9, 0, 0.49, 0.499, {}),
     "materials.*.density_kg_m3": _Range(50, 300, 2.3e4, 3e4, {"g/cm3": 1e3}),
     "pairs.*.restitution": _Range(0.05, 0.05, 1, 1, {}),
+    "pairs.*.rolling_damping": _Range(0, 0, 1, 10, {"%": 0.01}),
     "pairs.*friction": _Range(0, 0, 2, 10, {}),
     "pairs.*.cohesion_j_m3": _Range(0, 0, 1e9, 1e12, {"kJ/m3": 1e3, "MJ/m3": 1e6}),
     "gravity_m_s2": _Range(0.01, 1, 30, 500, {"cm/s2": 0.01, "mm/s2": 1e-3}),
