@@ -59,15 +59,15 @@ def check_run(
         _no_errors(screens[-1]),
         _neighbour_builds("".join(screens)),
     ]
-    checks += [_packing(folder / mark, inputs.media.count, ranks) for mark in inputs.marks]
+    checks += [_packing(folder / mark, inputs.media.n_spheres, ranks) for mark in inputs.marks]
     if inputs.settled is not None:
         checks.append(_at_rest(screens[-1]))
-        checks.append(_packing(folder / PACKING_FILE, inputs.media.count, ranks))
+        checks.append(_packing(folder / PACKING_FILE, inputs.media.n_spheres, ranks))
         if "particles" in outputs:
             checks += _in_bowl(folder, outputs["particles"], parts, inputs.settled.highest_m)
     if "thermo" in outputs:
         samples = _samples(folder, outputs["thermo"], parts)
-        checks += _thermo(samples, inputs.media.count)
+        checks += _thermo(samples, inputs.media.n_spheres)
         if inputs.steady is not None:
             checks.append(_steady(samples, inputs.steady))
     checks += [_complete(folder, name, output, parts) for name, output in outputs.items()]

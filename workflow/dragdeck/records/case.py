@@ -91,6 +91,32 @@ class ClassOfRun(Part):
     attractive: Mapping[str, Mapping[str, float]] = omitted({})
 
 
+class BodiesOfRun(Part):
+    """Particles of one class and size that are clumps of spheres.
+
+    Attributes
+    ----------
+    first_id, count : int
+        They have the ids from `first_id` on.
+    first_sphere : int
+        Id in LIGGGHTS of the first sphere of the first one; spheres are counted particle by
+        particle.
+    radius_m, mass_kg : float
+        Radius of the sphere of equal volume, and mass.
+    offsets_m, radii_m : tuple
+        Places of the spheres of a particle in its principal frame about the centre of mass, and
+        their radii, m.
+    """
+
+    first_id: int
+    count: int
+    first_sphere: int
+    radius_m: PositiveFloat
+    mass_kg: PositiveFloat
+    offsets_m: tuple[tuple[float, float, float], ...]
+    radii_m: tuple[PositiveFloat, ...]
+
+
 class BowlOfRun(Part):
     """The bowl: a cylinder about the z axis with its floor at z = 0.
 
@@ -185,6 +211,8 @@ class CaseOfRun(CaseFile):
         contact law has none.
     classes : tuple of ClassOfRun
         Classes of the media, if there are several.
+    bodies : tuple of BodiesOfRun
+        Particles by class and size, if they are clumps of spheres.
     unsafe_timestep : str or None
         Why a step of the process beyond the stable one is accepted.
     fidelity : FidelityOfRun
@@ -225,6 +253,7 @@ class CaseOfRun(CaseFile):
     contact_moduli: Mapping[str, ContactConstants]
     attractive: Mapping[str, Mapping[str, float]] = omitted({})
     classes: tuple[ClassOfRun, ...] = omitted(())
+    bodies: tuple[BodiesOfRun, ...] = omitted(())
     assumptions: tuple[AssumptionOfRun, ...]
     reference: Reference | None
     unsafe_timestep: str | None = None

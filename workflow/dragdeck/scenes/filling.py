@@ -1,7 +1,7 @@
 """The fill: the particles fall into the bowl and come to rest."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -9,12 +9,15 @@ import numpy as np
 
 from dragdeck.cases.bed import (
     JUST_BEYOND,
+    BodySize,
     bed_classes,
     bed_density,
     bed_radii,
     bed_rayleigh_time,
     bed_timestep,
     bed_volume,
+    body_sizes,
+    farthest_point,
     media_classes,
     outrun,
     particle_material,
@@ -39,7 +42,7 @@ from dragdeck.physics.contact_mechanics import (
 )
 from dragdeck.physics.coulomb import FrictionLimit
 from dragdeck.physics.domain_split import FilledBowl, Split, rank_warnings, split
-from dragdeck.physics.packing import Bed, Particles, pour
+from dragdeck.physics.packing import Bed, Particles, pour, primes, room_to_insert
 from dragdeck.physics.rounding import rounded
 from dragdeck.physics.run_limits import RunLimits, run_limits
 from dragdeck.records.case import FillingCase
@@ -60,9 +63,33 @@ _SETTLING_ESTIMATE_S = 0.5
 """Time from the last particle's arrival to rest, an estimate used for expectations only."""
 
 
+@dataclass(frozen=True)
+class Insertion:
+    """Clumps of one class and size, and how LIGGGHTS inserts them.
+
+    Attributes
+    ----------
+    body : BodySize
+    type : int
+        Of the material.
+    density_kg_m3, mass_kg : float
+    inertia_kg_m2 : (3,) array
+        Principal moments of inertia.
+    seeds : sequence of int
+        Three primes: of template, distribution and insertion.
+    """
+
+    body: BodySize
+    type: int
+    density_kg_m3: float
+    mass_kg: float
+    inertia_kg_m2: Sequence[float]
+    seeds: Sequence[int]
+
+
 @dataclass(frozen=True, kw_only=True)
 class FillingDeck(Deck):
-    """What the fill template sees."""
+    """What the fill template sees; `insertions` of clumps only, into a space with this top, m."""
 
     bowl_type: int
     bowl_radius_m: float
@@ -71,6 +98,8 @@ class FillingDeck(Deck):
     check_steps: int
     most_checks: int
     max_time_s: float
+    insertions: Sequence[Insertion] = ()
+    space_top_m: float = 0.0
 
 
 def filling_scene(case: Case) -> Scene[FillingCase]:
@@ -88,7 +117,7 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
     rayleigh = bed_rayleigh_time(study)
     dt = bed_timestep(study, "filling_timestep_fraction")
     check_steps = max(1, math.ceil(_CHECK_INTERVAL_S / dt))
-    particles, top = first_particles(study), box_top(study)
+    top, start = box_top(study), _start(study)
     longest = study.filling.max_time_s
     types = _filling_types(study)
     deck = FillingDeck(
@@ -103,7 +132,7 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
         skin_m=skin(study),
         timestep_s=dt,
         rayleigh_time_s=rayleigh,
-        outputs=(outputs.thermo(check_steps, None), outputs.settled_particles()),
+        outputs=(outputs.thermo(check_steps, None), outputs.settled_particles(study.media.clumped)),
         thermo_steps=check_steps,
         checkpoint_steps=5 * check_steps,
         processors=rank_split(case).line,
@@ -114,6 +143,9 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
         check_steps=check_steps,
         most_checks=math.ceil(longest / (check_steps * dt)),
         max_time_s=longest,
+        clumped=study.media.clumped,
+        insertions=_insertions(study),
+        space_top_m=start.top_m,
     )
     return Scene(
         deck=deck,
@@ -127,12 +159,12 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
             settled=SettlingCriterion(
                 energy_ratio=study.filling.energy_ratio, highest_m=study.bowl.height_m
             ),
-            limits=bed_limits(study, top, particles.fastest_m_s),
+            limits=bed_limits(study, top, start.fastest_m_s),
         ),
         steps=round(expected_time(study) / dt),
-        files={"particles.data": lambda: _particles_data(particles, study, top, len(types))},
+        files={"particles.data": lambda: _particles_data(study, top, len(types))},
         models={
-            "every particle individually": "exact number, mean and standard deviation of radii",
+            **_models(study),
             "settling by a criterion": f"kinetic energy below {study.filling.energy_ratio:g} m "
             f"g d per particle",
             "a separate time step": "falling particles collide faster than a packing at rest",
@@ -155,6 +187,53 @@ def _filling_types(study: Study) -> list[str]:
     bowl = study.bowl.material
     used = list(dict.fromkeys((*study.media.materials, bowl)))
     return used + [bowl] * (len(study.type_names()) - len(used))
+
+
+def _models(study: Study) -> dict[str, str]:
+    """How particles stand in a deck."""
+    if not study.media.clumped:
+        return {"every particle individually": "exact number, mean and standard deviation of radii"}
+    spheres = study.sphere_count / study.particle_count
+    return {
+        f"particles as clumps of {spheres:.3g} spheres": "mass and inertia of the body; a step "
+        "takes as long as with so many times the particles"
+    }
+
+
+@dataclass(frozen=True)
+class _Start:
+    """Highest point of the particles before they fall, m, and their largest speed, m/s."""
+
+    top_m: float
+    fastest_m_s: float
+
+
+def _start(study: Study) -> _Start:
+    """How particles start: spheres thrown from their places, clumps at rest where they fit."""
+    if not study.media.clumped:
+        particles = first_particles(study)
+        return _Start(particles.top_m, particles.fastest_m_s)
+    reaches = [one.radii_m * one.clump.reach for one in bed_classes(study)]
+    return _Start(room_to_insert(np.concatenate(reaches), study.bowl.radius_m), 0.0)
+
+
+def _insertions(study: Study) -> list[Insertion]:
+    """Clumps as LIGGGHTS inserts them."""
+    found, bodies = [], body_sizes(study)
+    for at, body in enumerate(bodies):
+        material = study.materials[body.of.material]
+        mass = particle_mass(material, body.radius_m)
+        found.append(
+            Insertion(
+                body=body,
+                type=1 + study.type_names().index(body.of.material),
+                density_kg_m3=material.density_kg_m3,
+                mass_kg=mass,
+                inertia_kg_m2=(mass * body.inertia).tolist(),
+                seeds=primes(study.seed, 3 * len(bodies))[3 * at : 3 * at + 3],
+            )
+        )
+    return found
 
 
 def first_particles(study: Study) -> Particles:
@@ -220,7 +299,7 @@ def box_top(study: Study) -> float:
     """
     diameter = 2 * study.media.typical_radius_m
     above_bed = 2 * expected_surface(study) + 8 * diameter
-    falling = first_particles(study).top_m
+    falling = _start(study).top_m
     return math.ceil(100 * max(falling, above_bed, 2 * study.bowl.height_m) + 5) / 100
 
 
@@ -228,13 +307,13 @@ def rank_split(case: Case) -> Split:
     """How the box of a case is split among its ranks."""
     study = case.study
     filled = FilledBowl(
-        particles=study.particle_count,
+        particles=study.sphere_count,
         radius_m=study.bowl.radius_m,
         height_m=expected_surface(study),
         half_width_m=_half_width(study),
         bottom_m=-study.media.typical_radius_m,
         top_m=box_top(study),
-        reach_m=2 * float(bed_radii(study).max()) + skin(study),
+        reach_m=(4 if study.media.clumped else 2) * farthest_point(study) + skin(study),
     )
     return split(case.ranks, filled)
 
@@ -256,8 +335,8 @@ def filling_cautions(case: Case) -> Iterator[Caution]:
     yield from _overlap_caution(study)
     yield from _cohesion_caution(study)
     yield from _class_cautions(study)
-    particles = first_particles(study)
-    speed = math.hypot(particles.fastest_m_s, _arrival_speed(study, particles))
+    start = _start(study)
+    speed = math.hypot(start.fastest_m_s, _arrival_speed(study, start.top_m))
     yield from outrun(study, "filling_timestep_fraction", "particles fall", speed)
 
 
@@ -320,7 +399,9 @@ def _class_cautions(study: Study) -> Iterator[Caution]:
 def bed_limits(study: Study, top_m: float, speed_m_s: float) -> RunLimits:
     """Limits of a run with the whole bed in a box of that height."""
     mass = particle_mass(particle_material(study), study.media.typical_radius_m)
-    return run_limits(study.particle_count, mass, study.gravity_m_s2, top_m, speed_m_s)
+    if study.media.clumped:
+        mass = bed_density(study) * bed_volume(study) / study.sphere_count
+    return run_limits(study.sphere_count, mass, study.gravity_m_s2, top_m, speed_m_s)
 
 
 def _energy_unit(study: Study) -> float:
@@ -331,12 +412,12 @@ def _energy_unit(study: Study) -> float:
 
 def expected_time(study: Study) -> float:
     """Time in which the particles of a study come to rest, s. An estimate."""
-    return _arrival_speed(study, first_particles(study)) / study.gravity_m_s2 + _SETTLING_ESTIMATE_S
+    return _arrival_speed(study, _start(study).top_m) / study.gravity_m_s2 + _SETTLING_ESTIMATE_S
 
 
-def _arrival_speed(study: Study, particles: Particles) -> float:
+def _arrival_speed(study: Study, top_m: float) -> float:
     """Speed of the highest particle on the bed if it falls from rest, m/s."""
-    return fall_speed(max(particles.top_m - expected_surface(study), 0.0), study.gravity_m_s2)
+    return fall_speed(max(top_m - expected_surface(study), 0.0), study.gravity_m_s2)
 
 
 def _half_width(study: Study) -> float:
@@ -344,10 +425,12 @@ def _half_width(study: Study) -> float:
     return study.bowl.radius_m + 2 * study.media.typical_radius_m
 
 
-def _particles_data(particles: Particles, study: Study, top_m: float, types: int) -> str:
+def _particles_data(study: Study, top_m: float, types: int) -> str:
     side = _half_width(study)
     box = ((-side, side), (-side, side), (-study.media.typical_radius_m, top_m))
-    names = [one.material for one in bed_classes(study)]
+    if study.media.clumped:
+        return data_file("the empty box", types, box, [])
+    particles, names = first_particles(study), [one.material for one in bed_classes(study)]
     kinds = [1 + study.type_names().index(name) for name in names]
     densities = [study.materials[name].density_kg_m3 for name in names]
     columns = (
@@ -388,9 +471,9 @@ def filling_content(case: Case) -> Json:
 
 def _impact_speed(case: Case) -> float:
     """Speed of the highest particle that is thrown down and falls to the floor, m/s."""
-    particles = first_particles(case.study)
-    fall = fall_speed(particles.top_m, case.study.gravity_m_s2)
-    return math.hypot(particles.fastest_m_s, fall)
+    start = _start(case.study)
+    fall = fall_speed(start.top_m, case.study.gravity_m_s2)
+    return math.hypot(start.fastest_m_s, fall)
 
 
 def partners_in_bed(case: Case) -> list[tuple[str, str, float]]:

@@ -8,7 +8,7 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 
 from dragdeck import __version__
-from dragdeck.cases.bed import bed_classes, bed_density, skin
+from dragdeck.cases.bed import bed_classes, bed_density, body_sizes, skin
 from dragdeck.cases.case import Case, digest, slug
 from dragdeck.decks.deck import Materials, Scene, contact_law
 from dragdeck.errors import InputError
@@ -17,11 +17,13 @@ from dragdeck.physics.contact_mechanics import (
     ContactConstants,
     effective_modulus,
     effective_shear,
+    particle_mass,
 )
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import round_to
 from dragdeck.records.case import (
     AssumptionOfRun,
+    BodiesOfRun,
     BowlOfRun,
     CaseOfRun,
     ClassOfRun,
@@ -179,6 +181,7 @@ def case_of_study(
         "inputs": flat(inputs),
         "media": MediaOfRun(
             count=study.particle_count,
+            spheres=study.sphere_count if study.media.clumped else 0,
             radius_mean_m=study.media.typical_radius_m,
             radius_std_m=study.media.typical_std_m,
             density_kg_m3=bed_density(study),
@@ -190,6 +193,7 @@ def case_of_study(
         "contact_moduli": _contact_moduli(study, main, fidelity.youngs_modulus_scale),
         "attractive": _attractive(study, main, fidelity.youngs_modulus_scale),
         "classes": _classes(study, fidelity.youngs_modulus_scale),
+        "bodies": _bodies_of(study),
         "assumptions": _assumptions(study),
         "reference": study.reference,
         "versions": {"dragdeck": __version__},
@@ -217,6 +221,22 @@ def _classes(study: Study, scale: float) -> tuple[ClassOfRun, ...]:
         )
         first += len(one.radii_m)
     return tuple(found)
+
+
+def _bodies_of(study: Study) -> tuple[BodiesOfRun, ...]:
+    """The particles by class and size, if they are clumps."""
+    return tuple(
+        BodiesOfRun(
+            first_id=one.first_id,
+            count=one.count,
+            first_sphere=one.first_sphere,
+            radius_m=one.radius_m,
+            mass_kg=particle_mass(study.materials[one.of.material], one.radius_m),
+            offsets_m=one.offsets_m.tolist(),
+            radii_m=one.radii_m.tolist(),
+        )
+        for one in body_sizes(study)
+    )
 
 
 def _bodies(study: Study) -> dict[str, str]:
