@@ -103,6 +103,8 @@ class BodiesOfRun(Part):
         particle.
     radius_m, mass_kg : float
         Radius of the sphere of equal volume, and mass.
+    inertia_kg_m2 : tuple of float
+        Principal moments of inertia.
     offsets_m, radii_m : tuple
         Places of the spheres of a particle in its principal frame about the centre of mass, and
         their radii, m.
@@ -113,6 +115,7 @@ class BodiesOfRun(Part):
     first_sphere: int
     radius_m: PositiveFloat
     mass_kg: PositiveFloat
+    inertia_kg_m2: tuple[PositiveFloat, PositiveFloat, PositiveFloat]
     offsets_m: tuple[tuple[float, float, float], ...]
     radii_m: tuple[PositiveFloat, ...]
 
@@ -273,6 +276,14 @@ class CaseOfRun(CaseFile):
     def class_of(self, particle_id: Ints) -> Ints:
         """Number of the class of (N,) particles in `classes`; 0 if there are none."""
         return class_numbers(particle_id, [one.first_id for one in self.classes])
+
+    def body_of(self, sphere_id: Ints) -> Ints:
+        """Ids of the bodies of (N,) spheres of clumps; ids below 1, of walls, stay."""
+        first = np.array([one.first_sphere for one in self.bodies])
+        size = np.maximum(np.searchsorted(first, sphere_id, side="right") - 1, 0)
+        many = np.array([len(one.radii_m) for one in self.bodies])[size]
+        first_id = np.array([one.first_id for one in self.bodies])[size]
+        return np.where(sphere_id > 0, first_id + (sphere_id - first[size]) // many, sphere_id)
 
     def density_of(self, particle_id: Ints) -> Floats:
         """Density of (N,) particles, kg/m3."""

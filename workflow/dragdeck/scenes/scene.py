@@ -232,6 +232,9 @@ def _bodies_of(study: Study) -> tuple[BodiesOfRun, ...]:
             first_sphere=one.first_sphere,
             radius_m=one.radius_m,
             mass_kg=particle_mass(study.materials[one.of.material], one.radius_m),
+            inertia_kg_m2=(
+                particle_mass(study.materials[one.of.material], one.radius_m) * one.inertia
+            ).tolist(),
             offsets_m=one.offsets_m.tolist(),
             radii_m=one.radii_m.tolist(),
         )

@@ -599,8 +599,7 @@ class Study(Model):
         """Number of spheres in LIGGGHTS: more than that of particles if these are clumps."""
         media = self.media
         return sum(
-            count * media.spheres_of(media.parts[name])
-            for name, count in self.class_counts.items()
+            count * media.spheres_of(media.parts[name]) for name, count in self.class_counts.items()
         )
 
     def pair(self, first: str, second: str) -> Pair:
