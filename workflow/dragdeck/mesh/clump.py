@@ -7,11 +7,13 @@ body's own: its origin is the centre of mass, its axes are the principal axes of
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dragdeck.errors import InputError
+from dragdeck.mesh.files import read
 from dragdeck.mesh.surface import Floats, surface
 
 if TYPE_CHECKING:
@@ -26,6 +28,9 @@ _FINE = 64
 
 _SMALLEST = 0.2
 """Radius of a sphere at least: smaller ones make the time step short and add little."""
+
+_DENTED = 0.02
+"""Volume that the convex hull of a particle may have more than the particle."""
 
 _DIGITS = 5
 """Decimals of places and radii: far below the errors of a clump."""
@@ -110,6 +115,31 @@ def body(corners: Floats) -> Trimesh:
     _, axes = np.linalg.eigh(surface(points, faces).moment_inertia)
     axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])
     return surface(points @ axes, faces)
+
+
+def convex_corners(file: Path) -> Floats:
+    """Corners of the convex body whose closed surface a file has, (N, 3); their unit is lost.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, or the surface is open or not convex.
+    """
+    mesh, field = read(file, "m"), "media.shape.points"
+    if not mesh.is_watertight:
+        raise InputError("the surface of a particle is not closed", file=file, field=field,
+                         remedy="close the holes and export it again")  # fmt: skip
+    hull, volume = mesh.convex_hull, abs(float(mesh.volume))
+    if hull.volume > (1 + _DENTED) * volume:
+        raise InputError(
+            "a particle is not convex",
+            file=file,
+            field=field,
+            value=f"its convex hull has {hull.volume / volume:.3g} times its volume",
+            limit=f"at most {1 + _DENTED:g} times",
+            remedy="use a convex body",
+        )
+    return np.asarray(hull.vertices, dtype=np.float64)
 
 
 def fit_clump(corners: Floats, count: int) -> Clump:

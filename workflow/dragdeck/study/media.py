@@ -96,7 +96,7 @@ class Grains(Model):
     )
     shape: AnyShape | None = Field(
         default=None,
-        description="shape of the particles, none: spheres; radii are those of the spheres of equal "
+        description="shape of the particles, none: spheres; radii are those of spheres of equal "
         "volume",
         exclude_if=_none,
     )
@@ -344,7 +344,7 @@ def class_counts(
 
 
 def few_sizes(radii_m: Array) -> Array:
-    """Ascending radii in at most `MOST_SIZES` sizes, each the mean by volume of those it replaces."""
+    """Ascending radii in at most `MOST_SIZES` sizes, each the mean by volume of some of them."""
     parts = np.array_split(radii_m, min(MOST_SIZES, len(np.unique(radii_m))))
     return np.concatenate([np.full(len(part), np.cbrt((part**3).mean())) for part in parts])
 
