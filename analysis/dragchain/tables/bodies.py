@@ -87,21 +87,18 @@ class Bodies:
     def wall(self, contacts: WallContacts, at: Ints) -> tuple[WallContacts, Ints]:
         """Contacts of spheres with a wall at their steps as those of bodies; see `network`.
 
-        Facet and surface velocity are those of the contact with the largest normal force.
+        Point, facet and surface velocity are those of the contact with the largest normal force.
         """
         body = self.case.body_of(contacts.particle_id)
         first, group = _groups(np.column_stack([at, body]))
         order = np.lexsort((contacts.normal_force_n(), ~contacts.silent, group))
         strongest = order[np.cumsum(np.bincount(group, minlength=len(first))) - 1]
-        force, normal, point = _joined(
-            group, len(first), contacts.force_n, contacts.normal, contacts.normal_force_n(),
-            contacts.point_m,
-        )  # fmt: skip
+        forces = contacts.force_n, contacts.normal, contacts.normal_force_n(), contacts.point_m
+        force, normal, _ = _joined(group, len(first), *forces)
         kept = contacts.select(strongest)
         whole = replace(
             kept,
             particle_id=body[strongest],
-            point_m=point,
             force_n=force,
             normal=normal,
             overlap_m=_largest(group, len(first), contacts.overlap_m),
