@@ -6,6 +6,7 @@ body's own: its origin is the centre of mass, its axes are the principal axes of
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -28,6 +29,12 @@ _FINE = 64
 
 _SMALLEST = 0.2
 """Radius of a sphere at least: smaller ones make the time step short and add little."""
+
+_STARTS = 3
+"""Starts of a fit beside the greedy one."""
+
+_LARGEST = 1.5
+"""Radius of a sphere at most, in that of the largest one inside the body."""
 
 _DENTED = 0.02
 """Volume that the convex hull of a particle may have more than the particle."""
@@ -145,10 +152,9 @@ def convex_corners(file: Path) -> Floats:
 def fit_clump(corners: Floats, count: int) -> Clump:
     """Fit spheres to the convex hull of corners.
 
-    Spheres inside the body that cover as much of it as possible (a greedy choice among points of a
-    grid, each with the largest sphere around it) are the start of a least-squares fit of the
-    distances between the body's surface and the union of the spheres. At last all radii change by
-    the same length, so that the union has the volume of the body.
+    Spheres inside the body are the start of a least-squares fit of the distances between the body's
+    surface and the union of the spheres; the best of several starts counts. At last all radii
+    change by the same length, so that the union has the volume of the body.
 
     Parameters
     ----------
@@ -165,7 +171,9 @@ def fit_clump(corners: Floats, count: int) -> Clump:
 
     mesh = body(corners)
     samples = np.asarray(sample_surface(mesh, _SAMPLES, seed=1)[0])
-    offsets, radii = _fitted(samples, *_inscribed(mesh, count))
+    fits = [_fitted(samples, *start) for start in _inscribed(mesh, count)]
+    joined = [fit for fit in fits if _pieces(*fit) == 1]
+    offsets, radii = min(joined or fits, key=lambda fit: float((_outside(samples, *fit) ** 2).sum()))
     offsets = np.round(offsets, _DIGITS) + 0.0
     points, cell = _grid(mesh, _FINE, 1.3)
     outside = _outside(points, offsets, radii)
@@ -190,11 +198,16 @@ def fit_clump(corners: Floats, count: int) -> Clump:
     return clump
 
 
-def _check(clump: Clump) -> None:
+def _pieces(offsets: Floats, radii: Floats) -> int:
+    """Groups of spheres that overlap."""
     from scipy.sparse.csgraph import connected_components
 
-    apart = np.linalg.norm(clump.offsets[:, None] - clump.offsets[None], axis=2)
-    pieces, _ = connected_components(apart < clump.radii[:, None] + clump.radii)
+    apart = np.linalg.norm(offsets[:, None] - offsets[None], axis=2)
+    return int(connected_components(apart < radii[:, None] + radii)[0])
+
+
+def _check(clump: Clump) -> None:
+    pieces = _pieces(clump.offsets, clump.radii)
     if pieces > 1:
         raise InputError("the spheres do not overlap", value=f"{pieces} separate groups",
                          limit="one group", remedy="use more spheres")  # fmt: skip
@@ -220,8 +233,14 @@ def _grid(mesh: Trimesh, cells: int, room: float = 1.0) -> tuple[Floats, float]:
     return points, float(np.prod(2 * half / counts))
 
 
-def _inscribed(mesh: Trimesh, count: int) -> tuple[Floats, Floats]:
-    """Spheres inside a convex body that cover most of it, one after the other."""
+def _inscribed(mesh: Trimesh, count: int) -> Iterator[tuple[Floats, Floats]]:
+    """Spheres inside a convex body from which a fit may start.
+
+    First those that cover most of it, one after the other, then some about the centres of parts
+    into which points of a grid fall.
+    """
+    from scipy.cluster.vq import kmeans2
+
     points, _ = _grid(mesh, _CELLS)
     normals = np.asarray(mesh.face_normals)
     start = np.einsum("fi,fi->f", normals, mesh.triangles[:, 0])
@@ -236,7 +255,11 @@ def _inscribed(mesh: Trimesh, count: int) -> tuple[Floats, Floats]:
     for _ in range(count):
         chosen.append(int((within & free).sum(axis=1).argmax()))
         free &= ~within[chosen[-1]]
-    return points[chosen], depth[chosen]
+    yield points[chosen], depth[chosen]
+    for seed in range(_STARTS):
+        middles = kmeans2(points, count, seed=seed, minit="++")[0]
+        chosen = np.linalg.norm(points[:, None] - middles[None], axis=2).argmin(axis=0).tolist()
+        yield points[chosen], depth[chosen]
 
 
 def _outside(points: Floats, offsets: Floats, radii: Floats) -> Floats:
@@ -272,6 +295,9 @@ def _fitted(samples: Floats, offsets: Floats, radii: Floats) -> tuple[Floats, Fl
         slope[rows, nearest, 3] = -1.0
         return slope.reshape(len(samples), -1)
 
+    # a flat face would pull the centre of a sphere far away
     start = np.column_stack([offsets, np.maximum(radii, 1.01 * _SMALLEST)]).ravel()
-    low = np.tile([-np.inf, -np.inf, -np.inf, _SMALLEST], len(radii))
-    return split(least_squares(residuals, start, slopes, (low, np.inf), max_nfev=100).x)
+    low = np.append(samples.min(axis=0), _SMALLEST)
+    high = np.append(samples.max(axis=0), _LARGEST * radii.max())
+    bounds = np.tile(low, len(radii)), np.tile(high, len(radii))
+    return split(least_squares(residuals, start, slopes, bounds, max_nfev=100).x)
