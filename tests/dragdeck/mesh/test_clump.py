@@ -51,7 +51,9 @@ def test_inertia_is_that_of_the_body(shape: dict[str, Any], moments: list[float]
 
 
 def test_more_spheres_are_nearer_to_the_body() -> None:
-    corners = SHAPE.validate_python({"kind": "triangular_prism", "aspect": 1, "spheres": 2}).corners()
+    corners = SHAPE.validate_python(
+        {"kind": "triangular_prism", "aspect": 1, "spheres": 2}
+    ).corners()
     few, more = (fit_clump(corners, count) for count in (3, 12))
     assert more.surface_rms < 0.7 * few.surface_rms
     assert more.inertia_error < few.inertia_error

@@ -33,6 +33,12 @@ _SMALLEST = 0.2
 _STARTS = 3
 """Starts of a fit beside the greedy one."""
 
+_PARTS = (0.0, 0.3, 0.6, 0.8, 1.0)
+"""Fractions of the way from a start to its fit that are tried, since fits may fall apart."""
+
+_MARGIN = 0.93
+"""Spheres count as overlapping if they do with radii smaller by this factor."""
+
 _LARGEST = 1.5
 """Radius of a sphere at most, in that of the largest one inside the body."""
 
@@ -153,8 +159,9 @@ def fit_clump(corners: Floats, count: int) -> Clump:
     """Fit spheres to the convex hull of corners.
 
     Spheres inside the body are the start of a least-squares fit of the distances between the body's
-    surface and the union of the spheres; the best of several starts counts. At last all radii
-    change by the same length, so that the union has the volume of the body.
+    surface and the union of the spheres. The best of several starts counts whose spheres overlap, if
+    need be part of the way to the fit. At last all radii change by the same length, so that the
+    union has the volume of the body.
 
     Parameters
     ----------
@@ -171,9 +178,15 @@ def fit_clump(corners: Floats, count: int) -> Clump:
 
     mesh = body(corners)
     samples = np.asarray(sample_surface(mesh, _SAMPLES, seed=1)[0])
-    fits = [_fitted(samples, *start) for start in _inscribed(mesh, count)]
-    joined = [fit for fit in fits if _pieces(*fit) == 1]
-    offsets, radii = min(joined or fits, key=lambda fit: float((_outside(samples, *fit) ** 2).sum()))
+    fits = []
+    for start in _inscribed(mesh, count):
+        fit = _fitted(samples, *start)
+        fits += [tuple((1 - part) * a + part * b for a, b in zip(start, fit, strict=True))
+                 for part in _PARTS]  # fmt: skip
+    joined = [fit for fit in fits if _pieces(fit[0], _MARGIN * fit[1]) == 1]
+    offsets, radii = min(
+        joined or fits, key=lambda fit: float((_outside(samples, *fit) ** 2).sum())
+    )
     offsets = np.round(offsets, _DIGITS) + 0.0
     points, cell = _grid(mesh, _FINE, 1.3)
     outside = _outside(points, offsets, radii)
