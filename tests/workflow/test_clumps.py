@@ -141,7 +141,7 @@ def test_a_clump_of_one_sphere_is_the_sphere(fill: Fill) -> None:
     shift = start.step - plain[0].step
     heights = np.array([float(one.columns["z_m"][0]) for one in plain])
     impact = int((heights < 3e-3).argmax())
-    assert 0 < impact and heights[impact:].max() > 4e-3
+    assert impact > 0 and heights[impact:].max() > 4e-3
     pairs = zip(plain, clump, strict=False)
     for one, other in pairs:
         assert one.step + shift == other.step

@@ -119,7 +119,8 @@ def test_contacts_of_a_body_on_the_workpiece_are_one() -> None:
     up = [0.0, 0, 1]
     contacts = WallContacts(
         particle_id=np.array([1, 2, 3, 10]), facet_id=np.array([5, 6, 7, 8]),
-        point_m=np.eye(4)[:, :3], force_n=np.array([[0, 0, 1.0], [0.5, 0, 3], [0, 0, 0], [0, 0, 2]]),
+        point_m=np.eye(4)[:, :3],
+        force_n=np.array([[0, 0, 1.0], [0.5, 0, 3], [0, 0, 0], [0, 0, 2]]),
         evaluated_n=np.zeros((4, 3)), normal=np.array([up, up, [0, 0, 0], up]),
         surface_m_s=np.array([[1.0] * 3, [2.0] * 3, [np.nan] * 3, [4.0] * 3]),
         overlap_m=np.array([1.0, 2, 9, 4]), attraction_n=np.array([0.1, 0.2, 0, 0.4]),

@@ -78,7 +78,8 @@ def test_sizes_and_ids(made: Made) -> None:
         "balls": {"material": "ceramic", "fraction": 0.5, "radius_mean_m": 2e-3},
     }  # fmt: skip
     case = made({"media": {"count": 60, "fractions_of": "number", "classes": classes,
-                           "material": None, "radius_mean_m": None, "radius_std_m": 0}})  # fmt: skip
+                           "material": None, "radius_mean_m": None,
+                           "radius_std_m": 0}})  # fmt: skip
     study = case.study
     sizes = body_sizes(study)
     rods, balls = sizes[:5], sizes[5:]
@@ -133,7 +134,6 @@ def test_a_body_from_a_file(made: Made, project: Any) -> None:
     assert sorted(map(list, read.corners().tolist())) == sorted(CORNERS)
 
 
-DENT = [*CORNERS[:3], [1, 1, 1], [0.3, 0.3, 0.3]]
 BAD: list[tuple[dict[str, Any], str]] = [
     ({"shape": {**ROD, "spheres": 1}}, "2"),
     ({"shape": {**ROD, "spheres": 41}}, "40"),
@@ -141,7 +141,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"shape": {**ROD, "kind": "cube"}}, "cylinder"),
     ({"shape": {"kind": "ellipsoid", "axes": [6, 1, 1], "spheres": 9}}, "more than 5"),
     ({"shape": {"kind": "ellipsoid", "axes": [5, 5, 1], "spheres": 2}}, "miss the body|overlap"),
-    ({"shape": {"kind": "mesh", "points": CORNERS[:3] + [[1, 1, 0]], "spheres": 4}}, "in a plane"),
+    ({"shape": {"kind": "mesh", "points": [*CORNERS[:3], [1, 1, 0]], "spheres": 4}}, "in a plane"),
     ({"shape": ROD, "radius_mean_m": 0.0185, "count": 1}, "does not fit"),
     ({"shape": {"kind": "mesh", "points": "open.stl", "spheres": 4}}, "not closed"),
     ({"shape": {"kind": "mesh", "points": "gone.stl", "spheres": 4}}, "no such file"),

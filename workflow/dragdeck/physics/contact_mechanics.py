@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dragdeck.physics.rigid import Levers, RigidBodies
-from dragdeck.study.media import SOLID_FRACTION_ESTIMATE
+from dragdeck.study.shapes import SOLID_FRACTION_ESTIMATE
 from dragdeck.study.workpiece import Material
 
 Size = TypeVar("Size", float, NDArray[np.float64])

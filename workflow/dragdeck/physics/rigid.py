@@ -6,11 +6,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-
-from dragdeck.study.media import Array, Ints
+from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
+
+Array, Ints = NDArray[np.float64], NDArray[np.int64]
 
 
 @dataclass(frozen=True)

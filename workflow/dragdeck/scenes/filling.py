@@ -49,8 +49,9 @@ from dragdeck.records.case import FillingCase
 from dragdeck.records.run import SettlingCriterion
 from dragdeck.scenes.scene import SceneType, case_of_study, material_table
 from dragdeck.study.base import Json
-from dragdeck.study.media import SOLID_FRACTION_ESTIMATE, Media
+from dragdeck.study.media import Media
 from dragdeck.study.model import Study
+from dragdeck.study.shapes import SOLID_FRACTION_ESTIMATE
 
 _CHECK_INTERVAL_S = 0.02
 """Time between two looks at the kinetic energy, about the fall over one particle."""

@@ -24,14 +24,10 @@ from dragdeck.study.base import (
     Positive,
     Whole,
 )
-from dragdeck.study.shapes import FEWEST_SPHERES, AnyShape
+from dragdeck.study.shapes import FEWEST_SPHERES, SOLID_FRACTION_ESTIMATE, AnyShape
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
-
-SOLID_FRACTION_ESTIMATE = 0.59
-"""Solid fraction of a poured bed about twelve particles wide, an estimate used only for
-expectations before the bed exists (measured beds replace it)."""
 
 CUTOFF_STD = 2.5
 """Radii lie within this many standard deviations of the untruncated normal distribution."""

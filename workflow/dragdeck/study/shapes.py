@@ -16,6 +16,10 @@ from dragdeck.study.base import Model, Number, Positive, Whole
 
 Corners = NDArray[np.float64]
 
+SOLID_FRACTION_ESTIMATE = 0.59
+"""Solid fraction of a poured bed about twelve particles wide, an estimate used only for
+expectations before the bed exists (measured beds replace it)."""
+
 FEWEST_SPHERES, MOST_SPHERES = 2, 40
 """Spheres of a clump: LIGGGHTS accepts no single one, and more cost more than a shape is worth."""
 
