@@ -149,7 +149,7 @@ def test_tests_bring_their_packages(clone: Clone, arguments: list[str], called: 
     ended = clone.run("test", *arguments)
     assert ended.returncode == 0
     assert re.fullmatch(rf"{called} in .*\n", ended.stdout)
-    assert clone.extras() == ["cad", "crate", "docs", "notebook", "test"]
+    assert clone.extras() == ["cad", "compare", "crate", "docs", "notebook", "test"]
 
 
 def test_a_failed_check_fails_the_whole_and_still_tests(clone: Clone, tmp_path: Path) -> None:
@@ -158,6 +158,16 @@ def test_a_failed_check_fails_the_whole_and_still_tests(clone: Clone, tmp_path: 
     assert "quality check failed" in ended.stderr
     assert ended.stdout.startswith("pytest ")
     assert clone.run(script=".ci/run", cwd=tmp_path, FAILS="pytest").returncode == 5
+
+
+def test_studies_are_run_one_by_one_and_then_compared(clone: Clone) -> None:
+    ended = clone.run("compare", "--config", "studies=a,b", "fidelity=draft", "--cores", "1")
+    each = f"{SNAKEMAKE} [all] [--config] [study={{}}] [fidelity=draft] [--cores] [1]"
+    last = "dragchain [compare] [--out] [results/compare/a+b] [results/a] [results/b]"
+    called = [line.partition(" in ")[0] for line in ended.stdout.splitlines()]
+    assert called == [each.format("a"), each.format("b"), last]
+    failed = clone.run("compare", "--config", "studies=a,b", FAILS="snakemake")
+    assert failed.returncode != 0 and len(failed.stdout.splitlines()) == 1
 
 
 # --- what is missing -----------------------------------------------------------------------
@@ -186,7 +196,9 @@ chmod +x ../bin/df"""
         (FULL_DISK, ["all"], {}, ["the disk is full", "42 kB free"]),
         ("", ["web"], {}, ["npm is missing"]),
         ("", ["all", "--profile", "profiles/slurm"], {}, ["--workflow-profile"]),
-        ("", ["setup", "crates"], {}, ["crates", "cad, crate, docs"]),
+        ("", ["compare", "--config", "study=a"], {}, ["no studies to compare", "studies=A,B"]),
+        ("", ["compare", "--config", "studies=a b;c"], {}, ["not names of studies", "a b;c"]),
+        ("", ["setup", "crates"], {}, ["crates", "cad, compare, crate, docs"]),
     ],
 )
 def test_what_is_missing_is_named_with_a_remedy(

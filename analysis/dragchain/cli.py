@@ -87,6 +87,17 @@ COMMANDS = (
                   "with the actual ones"),
         Argument("--preview", type=Path, metavar="FILE",
                   help="picture of the set-up, set_up.png of dragdeck preview, for the report"))),
+    Command("compare", "compare cases of one study or of several",
+            "Compare cases: differences with intervals over the packings, load maps on one scale, "
+            "contact networks side by side and, of a sweep over two or more fields, main effects "
+            "and interactions. It reads tables and figures of the runs and writes comparison.html, "
+            "differences.csv and effects.csv to the folder.",
+            "compare.report:write_comparison", (
+        OUT_DIR,
+        Argument("folders", type=Path, nargs="+", metavar="FOLDER",
+                  help="results/STUDY with a report, or folders of process runs; differences are "
+                  "from the first case")),
+            "dragchain compare results/drag-spin --out results/compare/drag-spin"),
 )  # fmt: skip
 """What a user calls."""
 

@@ -96,12 +96,6 @@ def test_a_template_of_the_how_to_passes_the_check(
     assert main(["check", "small"]) == 0
 
 
-def test_the_how_to_changes_law_damping_and_output() -> None:
-    assert set(template_examples()) == {"base.in.j2", "filling.in.j2", "process.in.j2"}
-    shallow = ROOT / "studies/shallow/templates/process.in.j2"
-    assert template_examples()["process.in.j2"] == shallow.read_text()
-
-
 def test_every_public_name_of_dragchain_is_on_the_page() -> None:
     text = text_of("reference/python.md")
     assert [name for name in dragchain.__all__ if name not in text] == []

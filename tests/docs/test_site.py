@@ -14,7 +14,6 @@ from mathml import mathml
 from paths import ROOT
 from PIL import Image
 
-README_LINES = 90
 LINK = re.compile(r"(?<!\\)\]\(([^)\s]+)\)")
 
 
@@ -57,21 +56,6 @@ def test_every_link_leads_somewhere(page: Path) -> None:
         if not known or (anchor and target.suffix == ".md" and anchor not in anchors(target)):
             missing.append(link)
     assert missing == []
-
-
-def test_every_page_of_the_documentation_is_in_a_table_of_contents() -> None:
-    listed = set()
-    for page in (ROOT / "docs").rglob("*.md"):
-        for tree in re.findall(r"```{toctree}\n(.*?)```", page.read_text(), re.S):
-            names = [line for line in tree.splitlines() if line and line[0] != ":"]
-            listed |= {(page.parent / f"{name}.md").resolve() for name in names}
-    own = {page.resolve() for page in (ROOT / "docs").rglob("*.md")}
-    own -= {(ROOT / "docs/index.md").resolve(), (ROOT / "docs/data/README.md").resolve()}
-    assert own == listed
-
-
-def test_the_readme_is_short() -> None:
-    assert len((ROOT / "README.md").read_text().splitlines()) <= README_LINES
 
 
 def test_every_image_is_shown_and_every_figure_is_drawn() -> None:

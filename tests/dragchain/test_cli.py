@@ -5,12 +5,6 @@ import pytest
 from dragchain.cli import main
 
 
-def test_makes_the_tables(tiny_run: Path, capsys) -> None:
-    assert main(["tables", str(tiny_run)]) == 0
-    assert (tiny_run / "tables" / "workpiece_force.parquet").is_file()
-    assert capsys.readouterr().err == ""
-
-
 def test_an_error_is_one_message_and_status_1(tmp_path: Path, capsys) -> None:
     assert main(["tables", str(tmp_path)]) == 1
     error = capsys.readouterr().err

@@ -3,23 +3,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dragchain import SeriesError, TableError, load_case
+from dragchain import SeriesError, load_case
 from dragchain.drag import (
     circumference,
     find_drag_peaks,
     parts,
     peak_separation_s,
-    read_counted,
     to_the_left,
     within_angle,
 )
-
-
-def test_missing_tables_are_named(tmp_path: Path) -> None:
-    with pytest.raises(
-        TableError, match=r"workpiece_force\.parquet is missing: run `dragchain tables"
-    ):
-        read_counted(tmp_path)
 
 
 def test_peaks_of_the_resistance_are_minima_of_the_drag() -> None:

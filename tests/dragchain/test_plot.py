@@ -1,5 +1,4 @@
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,7 +8,7 @@ from matplotlib import pyplot
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from dragchain import FinishedRun, TableError, UnknownNameError, load, plot
+from dragchain import FinishedRun, UnknownNameError, load, plot
 from dragchain.report import run_figures
 
 PLOTS = (
@@ -104,11 +103,3 @@ def test_contact_forces_are_a_density_of_the_frames_in_the_statistics(run: Finis
     assert axes.get_legend().get_texts()[0].get_text() == "particle-floor (mean 0.01 N)"
     with pytest.raises(UnknownNameError, match=r"(?s)'particle-side-'.*mean 'particle-side'"):
         plot.contact_forces(run, kind="particle-side-")
-
-
-def test_a_plot_of_a_missing_table_names_the_command(run: FinishedRun, tmp_path: Path) -> None:
-    for name in ("case.json", "columns.json"):
-        (tmp_path / name).write_bytes((run.folder / name).read_bytes())
-    with pytest.raises(TableError, match="`dragchain chains "):
-        plot.chain_lengths(load(tmp_path).run())
-    assert not pyplot.get_fignums()

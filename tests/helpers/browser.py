@@ -12,9 +12,8 @@ MISSING = [name for name in ("chromium", "chromedriver") if not shutil.which(nam
 _SWITCHES = (
     *("--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--hide-scrollbars"),
     *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
+    "--enable-unsafe-swiftshader",
 )
-WEBGL = ("--enable-unsafe-swiftshader",)
-NO_WEBGL = ("--disable-3d-apis",)
 HUNG_S = 3600.0
 """A browser that has not answered after this time never will, s: nothing else is timed."""
 
@@ -26,18 +25,16 @@ class Browser:
     ----------
     profile : Path
         An empty folder for what the browser stores.
-    switches : tuple of str
-        Beyond those of every test: `WEBGL` or `NO_WEBGL`.
     """
 
-    def __init__(self, profile: Path, switches: tuple[str, ...] = WEBGL) -> None:
+    def __init__(self, profile: Path) -> None:
         from selenium import webdriver
         from selenium.webdriver.chrome.service import Service
 
         options = webdriver.ChromeOptions()
         options.binary_location = shutil.which("chromium")
         own = (f"--user-data-dir={profile}", "--window-size=1366,900")
-        for switch in (*_SWITCHES, *switches, *own):
+        for switch in (*_SWITCHES, *own):
             options.add_argument(switch)
         options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
         service = Service(shutil.which("chromedriver"))
@@ -80,18 +77,11 @@ class Browser:
 
     def click_at(self, selector: str, x: float, y: float) -> None:
         """Click a point of an element, in pixels from its upper left corner."""
-        self.drag(selector, (x, y), (x, y))
-
-    def drag(self, selector: str, start: tuple[float, float], end: tuple[float, float]) -> None:
-        """Drag the mouse over an element, from and to pixels from its upper left corner."""
         from selenium.webdriver import ActionChains
 
-        element, chain = self.find(selector), ActionChains(self.driver)
-        for (x, y), press in ((start, chain.click_and_hold), (end, chain.release)):
-            off = round(x - element.size["width"] / 2), round(y - element.size["height"] / 2)
-            chain.move_to_element_with_offset(element, *off)
-            press()
-        chain.perform()
+        element = self.find(selector)
+        off = round(x - element.size["width"] / 2), round(y - element.size["height"] / 2)
+        ActionChains(self.driver).move_to_element_with_offset(element, *off).click().perform()
 
     def errors(self) -> list[str]:
         """What the page wrote to the console, but for notes of the graphics driver."""

@@ -4,8 +4,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-import pyvista as pv
-from made_run import run_json, write_documents
+from made_run import run_json, stl, write_documents
 from tiny_run_files import WORKPIECE_RADIUS_M, case_json, write_tiny_run
 
 from dragchain import write_tables
@@ -29,12 +28,7 @@ def square_workpiece() -> str:
         upper = ((ax, ay, 0.0), (bx, by, LENGTH_M), (ax, ay, LENGTH_M))
         lower = ((ax, ay, 0.0), (bx, by, 0.0), (bx, by, LENGTH_M))
         facets += [upper, lower]
-    return "solid workpiece\n" + "".join(map(_facet, facets)) + "endsolid workpiece\n"
-
-
-def _facet(corners: Any) -> str:
-    rows = "".join(f"vertex {x:.9g} {y:.9g} {z:.9g}\n" for x, y, z in corners)
-    return f"facet normal 0 0 0\nouter loop\n{rows}endloop\nendfacet\n"
+    return stl(facets)
 
 
 def write_finished_run(folder: Path, **case: Any) -> Path:
@@ -47,14 +41,4 @@ def write_finished_run(folder: Path, **case: Any) -> Path:
     write_tables(folder)
     write_chains(folder)
     write_loading(folder)
-    return folder
-
-
-def analysed_tiny_run(folder: Path) -> Path:
-    """The tiny run with its tables, its chains and a mesh of the workpiece."""
-    write_tiny_run(folder)
-    write_tables(folder)
-    write_chains(folder)
-    workpiece = pv.Cylinder(center=(0, 0, 0.03), direction=(0, 0, 1), radius=0.005, height=0.06)
-    workpiece.triangulate().save(folder / "workpiece.stl")
     return folder

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from made_run import line, made_case, output, phases, touching, write_documents
+from made_run import line, made_case, output, phases, stl, touching, write_documents
 
 STEP_S = 1e-4
 PERIOD = 10
@@ -19,23 +19,8 @@ SURFACE = 0.03
 SIZE = 0.02
 SLIDE, ROLL, HIT, REST = 1, 2, 3, 4
 
-PLATE = """solid plate
-facet normal 1 0 0
-outer loop
-vertex 0 -0.01 0
-vertex 0 0.01 0
-vertex 0 0.01 0.02
-endloop
-endfacet
-facet normal 1 0 0
-outer loop
-vertex 0 -0.01 0
-vertex 0 0.01 0.02
-vertex 0 -0.01 0.02
-endloop
-endfacet
-endsolid plate
-"""
+_LEFT, _RIGHT = (0.0, -0.01, 0.0), (0.0, 0.01, 0.02)
+PLATE = stl([(_LEFT, (0.0, 0.01, 0.0), _RIGHT), (_LEFT, _RIGHT, (0.0, -0.01, 0.02))])
 """A square of 20 mm that looks along +x; its diagonal runs up to the left."""
 
 

@@ -192,3 +192,12 @@ def save(table: pd.DataFrame, folder: Path, name: str) -> None:
     """Write one of a run's tables."""
     (folder / "tables").mkdir(exist_ok=True)
     table.to_parquet(folder / "tables" / f"{name}.parquet", index=False)
+
+
+def stl(facets: Iterable[Iterable[Sequence[float]]]) -> str:
+    """An STL of triangles, given by their corners."""
+    text = "solid plate\n"
+    for corners in facets:
+        rows = "".join(f"vertex {x:.9g} {y:.9g} {z:.9g}\n" for x, y, z in corners)
+        text += f"facet normal 0 0 0\nouter loop\n{rows}endloop\nendfacet\n"
+    return text + "endsolid plate\n"

@@ -9,6 +9,7 @@ from made_run import made_case, run_json, write_documents
 from pages import Page
 
 from dragchain.report.findings import (
+    FIGURES,
     FILE,
     AheadBehind,
     AzimuthProfile,
@@ -31,14 +32,7 @@ from dragchain.statistics.estimate import Estimate, EstimateColumns
 PNG = base64.b64decode(
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="
 )
-PICTURES = [
-    "forces",
-    "force_around_workpiece",
-    "force_depth",
-    "chains_peaks",
-    "network_xy",
-    "network_xz",
-]
+PICTURES = list(FIGURES["process"])
 
 ASKED = {
     "tolerance": 0.05, "quantities": ["drag_mean"], "error": None, "relative_cost": 0.04,

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from made_run import run_json, save, write_documents
+from made_run import particles_kept, run_json, save, write_documents
 from report_files import case_json
 
 from dragchain.tradeoff.compare import read_plan_runs
@@ -117,15 +117,7 @@ def write_drop(folder: Path, fraction: float, ratios: Sequence[float], cpu_time_
 REFERENCE, SOFT, COARSE, FAST = (1.0, 0.2, 1.0), (0.01, 0.2, 1.0), (1.0, 0.5, 1.0), (1.0, 0.2, 5.0)
 BOTH = (0.01, 0.5, 1.0)
 SOFTNESS = {"drag_mean": 1.1, "lateral_mean": 0.2, "contact_force_mean": 0.7}
-FAILURE = [
-    {
-        "code": "particles_kept",
-        "passed": False,
-        "name": "no particle lost",
-        "seen": "12 particles",
-        "limit": "1422",
-    }
-]
+FAILURE = [particles_kept(12)]
 
 
 def contents(**changes: Any) -> list[dict[str, Any]]:

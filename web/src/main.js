@@ -96,12 +96,42 @@ class Page {
     const { cylinders, halos } = this.contacts;
     this.view.scene.add(outline(head), this.workpiece.group, this.workpiece.arrow);
     this.view.scene.add(this.media.spheres.mesh, cylinders.mesh, halos.mesh, this.marks.group);
-    this.view.after = () => showScale(byId("scale-bar"), byId("scale-length"), this.view.millimetresPerPixel);
+    this.view.after = () => {
+      showScale(byId("scale-bar"), byId("scale-length"), this.view.millimetresPerPixel);
+      this.share?.();
+    };
     this.view.resize();
     this.preset("overview");
     this.player = new Player(this);
     this.startControls();
     this.startChoosing();
+    if (parent !== window) this.link();
+  }
+
+  /** Share camera and time with the pages beside this one, by way of the page around them all. */
+  link() {
+    const { view, frames } = this,
+      { camera, controls } = view;
+    const told = () => ({
+      dragdeck: true,
+      place: camera.position.toArray(),
+      target: controls.target.toArray(),
+      zoom: camera.zoom,
+      time: this.number / Math.max(frames.count - 1, 1),
+    });
+    let last = JSON.stringify(told());
+    this.share = () => {
+      const now = JSON.stringify(told());
+      if (now !== last) parent.postMessage(told(), "*");
+      last = now;
+    };
+    addEventListener("message", ({ data, source }) => {
+      if (source !== parent || data?.dragdeck !== true) return;
+      Object.assign(view, { follows: null, framed: null });
+      this.go(Math.round(data.time * (frames.count - 1)));
+      view.look(new Vector3(...data.target), new Vector3(...data.place).sub(new Vector3(...data.target)), data.zoom);
+      last = JSON.stringify(told());
+    });
   }
 
   /** What is to be seen: the bowl, or the surroundings of the workpiece in a wide one. */

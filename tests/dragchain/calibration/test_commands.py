@@ -44,31 +44,7 @@ def test_a_refusal_names_the_reason_and_leaves_no_file(
 def test_a_missing_sweep_is_told_with_what_makes_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    words = [
-        "step",
-        "calibrate",
-        str(EXAMPLE),
-        "--drops",
-        str(tmp_path / "drops.json"),
-        "--out",
-        "x",
-    ]
+    drops = str(tmp_path / "drops.json")
+    words = ["step", "calibrate", str(EXAMPLE), "--drops", drops, "--out", "x"]
     assert main(words) == 1
     assert "snakemake calibrate" in capsys.readouterr().err
-
-
-def test_a_list_of_drops_names_what_it_lacks(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    drop = {"folder": "x", "purpose": "sweep", "restitution": 0.7, "limit_force": True}
-    drop |= {"height_m": 0.01, "youngs_modulus_scale": 1.0}
-    drop |= {"timestep_s": 1e-7, "timestep_fraction": 0.01}
-    study = {"study": "a", "title": "b", "pair": "c-d", "fidelity": "e", "record": "f.csv"}
-    study |= {"height_m": 0.01, "height_std_m": 1e-4, "peaks": "auto", "gravity_m_s2": 9.81}
-    study |= {"limit_force": True, "restitution_now": 0.7, "fall_time_s": 0.045}
-    listed = tmp_path / "drops.json"
-    listed.write_text(json.dumps({"schema": 2, **study, "contact_time_s": 2e-5, "drops": [drop]}))
-    words = ["step", "calibrate", str(EXAMPLE), "--drops", str(listed), "--out", str(tmp_path)]
-    assert main(words) == 1
-    assert "drops[0].purpose: Input should be 'production'" in capsys.readouterr().err
-    assert not (tmp_path / "result.json").exists()

@@ -164,16 +164,6 @@ def test_columns_say_their_unit(header: str, time_unit: float, force_unit: float
     assert force == pytest.approx(2 * np.arange(3) * force_unit)
 
 
-def test_a_file_is_read(tmp_path: Path) -> None:
-    time, force = samples(50e3)
-    file = tmp_path / "record.csv"
-    rows = [f"{t:.7f},{f:.3f}" for t, f in zip(time, force, strict=True)]
-    file.write_text("\n".join(["time_s,force_n", *rows]))
-    record = read_record(file)
-    assert record.interval_s == pytest.approx(2e-5, rel=1e-6)
-    assert record.force_n == pytest.approx(force, abs=5.1e-4)
-
-
 @pytest.mark.parametrize(
     ("text", "reason"),
     [

@@ -1,17 +1,21 @@
 import math
+from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from networks import R, make_frame, row
+from networks import R, make_frame, random_frame, row
+from scipy.sparse.csgraph import csgraph_from_dense, dijkstra
 
 from dragchain.network.chains import (
     dominant_path,
     major_stress,
     particle_stress,
     peters_rows,
+    split_chains,
     widest_paths,
 )
 from dragchain.network.frame import FLOOR, SIDE, WORKPIECE, NetworkFrame
@@ -65,50 +69,6 @@ def test_the_stronger_of_two_chains_is_dominant() -> None:
     assert paths["dominant"].tolist() == [False, True]
 
 
-def test_a_detour_with_the_stronger_bottleneck_wins() -> None:
-    centres = row(3) | {4: (R, 2 * R, 0.03), 5: (3 * R, 2 * R, 0.03)} | WEAK
-    contacts = [(1, WORKPIECE, 9.0), (1, 3, 2.0), (3, SIDE, 9.0)]
-    contacts += [(1, 4, 5.0), (4, 5, 6.0), (5, 3, 4.0), *WEAK_CONTACTS]
-    path = paths_of(make_frame(centres, contacts)).iloc[0]
-    assert path["particle_ids"] == [1, 4, 5, 3]
-    assert path["bottleneck_n"] == 4.0
-
-
-def test_equal_bottlenecks_go_by_fewer_links_then_by_force() -> None:
-    centres = row(3) | {4: (R, 2 * R, 0.03), 5: (R, -2 * R, 0.03), 6: (R, 4 * R, 0.03)} | WEAK
-    contacts = [(1, WORKPIECE, 9.0), (3, SIDE, 2.0)]
-    contacts += [(1, 2, 3.0), (2, 3, 3.0)]
-    contacts += [(1, 4, 8.0), (4, 3, 8.0)]
-    contacts += [(1, 5, 9.0), (5, 6, 9.0), (6, 3, 9.0), *WEAK_CONTACTS]
-    path = paths_of(make_frame(centres, contacts)).iloc[0]
-    assert path["particle_ids"] == [1, 4, 3]
-
-
-def test_a_weak_start_takes_the_short_way_at_its_own_bottleneck() -> None:
-    # width alone would send the path round over the stronger contacts of the upper way
-    centres = row(2) | {3: (R, 2 * R, 0.03), 4: (3 * R, 2 * R, 0.03)} | WEAK
-    contacts = [
-        (1, WORKPIECE, 2.0),
-        (1, 2, 3.0),
-        (1, 3, 9.0),
-        (3, 4, 9.0),
-        (4, 2, 9.0),
-        (2, SIDE, 9.0),
-    ]
-    path = paths_of(make_frame(centres, contacts + WEAK_CONTACTS)).iloc[0]
-    assert path["particle_ids"] == [1, 2]
-    assert path["bottleneck_n"] == 2.0
-
-
-def test_two_workpiece_contacts_share_a_trunk() -> None:
-    centres = row(4) | {11: (2 * R, 2 * R, 0.03)} | WEAK
-    contacts = [(1, WORKPIECE, 7.0), (11, WORKPIECE, 5.0), (1, 2, 6.0), (11, 2, 4.0)]
-    contacts += [(2, 3, 9.0), (3, 4, 9.0), (4, SIDE, 9.0), *WEAK_CONTACTS]
-    paths = paths_of(make_frame(centres, contacts))
-    assert paths["particle_ids"].tolist() == [[1, 2, 3, 4], [11, 2, 3, 4]]
-    assert paths["bottleneck_n"].tolist() == [6.0, 4.0]
-
-
 def test_a_cut_path_does_not_reach_the_bowl() -> None:
     contacts = [(1, WORKPIECE, 4.0), (1, 2, 3.0), (2, 3, 0.0005), (3, SIDE, 6.0), *WEAK_CONTACTS]
     paths = paths_of(make_frame(row(3) | WEAK, contacts))
@@ -116,13 +76,6 @@ def test_a_cut_path_does_not_reach_the_bowl() -> None:
     assert not paths["reaches_bowl"][0] and not paths["dominant"][0]
     assert paths["end_kind"][0] == "none"
     assert math.isnan(paths["bottleneck_n"][0]) and math.isnan(paths["azimuth_rad"][0])
-
-
-def test_a_weak_workpiece_contact_starts_no_path() -> None:
-    contacts = [(1, WORKPIECE, 0.1), (1, 2, 3.0), (2, 3, 3.0), (3, SIDE, 3.0)]
-    frame = make_frame(row(3), contacts)
-    assert widest_paths(frame) == []
-    assert len(widest_paths(frame, threshold=0.01)) == 1
 
 
 def test_an_empty_frame_has_no_chain_but_keeps_its_columns() -> None:
@@ -180,13 +133,6 @@ def test_a_bend_beyond_twice_alpha_breaks_a_chain(bend_deg: float, chained: bool
     assert bool(chain_ids(squeezed_row(math.radians(bend_deg)))) is chained
 
 
-def test_two_particles_are_no_chain() -> None:
-    frame = make_frame(
-        row(2) | WEAK, [(1, WORKPIECE, 5.0), (1, 2, 5.0), (2, SIDE, 5.0), *WEAK_CONTACTS]
-    )
-    assert chain_ids(frame) == []
-
-
 def test_a_branch_keeps_the_stronger_link() -> None:
     centres = row(3) | {4: (2 * R + 2 * R * math.cos(0.7), 2 * R * math.sin(0.7), 0.03)} | WEAK
     contacts = [(1, WORKPIECE, 9.0), (1, 2, 9.0), (2, 3, 7.0), (3, SIDE, 7.0), (2, 4, 4.0)]
@@ -214,42 +160,99 @@ def test_a_chain_is_listed_from_its_higher_end() -> None:
     assert chain_ids(frame) == [[3, 2, 1]]
 
 
-def packing(
-    seed: int,
-) -> tuple[dict[int, tuple[float, float, float]], list[tuple[int, int, float]]]:
-    """Return a small jittered lattice of particles with random forces between near neighbours."""
-    random = np.random.default_rng(seed)
-    grid = np.stack(np.meshgrid(*[np.arange(4)] * 3), axis=-1).reshape(-1, 3) * 2 * R
-    grid = grid + random.uniform(-0.3 * R, 0.3 * R, grid.shape) + 0.01
-    centres = {k + 1: tuple(centre) for k, centre in enumerate(grid.tolist())}
-    gaps = np.linalg.norm(grid[:, None] - grid[None], axis=-1)
-    near = [(i, j) for i, j in np.argwhere(gaps < 2.3 * R).tolist() if i < j]
-    contacts = [(i + 1, j + 1, float(random.exponential())) for i, j in near]
-    order = np.argsort(grid[:, 0])
-    contacts += [(int(k) + 1, WORKPIECE, float(random.exponential())) for k in order[:12]]
-    contacts += [(int(k) + 1, SIDE, float(random.exponential())) for k in order[-12:]]
-    return centres, contacts
+# --- random networks -------------------------------------------------------------------------
+
+frames = st.builds(
+    random_frame,
+    st.integers(0, 2**32 - 1),
+    edge=st.integers(2, 6),
+    levels=st.sampled_from([None, 1, 2, 5]),
+)
 
 
-@given(seed=st.integers(0, 2**32 - 1))
-@settings(max_examples=40)
-def test_numbering_and_order_change_nothing(seed: int) -> None:
-    centres, contacts = packing(seed)
-    random = np.random.default_rng(seed + 1)
-    new = dict(zip(centres, (1 + random.permutation(len(centres))).tolist(), strict=True))
-    shuffled = [
-        (new[b], new[a], force)
-        if b > 0 and random.random() < 0.5
-        else (new[a], new.get(b, b), force)
-        for a, b, force in contacts
-    ]
-    random.shuffle(shuffled)
-    plain = chain_table(make_frame(centres, contacts))
-    mixed = chain_table(make_frame({new[k]: c for k, c in centres.items()}, shuffled))
+def joined(frame: NetworkFrame, contact: int) -> set[int]:
+    return {int(frame.a[contact]), int(frame.b[contact])}
+
+
+@given(frames, st.sampled_from([0.3, 1.0, 2.0]), st.booleans())
+@settings(max_examples=30)
+def test_a_path_is_the_shortest_of_the_widest(
+    frame: NetworkFrame, threshold: float, with_workpiece: bool
+) -> None:
+    """Against the search of scipy, where a link is shorter the stronger it is."""
+    force, bowl, long = frame.normal_force, frame.particle_id.size, 1e6
+    strong = force > threshold * frame.mean_force_n(with_workpiece=with_workpiece)
+
+    def distance(start: int, least: float) -> float:
+        used = np.flatnonzero(strong & (frame.other != WORKPIECE) & (force >= least))
+        lengths = np.full((bowl + 1, bowl + 1), np.inf)
+        ends = frame.a[used], np.where(frame.b[used] >= 0, frame.b[used], bowl)
+        np.minimum.at(lengths, ends, long - force[used])
+        graph = csgraph_from_dense(np.minimum(lengths, lengths.T), null_value=np.inf)
+        return float(dijkstra(graph, indices=start)[bowl])
+
+    paths = widest_paths(frame, threshold, with_workpiece=with_workpiece)
+    pushed = strong if with_workpiece else force > 0.0
+    assert len(paths) == (pushed & (frame.other == WORKPIECE)).sum()
+    for path in paths:
+        (first, *links), start = path.contacts, path.particles[0]
+        assert (frame.other[first], frame.a[first]) == (WORKPIECE, start)
+        if path.end is None:
+            assert not links and distance(start, 0.0) == np.inf
+            continue
+        weakest = force[links].min()
+        least = min(weakest, force[first]) if with_workpiece else weakest
+        assert distance(start, least) == pytest.approx((long - force[links]).sum(), rel=1e-12)
+        if weakest < force[first] or not with_workpiece:
+            assert distance(start, np.nextafter(least, np.inf)) == np.inf
+        for pair, link in zip(pairwise(path.particles), links[:-1], strict=True):
+            assert set(pair) == joined(frame, link)
+        assert frame.a[links[-1]] == path.particles[-1] and frame.other[links[-1]] == path.end
+
+
+@given(frames, st.sampled_from([30.0, 45.0, 60.0]), st.sampled_from([0.3, 1.0, 2.0]))
+@settings(max_examples=30)
+def test_peters_chains_go_along_the_axes_of_stressed_particles(
+    frame: NetworkFrame, angle_deg: float, factor: float
+) -> None:
+    tensor = particle_stress(frame)
+    np.testing.assert_allclose(tensor, tensor.transpose(0, 2, 1))
+    stress, axis = major_stress(tensor)
+    chains = peters_rows(frame, math.radians(angle_deg), factor)
+    assert len(set(chains.particles.tolist())) == len(chains.particles)
+    assert (stress[chains.particles] > factor * stress.mean()).all()
+    links = split_chains(chains.contacts, chains.contact_starts)
+    for particles, contacts in zip(chains.particle_lists(), links, strict=True):
+        assert len(particles) >= 3
+        for pair, contact in zip(pairwise(particles), contacts, strict=True):
+            assert set(pair) == joined(frame, contact)
+            line = np.subtract(*frame.centre[list(pair)])
+            cosines = axis[list(pair)] @ line / np.linalg.norm(line)
+            assert (np.abs(cosines) > math.cos(math.radians(angle_deg)) - 1e-9).all()
+
+
+@given(st.builds(random_frame, st.integers(0, 2**32 - 1), edge=st.integers(2, 5)))
+@settings(max_examples=20)
+def test_numbering_and_order_change_nothing(frame: NetworkFrame) -> None:
+    random = np.random.default_rng(frame.step)
+    place = random.permutation(frame.particle_id.size)
+    order = random.permutation(frame.a.size)
+    swap = frame.between_particles() & (random.random(frame.a.size) < 0.5)
+    mixed = replace(
+        frame,
+        centre=frame.centre[np.argsort(place)],
+        a=place[np.where(swap, frame.b, frame.a)][order],
+        b=np.where(frame.b >= 0, place[np.where(swap, frame.a, frame.b)], -1)[order],
+        other=frame.other[order],
+        point=frame.point[order],
+        force=np.where(swap[:, None], -frame.force, frame.force)[order],
+        normal_force=frame.normal_force[order],
+    )
+    plain, other = chain_table(frame), chain_table(mixed)
     plain["particle_ids"] = plain["particle_ids"].map(
-        lambda particles: [new[particle] for particle in particles]
+        lambda ids: [int(place[one - 1]) + 1 for one in ids]
     )
     keys = ["definition", "mean_force_n", "altitude_m"]
     pd.testing.assert_frame_equal(
-        plain.sort_values(keys, ignore_index=True), mixed.sort_values(keys, ignore_index=True)
+        plain.sort_values(keys, ignore_index=True), other.sort_values(keys, ignore_index=True)
     )

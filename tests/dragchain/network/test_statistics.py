@@ -3,12 +3,12 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-import pyarrow.parquet as pq
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from networks import RADIUS_M, random_frame, real_frame
-from plain_chains import plain_clusters
+from networks import random_frame, real_frame
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from dragchain.errors import TableError
 from dragchain.network.chains import dominant_path, widest_paths
@@ -32,7 +32,6 @@ from dragchain.network.statistics import (
     mechanical_coordination_number,
 )
 from dragchain.network.write import write_chains
-from dragchain.tables.parquet import table_writer
 
 CONTACT_COLUMNS = [
     "step", "time_s", "kind", "a_id", "b_id", "point_x_m", "point_y_m", "point_z_m",
@@ -63,13 +62,6 @@ def a_frame(rows: list[tuple[int, int, float]], ids: list[int]) -> NetworkFrame:
 # particle 7 touches four particles and the workpiece, the others fewer; particle 9 touches nothing
 STAR = [(7, 1, 4.0), (2, 7, 3.0), (7, 3, 2.0), (7, 4, 1.0), (7, 0, 5.0), (1, -1, 2.0), (4, -2, 4.0)]
 STAR_IDS = [9, 7, 1, 2, 3, 4]
-
-
-def test_counts_of_a_star() -> None:
-    frame = a_frame(STAR, STAR_IDS)
-    assert dict(zip(frame.particle_id.tolist(), contact_counts(frame).tolist(), strict=True)) == {
-        1: 2, 2: 1, 3: 1, 4: 2, 7: 5, 9: 0,
-    }  # fmt: skip
 
 
 def test_statistics_of_a_star() -> None:
@@ -158,51 +150,9 @@ def test_a_frame_has_the_heading_of_its_step(run_dir: Path) -> None:
         assert math.cos(frame.direction_rad - expected) == pytest.approx(1.0)
 
 
-def grouped(run_dir: Path, rows: int) -> None:
-    """Write contacts and particles again in row groups of few rows."""
-    for name in ("contacts", "particles"):
-        file = run_dir / "tables" / f"{name}.parquet"
-        pd.read_parquet(file).to_parquet(file, row_group_size=rows)
-
-
-def test_row_groups_are_read_when_their_frames_are_due(run_dir: Path, monkeypatch) -> None:
-    read: list[int] = []
-    plain = pq.ParquetFile.read_row_group
-
-    def noted(file, number, **options):
-        read.append(number)
-        return plain(file, number, **options)
-
-    monkeypatch.setattr(pq.ParquetFile, "read_row_group", noted)
-    grouped(run_dir, 2)
-    frames = network_frames(run_dir, (10, 30))
-    next(frames)
-    # rows 7 to 13 of contacts and 6 to 11 of particles are step 10, and a row beyond shows their
-    # ends
-    assert sorted(set(read)) == [3, 4, 5, 6, 7]
-    list(frames)
-    assert len(read) == 8 + 7
-    assert sorted(set(read)) == [3, 4, 5, 6, 7, 8, 9, 10]
-
-
 def test_a_particle_with_two_rows_is_refused() -> None:
     with pytest.raises(TableError, match="particle 2 twice in step 1"):
         a_frame([(1, 2, 1.0)], [2, 1, 3, 2])
-
-
-def test_a_table_in_parts_is_the_whole_table(tmp_path: Path) -> None:
-    parts = [contact_rows(step, STAR[:step]) for step in (1, 2, 4, 1)]
-    parts.insert(2, parts[0].iloc[:0])
-    with table_writer(tmp_path / "t.parquet", group_rows=3) as table:
-        for part in parts:
-            table.write(part)
-            assert not (tmp_path / "t.parquet").exists()
-    whole = pd.concat(parts, ignore_index=True)
-    pd.testing.assert_frame_equal(pd.read_parquet(tmp_path / "t.parquet"), whole)
-    assert pq.ParquetFile(tmp_path / "t.parquet").num_row_groups == 3
-    whole.to_parquet(tmp_path / "w.parquet", index=False)
-    schemas = [pq.read_schema(tmp_path / f"{name}.parquet") for name in "tw"]
-    assert schemas[0].equals(schemas[1], check_metadata=True)
 
 
 def test_write_chains_writes_counted_frames_only(run_dir: Path) -> None:
@@ -234,26 +184,9 @@ def test_a_stretch_without_frames_is_refused(run_dir: Path) -> None:
         write_chains(run_dir)
 
 
-def frame_with(
-    rows: list[tuple[int, int, float]],
-    particles: int,
-    at: dict[int, tuple[float, float]] | None = None,
-) -> NetworkFrame:
-    """A frame of (particle, other, normal force) rows; `at` gives x, y of a particle's contact
-    points."""
-    places = at or {}
-    points = [places.get(a, (0.01, 0.0)) for a, _, _ in rows]
-    contacts = {
-        "a_id": np.array([a for a, _, _ in rows], dtype=np.int64),
-        "b_id": np.array([b for _, b, _ in rows], dtype=np.int64),
-        "point_x_m": np.array([x for x, _ in points]),
-        "point_y_m": np.array([y for _, y in points]),
-        "normal_force_n": np.array([force for _, _, force in rows], dtype=np.float64),
-    }
-    for name in ("point_z_m", "force_x_n", "force_y_n", "force_z_n"):
-        contacts[name] = np.zeros(len(rows))
-    table = {name: np.full(particles, RADIUS_M) for name in ("x_m", "y_m", "z_m", "radius_m")}
-    return frame_of(contacts, table | {"particle_id": np.arange(1, particles + 1)}, 1, 0.1, 0.0)
+def frame_with(rows: list[tuple[int, int, float]], particles: int) -> NetworkFrame:
+    """A frame of (particle, other, normal force) rows."""
+    return a_frame(rows, list(range(1, particles + 1)))
 
 
 # 1-2-3-4 with falling force, 5-6, and 7 alone
@@ -272,35 +205,33 @@ def test_sizes_by_hand() -> None:
     assert found.second_moment().tolist() == [4 / 7, 4 / 7, 0.0, 0.0, 0.0]
 
 
-def test_the_weakest_contact_between_workpiece_and_bowl_is_where_they_part() -> None:
-    rows = [(1, WORKPIECE, 8.0), *CHAIN[:3], (4, FLOOR, 7.0)]
-    found = find_clusters(frame_with(rows, 7), np.array([2.9, 3.0]))
-    assert found.percolation_n == {"workpiece_to_bowl": 3.0, "side_to_side": 0.0}
-    assert found.spans("workpiece_to_bowl").tolist() == [True, False]
-
-
-def test_one_particle_on_workpiece_and_bowl_spans() -> None:
-    found = find_clusters(frame_with([(1, WORKPIECE, 2.0), (1, SIDE, 4.0)], 2), np.array([1.0]))
-    assert found.percolation_n["workpiece_to_bowl"] == 2.0
-    assert found.clusters.tolist() == [0]
-
-
-@pytest.mark.parametrize(
-    ("last", "force"),
-    [((-0.01, 0.001), 3.0), ((0.0, 0.01), 0.0), ((0.0, -0.01), 0.0), ((0.01, -0.002), 0.0)],
-)
-def test_side_to_side_is_between_opposite_quarters(last, force) -> None:
-    rows = [(1, SIDE, 8.0), *CHAIN[:3], (8, SIDE, 7.0), (4, 8, 9.0)]
-    found = find_clusters(frame_with(rows, 8, {8: last}), np.array([1.0]))
-    assert found.percolation_n["side_to_side"] == force
-
-
 def test_a_frame_without_contacts_has_no_cluster() -> None:
     frame = frame_with([], 3)
     rows = cluster_rows(frame, frame_clusters(frame))
     assert rows["clusters"].tolist() == [0] * len(FORCE_FACTORS)
     assert not rows["workpiece_to_bowl"].any()
     assert math.isnan(rows["mean_cluster_size"][0])
+
+
+def flooded(frame: NetworkFrame, least: float) -> tuple[np.ndarray, set[str]]:
+    """Sizes of the clusters above a force, and the ways in which one spans."""
+    strong = frame.normal_force > max(least, 0.0)
+    inner, size = strong & frame.between_particles(), frame.particle_id.size
+    graph = coo_array((np.ones(inner.sum()), (frame.a[inner], frame.b[inner])), (size, size))
+    _, cluster = connected_components(graph, directed=False)
+    x, y = frame.point[:, :2].T
+    on_side, east_west = frame.other == SIDE, np.abs(x) > np.abs(y)
+    workpiece, bowl, east, west, north, south = (
+        set(cluster[frame.a[strong & where]].tolist())
+        for where in (
+            frame.other == WORKPIECE, frame.other < WORKPIECE,
+            on_side & east_west & (x > 0), on_side & east_west & (x < 0),
+            on_side & ~east_west & (y > 0), on_side & ~east_west & (y < 0),
+        )
+    )  # fmt: skip
+    found = {"workpiece_to_bowl": workpiece & bowl, "side_to_side": (east & west) | (north & south)}
+    sizes = np.bincount(cluster)
+    return sizes[sizes > 1], {name for name, spanning in found.items() if spanning}
 
 
 @given(
@@ -313,10 +244,10 @@ def test_clusters_are_those_of_a_flood(seed: int, edge: int, levels: int | None)
     frame = random_frame(seed, edge=edge, levels=levels)
     found = frame_clusters(frame)
     for at, least in enumerate(found.force_n):
-        sizes, spans = plain_clusters(frame, float(least))
-        assert found.clusters[at] == sum(sizes.values())
-        assert found.clustered_particles[at] == sum(size * count for size, count in sizes.items())
-        assert found.squares[at] == sum(size**2 * count for size, count in sizes.items())
+        sizes, spans = flooded(frame, float(least))
+        assert found.clusters[at] == len(sizes)
+        assert found.clustered_particles[at] == sizes.sum()
+        assert found.squares[at] == (sizes**2).sum()
         assert found.largest_cluster[at] == max(sizes, default=0)
         assert {name for name in SPANS if found.spans(name)[at]} == spans
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from browser import MISSING, NO_WEBGL, Browser
+from browser import MISSING, Browser
 from made_run import line
 from network_run_files import PEAK_N, PEAKS_S, accept, write_network_run
 from selenium.webdriver import Keys
@@ -61,10 +61,6 @@ def step_at(page: Browser) -> int:
     return int(page.run("return networkPage.head.steps[networkPage.number]"))
 
 
-def frame_at(page: Browser) -> int:
-    return int(page.run("return networkPage.number"))
-
-
 def chosen(page: Browser) -> dict[str, float]:
     """The table of what was chosen, the first number of each row."""
     lines = page.run("""return [...document.querySelectorAll("#chosen tr")]
@@ -111,34 +107,6 @@ def test_a_peak_shows_its_force_and_the_strongest_chain(
     )
     assert said.endswith(f"to {path['end_kind']}.")
     assert page.run("return networkPage.contacts.halos.count") == path["n_particles"] + 1
-
-
-def test_it_plays_pauses_and_ends(page: Browser) -> None:
-    speed = "networkPage.player.speed = arguments[0]"
-    page.run(f"networkPage.show(0); {speed}", 0.02)  # so slow that no machine comes to the end
-    page.click("#play")
-    page.wait(lambda: frame_at(page) > 0, "the second frame")
-    page.click("#play")
-    assert page.text("#play") == "Play"
-    paused = frame_at(page)
-    turn = "new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"
-    page.run(f"{speed}; return {turn}", 1e6)  # it would be at the end now
-    assert frame_at(page) == paused
-    page.click("#play")
-    page.wait(lambda: page.text("#play") == "Play", "the end")
-    assert page.run("return networkPage.frames.count") == frame_at(page) + 1
-    page.click("#previous")
-    assert page.run("return networkPage.frames.count") == frame_at(page) + 2
-
-
-def test_the_slider_moves_the_cursor(page: Browser) -> None:
-    place = "return document.querySelector('#curve .cursor').offsetLeft"
-    page.find("#time").send_keys(Keys.HOME)
-    first = page.run(place)
-    page.find("#time").send_keys(Keys.END)
-    assert page.run(place) > first + 100
-    time_s = page.run("return networkPage.frames.times.at(-1)")
-    assert numbers(page.text("#now"))[0] == pytest.approx(time_s, abs=5e-4)
 
 
 # --- contacts and particles ----------------------------------------------------------------------
@@ -210,53 +178,3 @@ def test_contacts_are_shown_by_force_class_and_chain(page: Browser, run: Path) -
     assert drawn() == (b_id.size, 0, expected)
     page.click("#class-0")
     assert drawn() == (sum(expected[1:]), 0, [0, *expected[1:]])
-    page.run("networkPage.setThreshold(1e6)")
-    page.click("#path")
-    assert drawn()[:2] == (path, path)
-    assert "N, or on the dominant path." in page.text("#status")
-
-
-def test_a_section_plane_hides_what_is_beyond_it(page: Browser, run: Path) -> None:
-    choose(page, "section-axis", "y")
-    at = page.run("""const slider = document.getElementById("section-at");
-        slider.value = 0.4 * slider.min + 0.6 * slider.max;
-        slider.dispatchEvent(new Event("input", {bubbles: true}));
-        return Number(slider.value)""")
-    assert numbers(page.text("#section-shown")) == [pytest.approx(at, abs=0.06)]
-    particles, contacts = (rows(run, name, step_at(page)) for name in ("particles", "contacts"))
-    beyond = 1e3 * particles["y_m"] > at
-    for _ in range(2):
-        larger = page.find("#section-side").is_selected()
-        kept = set(particles["particle_id"][beyond == larger])
-        ids = page.run("const {media: {spheres}, frames, number} = networkPage;"
-                       "return spheres.rows.map(row => frames.at(number).id[row])")  # fmt: skip
-        assert set(ids) == kept
-        other = contacts["b_id"].isin(kept) | (contacts["b_id"] <= 0)
-        inside = (contacts["a_id"].isin(kept) & other).sum()
-        assert page.text("#status").startswith(f"{inside} of {len(contacts)} contacts shown")
-        page.click("#section-side")
-
-
-# --- without a scene -----------------------------------------------------------------------------
-
-
-def test_without_webgl_the_curve_works(run: Path, tmp_path: Path) -> None:
-    page = Browser(tmp_path / "profile", NO_WEBGL)
-    try:
-        page.open(run / "network.html")
-        assert "WebGL" in page.text("#problem")
-        assert not page.find("#canvas").is_displayed()
-        page.click("#peaks li:first-child button")
-        assert page.run("return document.querySelector('#curve .cursor').offsetLeft") > 100
-    finally:
-        page.close()
-
-
-def test_data_that_are_damaged_are_told(window: Browser, run: Path, tmp_path: Path) -> None:
-    text = (run / "network.html").read_text(encoding="utf-8")
-    at = text.index('id="data">') + 2000
-    broken = tmp_path / "broken.html"
-    broken.write_text(text[:at] + text[at + 400 :], encoding="utf-8")
-    window.open(broken)
-    assert "could not be shown" in window.text("#problem")
-    window.errors()

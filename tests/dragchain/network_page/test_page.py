@@ -30,7 +30,6 @@ from dragchain.network_page.scene import (
     ROUNDING,
     PackedColumns,
 )
-from dragchain.report.page import TIMES
 
 _BYTES = {"u8": 1, "u16": 2, "u32": 4, "f24": 3}
 
@@ -277,22 +276,6 @@ def with_fidelity(folder: Path, **changes: Any) -> Written:
     return Written(run / "network.html")
 
 
-@pytest.mark.parametrize(
-    ("scale", "factor", "short"),
-    [(1.0, 1.0, None), (0.001, 2.5, "Young&#39;s modulus x 0.001, speed x 2.5")],
-)  # fmt: skip
-def test_the_settings_of_the_run_are_named(
-    tmp_path: Path, scale: float, factor: float, short: str | None
-) -> None:
-    page = with_fidelity(tmp_path / "run", youngs_modulus_scale=scale, speed_factor=factor)
-    shell = page.text[: page.text.index("<script")].replace(TIMES, "x")
-    assert f"E x {scale:g}, time step 0.5 of the Rayleigh time, speed x {factor:g}" in shell
-    assert ('id="settings"' in shell) == (short is not None)
-    assert (f"<p>{short} <span" in shell) == (short is not None)
-    assert ("more and smaller contact forces" in shell) == (scale != 1)
-    assert ("fewer and larger contact forces" in shell) == (factor != 1)
-
-
 def test_times_and_speeds_of_a_faster_run_are_those_of_the_process(
     page: Written, tmp_path: Path
 ) -> None:
@@ -306,14 +289,6 @@ def test_times_and_speeds_of_a_faster_run_are_those_of_the_process(
     speeds = 4 * fast.columns["speed"], page.columns["speed"]
     np.testing.assert_allclose(*speeds, rtol=3 * ROUNDING)
     np.testing.assert_array_equal(fast.columns["normal"], page.columns["normal"])
-
-
-def test_a_page_without_loads(tmp_path: Path) -> None:
-    run = write_network_run(tmp_path / "run")
-    (run / "tables/facets.parquet").unlink()
-    write_page(run)
-    page = Written(run / "network.html")
-    assert page.head["workpieces"][0]["loads"] == []
 
 
 def test_a_run_without_a_network_has_no_page(tmp_path: Path, capsys: Any) -> None:

@@ -37,12 +37,6 @@ def test_headings_go_and_panels_get_letters(width: float) -> None:
     assert [axes.texts[0].get_text() for axes in figure.axes] == ["(a)", "(b)"]
 
 
-def test_a_single_panel_has_no_letter() -> None:
-    figure, (axes,) = new_panels(3.0)
-    as_printed(figure, COLUMN_MM)
-    assert not axes.texts
-
-
 def test_pictures_in_a_figure_keep_their_own_pixels() -> None:
     pixels = np.random.default_rng(1).integers(0, 256, (120, 100, 3), dtype=np.uint8)
     figure, (axes,) = new_panels(3.0)

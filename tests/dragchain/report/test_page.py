@@ -1,43 +1,20 @@
 """The frame, the style and the pieces that all pages share."""
 
-import base64
-import io
-from pathlib import Path
-
 import jinja2
-import numpy as np
 import pytest
 from pages import stands_alone
-from PIL import Image
 
-import dragchain
-import evidence
 from dragchain.report.page import (
     DASH,
-    LARGE_PICTURE,
     MINUS,
     data_uri,
-    file_uri,
-    fraction,
     measured,
     number,
     page_environment,
     with_interval,
 )
 from dragchain.statistics.estimate import Estimate
-from dragchain.tradeoff.report import FILTERS
 
-FOLDERS = [Path(package.__path__[0]) for package in (dragchain, evidence)]
-TEMPLATES = {
-    file.relative_to(folder).as_posix(): file
-    for folder in FOLDERS
-    for file in sorted(folder.rglob("*.html.j2"))
-}
-PAGES = [
-    "calibration/calibration.html.j2", "report/report.html.j2", "stability/stability.html.j2",
-    "tradeoff/tradeoff.html.j2",
-    "validation/validation.html.j2", "verification/verification.html.j2",
-]  # fmt: skip
 PAGE = """{% extends "report/page.html.j2" %}
 {% from "report/macros.html.j2" import box, estimate, figure, section, table, verdict %}
 {% block title %}Drag & drop{% endblock %}
@@ -73,13 +50,6 @@ def test_a_page_is_whole_and_needs_nothing_else() -> None:
     assert len(read.images) == 1
 
 
-def test_the_head_of_a_page_points_to_its_sections() -> None:
-    read = stands_alone(page())
-    links = [link for link in read.references if link.startswith("#")]
-    assert links == ["#force-on-the-workpiece", "#run-1"]
-    assert read.words.count("Force on the workpiece") == 2
-
-
 def test_a_listing_writes_each_column_in_its_form() -> None:
     drag = {"value": 1.5, "ci95_low": 1.0, "ci95_high": 2.0}
     rows = [("a & b", {"mean": 0.25, "said": "confirmed", **drag}), ("a & b", {"mean": None})]
@@ -98,42 +68,6 @@ def test_a_listing_writes_each_column_in_its_form() -> None:
 def test_what_is_not_given_is_an_error() -> None:
     with pytest.raises(jinja2.UndefinedError, match="nothing"):
         page(PAGE.replace("{{ count }}", "{{ nothing }}"))
-
-
-@pytest.mark.parametrize("block", ["title", "lead", "says", "body"])
-def test_a_page_that_leaves_out_a_block_is_refused(block: str) -> None:
-    with pytest.raises(jinja2.TemplateRuntimeError, match=block):
-        page(PAGE.replace(f"block {block} ", "block other "))
-
-
-@pytest.mark.parametrize("name", PAGES)
-def test_every_page_packings_the_frame(name: str) -> None:
-    environment = page_environment({**FILTERS, "quantity": str, "setting": str}, "evidence")
-    template = environment.get_template(name)
-    assert {"title", "lead", "says", "body"} <= set(template.blocks)
-    source = TEMPLATES[name].read_text(encoding="utf-8")
-    assert source.startswith('{% extends "report/page.html.j2" %}')
-
-
-def test_a_file_that_is_not_there_is_no_picture(tmp_path: Path) -> None:
-    assert file_uri(tmp_path / "film.gif") is None
-    (tmp_path / "film.gif").write_bytes(b"film")
-    uri = file_uri(tmp_path / "film.gif")
-    assert uri == "data:image/gif;base64," + base64.b64encode(b"film").decode()
-
-
-def test_a_large_picture_is_made_smaller_but_not_another() -> None:
-    noise = np.random.default_rng(1).integers(0, 256, (30, 40, 3), dtype=np.uint8)
-    drawn = Image.fromarray(noise).resize((800, 600), Image.Resampling.BICUBIC)
-    large = io.BytesIO()
-    drawn.save(large, format="png")
-    uri = data_uri(large.getvalue())
-    assert uri.startswith("data:image/webp;base64,")
-    small = base64.b64decode(uri.split(",")[1])
-    assert len(large.getvalue()) > LARGE_PICTURE > len(small)
-    with Image.open(io.BytesIO(small)) as shown:
-        change = np.abs(np.asarray(shown.convert("L"), int) - np.asarray(drawn.convert("L"), int))
-    assert change.mean() < 4
 
 
 @pytest.mark.parametrize(
@@ -177,8 +111,3 @@ def test_a_value_has_the_decimals_of_its_interval(
     ends: tuple[float, float, float], text: str
 ) -> None:
     assert with_interval(Estimate(*ends), "N") == text
-
-
-def test_percent_carries_its_sign() -> None:
-    assert fraction(0.0126) == "+1.3 %" and fraction(-0.034) == "\N{MINUS SIGN}3.4 %"
-    assert fraction(None) == "\N{EN DASH}"

@@ -8,35 +8,18 @@ import numpy as np
 import pandas as pd
 import pytest
 from changed import changed
-from figure_files import (
-    LAST,
-    STEP_S,
-    R,
-    case_json,
-    resistance,
-    workpiece_contacts_table,
-    workpiece_force_table,
-    write_process_run,
-)
-from made_run import line, output, save, with_motion, write_documents
+from figure_files import LAST, R, case_json, resistance, write_process_run
+from made_run import line, with_motion, write_documents
+from networks import make_frame
 from PIL import Image
 
 from dragchain.errors import TableError
 from dragchain.figures import network_picture as scene
 from dragchain.figures.rendering import RenderError, check_rendering
-from dragchain.network.frame import NetworkFrame
-from dragchain.report.findings import (
-    FIGURES,
-    FILE,
-    DropFindings,
-    FillingFindings,
-    ProcessFindings,
-)
+from dragchain.network.frame import SIDE, NetworkFrame
+from dragchain.report.findings import FIGURES, FILE, FillingFindings, ProcessFindings
 from dragchain.report.run_data import RunData, dominant_bottlenecks, process_findings
-from dragchain.report.run_figures import (
-    energy_ratio,
-    write_figures,
-)
+from dragchain.report.run_figures import energy_ratio, write_figures
 from dragchain.run.reference import reference_drags
 from dragchain.statistics.estimate import Estimate
 from dragdeck.records.case import CaseOfRun, load_case
@@ -121,37 +104,16 @@ def test_process_figures_are_whole_pictures(process: Path, drawn: list[Path]) ->
             assert len(picture.convert("RGB").getcolors(1 << 24) or []) > 20
 
 
-def test_a_run_without_chains_names_the_missing_table(process: Path, tmp_path: Path) -> None:
-    for name in ("case.json", "columns.json"):
-        (tmp_path / name).write_bytes((process / name).read_bytes())
-    save(workpiece_force_table(), tmp_path, "workpiece_force")
-    save(workpiece_contacts_table(), tmp_path, "workpiece_contacts")
-    with pytest.raises(TableError, match=r"network\.parquet"):
-        write_figures(tmp_path)
-
-
 # --- the network's pictures ------------------------------------------------------------------
 
 
 UPRIGHT = Rotation(np.zeros(1))
 
 
-def network_frame(normal_force: list[float], *, direction_rad: float = 0.0) -> NetworkFrame:
-    """Return two particles on the x axis in contact with each other and with the side."""
-    return NetworkFrame(
-        step=300, time_s=0.3, direction_rad=direction_rad, particle_id=np.array([4, 7]),
-        centre=np.array([[-R, 0.0, 0.015], [R, 0.0, 0.015]]), radius=np.array([R, R]),
-        a=np.array([0, 1]), b=np.array([1, -1]), other=np.array([1, -2]),
-        point=np.array([[0.0, 0.0, 0.015], [2 * R, 0.0, 0.015]]), force=np.zeros((2, 3)),
-        normal_force=np.array(normal_force),
-    )  # fmt: skip
-
-
-def test_cylinders_join_centres_or_end_at_the_wall() -> None:
-    assert scene.segments(network_frame([1.0, 2.0])).tolist() == [
-        [[-R, 0.0, 0.015], [R, 0.0, 0.015]],
-        [[R, 0.0, 0.015], [2 * R, 0.0, 0.015]],
-    ]
+def network_frame(between_n: float, on_side_n: float) -> NetworkFrame:
+    """Two particles on the x axis in contact with each other and with the side."""
+    centres = {4: (-R, 0.0, 0.015), 7: (R, 0.0, 0.015)}
+    return make_frame(centres, [(4, 7, between_n), (7, SIDE, on_side_n)])
 
 
 def test_the_largest_force_has_the_mean_particle_radius() -> None:
@@ -204,7 +166,7 @@ def test_a_rendered_contact_is_where_its_axes_say(
 ) -> None:
     case = load_case(process)
     far = np.array([0.015, 0.012, 0.01])
-    shown = scene.NetworkScene(network_frame([2.0, 0.5]), far, UPRIGHT, None, 0.2)
+    shown = scene.NetworkScene(network_frame(2.0, 0.5), far, UPRIGHT, None, 0.2)
     image, extent = scene.render_view(process, case, shown, view)
     assert is_strongest(pixel(image, extent, 0.0, level_mm))
     assert is_strongest(pixel(image, extent, -2.5, level_mm + 2.0))
@@ -221,22 +183,12 @@ def widened(case: CaseOfRun, radius_m: float) -> CaseOfRun:
     return changed(case, bowl=changed(case.bowl, radius_m=radius_m))
 
 
-def test_a_bowl_not_much_wider_than_the_window_is_shown_whole(process: Path) -> None:
-    case = load_case(process)
-    shown = scene.NetworkScene(
-        network_frame([1.0, 1.0]), np.array([0.01, 0.0, 0.01]), UPRIGHT, None, 0.2
-    )
-    part = scene.window(case, shown, "xy")
-    assert part.contacts is None and part.low.tolist() == [-0.024, -0.024]
-    assert scene.cut_words(case, "xz") == ""
-
-
 def test_a_wide_bowl_is_cut_to_the_surroundings_of_the_workpiece(process: Path) -> None:
     case = widened(load_case(process), 0.5)
     reach = 2 * R * scene.WINDOW_DIAMETERS
     depth = 2 * R * scene.DEPTH_DIAMETERS
     workpiece = np.array([0.5 + 0.004 - reach / 2, 0.1, 0.01])
-    frame = network_frame([1.0, 1.0])
+    frame = network_frame(1.0, 1.0)
     places = np.array([[0.0, 1.1 * depth, 0.0], [-1.1 * reach, 0.0, 0.0]]) + workpiece
     shown = scene.NetworkScene(replace(frame, point=places), workpiece, UPRIGHT, None, 0.2)
     above, side = (scene.window(case, shown, view) for view in ("xy", "xz"))
@@ -278,40 +230,8 @@ def test_a_filling_without_thermo_has_no_figure(filling: Path) -> None:
     assert found.rest_energy_ratio == 1e-5
 
 
-def test_a_filling_is_drawn_from_its_thermo_table(filling: Path) -> None:
-    energy = 1e-3 * np.exp(-np.arange(30.0))
-    table = pd.DataFrame({"time_s": np.arange(30.0), "n_particles": 3, "kinetic_energy_j": energy})
-    table["rotational_energy_j"] = 0.0
-    table.loc[0, "n_particles"] = 0
-    save(table, filling, "thermo")
-    assert [path.name for path in write_figures(filling)] == ["filling.png"]
-
-
 def test_energy_ratio_of_particles_that_fell_their_diameter_is_one(filling: Path) -> None:
     case: CaseOfRun = load_case(filling)
     mass = 2500.0 * 4 / 3 * math.pi * R**3
     ratio = energy_ratio(np.array([2 * mass * 10.0 * 2 * R]), np.array([2.0]), case)
     assert ratio == pytest.approx([1.0])
-
-
-def test_a_drop_is_drawn_with_its_restitution(tmp_path: Path) -> None:
-    columns = ["step", "time_s", "z_m", "vz_m_s", "force_n"]
-    outputs = {"impacts": output("print", columns, 1, 0, None, pattern="out.{part}.txt")}
-    write_documents(tmp_path, case_json("drop_test", phases=[]), outputs)
-    lines = [" ".join(columns)]
-    for first in (10, 200, 300):
-        lines += [
-            f"{first + k} {(first + k) * STEP_S} 0 {k - 6} {max(0, 9 - (k - 6) ** 2)}"
-            for k in range(13)
-        ]
-    (tmp_path / "out.1.txt").write_text("\n".join(lines) + "\n")
-    impacts = {
-        "impact": [1, 2, 3], "start_time_s": [0.014, 0.204, 0.304], "duration_s": 0.005,
-        "peak_force_n": 9.0, "speed_in_m_s": 1.0, "speed_out_m_s": 0.7,
-        "restitution": [0.70, 0.72, 0.74], "time_since_first_s": [0.0, 0.19, 0.29],
-    }  # fmt: skip
-    save(pd.DataFrame(impacts), tmp_path, "impacts")
-    assert [path.name for path in write_figures(tmp_path)] == ["drop_test.png"]
-    ratio = DropFindings.read(tmp_path / FILE).restitution
-    assert ratio.mean == pytest.approx(0.72)
-    assert ratio.input == 0.7

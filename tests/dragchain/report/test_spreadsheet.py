@@ -11,7 +11,6 @@ from report_files import PICTURES, case_json, make_run, process_findings, write_
 
 from dragchain.report.cases import cases_of, read_study_runs
 from dragchain.report.spreadsheet import definitions, summary_workbook, workbook
-from dragdeck.records.case import AssumptionOfRun
 
 FORMULAE = ["=1+1", "+1", "-1", "@SUM(A1)", "{=1}", "https://example.org", "=cmd|' /C calc'!A0"]
 
@@ -60,29 +59,6 @@ def test_headings_are_words_with_units(column: str, unit: str, heading: str) -> 
     (row,) = definitions(pd.DataFrame({column: [1.0]})).itertuples(index=False)
     assert (row.heading, row.column, row.unit) == (heading, column, unit)
     assert row.meaning
-
-
-def test_a_column_that_nobody_describes_has_no_meaning() -> None:
-    found = definitions(pd.DataFrame({"x_of_tomorrow_m": [1.0], "text": ["a"]}))
-    assert found.iloc[:, 2:].to_numpy().tolist() == [["m", ""], ["", ""]]
-
-
-def test_the_sheets_say_what_there_is(tmp_path: Path) -> None:
-    table = pd.DataFrame({"case": ["=a", "b"], "drag_mean_n": [-2.5, math.nan]})
-    assumed = {"run-1": [AssumptionOfRun(field="bowl.radius_m", value=0.04, why="+plausible")]}
-    folder = make_run(
-        tmp_path, case_json("process", "workpiece-1"), process_findings(-2.5), PICTURES
-    )
-    book = read(summary_workbook(table, assumed, cases_of([read_study_runs(folder)])))
-    assert book.sheetnames == ["Overview", "Summary", "Definitions", "Assumptions"]
-    rows = [list(sheet.iter_rows(values_only=True)) for sheet in book][1:]
-    assert rows[0] == [("Case", "Drag mean (N)"), ("=a", -2.5), ("b", None)]
-    assert [row[:3] for row in rows[1][1:]] == [
-        ("Case", "case", None), ("Drag mean (N)", "drag_mean_n", "N")
-    ]  # fmt: skip
-    assert rows[2] == [
-        ("run", "field", "value", "reason"), ("run-1", "bowl.radius_m", "0.04", "+plausible")
-    ]  # fmt: skip
 
 
 def test_the_overview_has_a_row_per_quantity_with_formats(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from report_files import case_json
 
-from dragchain.run.basis import QUANTITIES, Basis, Correction, Quantity, judge, notes
+from dragchain.run.basis import Basis, Correction, Quantity, judge, notes
 from dragchain.statistics.estimate import Estimate
 from dragdeck.records.case import CaseOfRun
 
@@ -86,29 +86,7 @@ def test_an_interval_that_is_not_known_stays_unknown() -> None:
     assert found.run.value == 20.0 and not found.run.known
 
 
-@pytest.mark.parametrize(
-    ("scale", "factor", "said", "not_said"),
-    [
-        (1.0, 1.0, ["is the physical one"], ["fewer", "more and", "process time"]),
-        (0.01, 1.0, ["more and smaller", "tolerance: 0.1"], ["fewer", "process time"]),
-        (1.0, 5.0, ["fewer and larger", "simulated time \N{MULTIPLICATION SIGN} 5:"], ["more and"]),
-        (1e-4, 5.0, ["more and smaller", "fewer and larger", "Nothing is corrected"], ["where a"]),
-    ],
-)
-def test_each_setting_has_its_own_sentence(
-    scale: float, factor: float, said: list[str], not_said: list[str]
-) -> None:
-    text = " ".join(notes(case(scale, factor)))
-    assert all(words in text for words in said)
-    assert not any(words in text for words in not_said)
-    assert "77 % of the Rayleigh time" in text
-
-
 def test_a_step_that_was_accepted_though_unstable_is_said_to_be() -> None:
     text = " ".join(notes(case(unsafe_timestep="to see it break")))
     assert "may be unstable" in text and "to see it break" in text
     assert "no effect" not in text
-
-
-def test_names_of_the_registry_are_unique() -> None:
-    assert len({one.name for one in QUANTITIES}) == len(QUANTITIES)

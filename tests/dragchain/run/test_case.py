@@ -1,4 +1,3 @@
-import json
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +8,6 @@ from dragchain import DocumentError, TableError, load_case, load_outputs
 from dragchain.run.case import changed_inputs
 from dragchain.run.kinematics import motion_of
 from dragdeck.records.case import StatisticsOfRun
-from dragdeck.study.paths.circle import CirclePath
 
 
 def test_reads_a_process(tiny_run: Path) -> None:
@@ -27,14 +25,6 @@ def test_reads_a_process(tiny_run: Path) -> None:
     assert case.restitution is None
 
 
-def test_reads_a_circle(tiny_run: Path, edit_json) -> None:
-    path = {"kind": "circle", "radius_m": 0.02, "direction": "cw"}
-    edit_json(tiny_run / "case.json", lambda case: case.update(with_motion(case, path, 0.01)))
-    found = motion_of(load_case(tiny_run)).motion.path
-    assert isinstance(found, CirclePath)
-    assert (found.radius_m, found.sign) == (0.02, -1)
-
-
 def test_a_motion_that_this_version_makes_otherwise_is_refused(tiny_run: Path, edit_json) -> None:
     """The tables follow from the inputs; what was simulated stands beside them."""
     path = {"kind": "circle", "radius_m": 0.02}
@@ -46,17 +36,6 @@ def test_a_motion_that_this_version_makes_otherwise_is_refused(tiny_run: Path, e
     edit_json(tiny_run / "case.json", slower)
     with pytest.raises(TableError, match="another version of dragdeck"):
         motion_of(load_case(tiny_run))
-
-
-def test_a_drop_has_no_workpiece(tiny_run: Path, edit_json) -> None:
-    def to_drop(case):
-        for key in ("case", "workpiece", "motion", "surface_m", "statistics"):
-            del case[key]
-        case.update(scene="drop_test", restitution=0.68)
-
-    edit_json(tiny_run / "case.json", to_drop)
-    case = load_case(tiny_run)
-    assert (case.workpiece, case.restitution) == (None, 0.68)
 
 
 @pytest.mark.parametrize(
@@ -93,27 +72,6 @@ def test_a_missing_case_and_a_broken_one_are_told_apart(tiny_run: Path) -> None:
         load_case(tiny_run)
 
 
-def test_reads_outputs(tiny_run: Path) -> None:
-    outputs = load_outputs(tiny_run)
-    assert list(outputs) == [
-        *(
-            "thermo",
-            "workpiece_force",
-            "workpiece_particles",
-            "workpiece_contacts",
-            "contacts",
-            "particles",
-        ),
-    ]
-    assert outputs["workpiece_force"].header == outputs["workpiece_force"].columns
-    assert outputs["contacts"].header == tuple(f"c_x[{i}]" for i in range(6))
-
-
-def test_the_last_step_may_be_open(tiny_run: Path, edit_json) -> None:
-    edit_json(tiny_run / "columns.json", lambda c: c["outputs"]["thermo"].update(last_step=None))
-    assert load_outputs(tiny_run)["thermo"].last_step is None
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -127,15 +85,6 @@ def test_says_what_is_wrong_with_an_output(tiny_run: Path, edit_json, change, me
     edit_json(tiny_run / "columns.json", lambda c: c["outputs"]["contacts"].update(change))
     with pytest.raises(DocumentError, match=message):
         load_outputs(tiny_run)
-
-
-def test_an_error_names_file_and_remedy(tiny_run: Path) -> None:
-    file = tiny_run / "columns.json"
-    file.write_text(json.dumps({"schema": 2}))
-    with pytest.raises(DocumentError) as caught:
-        load_outputs(tiny_run)
-    assert (caught.value.file, caught.value.field) == (file, "outputs")
-    assert "remedy:" in str(caught.value)
 
 
 def test_an_input_that_is_left_out_is_one_that_is_none() -> None:

@@ -1,5 +1,6 @@
 import struct
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -7,71 +8,27 @@ from changed import changed
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
+from made_run import output
 
 from dragchain.run.run_parts import iter_frames, iter_prints, output_files
 from dragdeck.decks.outputs import OutputOfRun
 from dragdeck.dumps.reader import read_frames, read_prints
 from dragdeck.errors import DumpError, TruncatedDumpError
 
-PARTICLES = OutputOfRun(
-    name="particles",
-    kind="custom",
-    binary=True,
-    pattern="particles.{part}.bin",
-    columns=("particle_id", "x_m"),
-    engine_columns=None,
-    period_steps=10,
-    first_step=0,
-    last_step=20,
-)
-CONTACTS = OutputOfRun(
-    name="contacts",
-    kind="local",
-    binary=False,
-    pattern="contacts.{part}.dump",
-    columns=("particle1_id", "overlap_m"),
-    engine_columns=("c_p[1]", "c_p[7]"),
-    period_steps=10,
-    first_step=0,
-    last_step=20,
-)
-FORCE = OutputOfRun(
-    name="force",
-    kind="print",
-    binary=False,
-    pattern="force.{part}.txt",
-    columns=("step", "force_x_n"),
-    engine_columns=None,
-    period_steps=2,
-    first_step=2,
-    last_step=10,
-)
-ROWS = {0: [], 10: [[1, 0.5], [2, 0.25]], 20: [[2, -1.5]]}
 
-# Step 7, two particles from two ranks, written out field by field.
-BY_HAND = (
-    bytes([7, 0, 0, 0, 0, 0, 0, 0])
-    + bytes([2, 0, 0, 0, 0, 0, 0, 0])
-    + bytes([0, 0, 0, 0])
-    + bytes([1, 0, 0, 0]) * 6
-    + bytes(48)
-    + bytes([2, 0, 0, 0])
-    + bytes([2, 0, 0, 0])
-    + bytes([2, 0, 0, 0])
-    + bytes([0, 0, 0, 0, 0, 0, 0x08, 0x40])
-    + bytes([0, 0, 0, 0, 0, 0, 0xE0, 0x3F])
-    + bytes([2, 0, 0, 0])
-    + bytes([0, 0, 0, 0, 0, 0, 0xF0, 0x3F])
-    + bytes([0, 0, 0, 0, 0, 0, 0xF0, 0xBF])
-)
+def output_of_run(name: str, kind: str, columns: tuple[str, ...], *schedule: Any, **more: Any):
+    """An output whose period, first and last step are these."""
+    entry = output(kind, columns, *schedule, pattern=f"{name}.{{part}}", **more)
+    return OutputOfRun.model_validate({"name": name, **entry})
+
+
+PARTICLES = output_of_run("particles", "custom", ("particle_id", "x_m"), 10, 0, 20, binary=True)
+FORCE = output_of_run("force", "print", ("step", "force_x_n"), 2, 2, 10)
+ROWS = {0: [], 10: [[1, 0.5], [2, 0.25]], 20: [[2, -1.5]]}
 
 
 def binary_file(raw, steps, width=2):
     return b"".join(raw.binary(step, ROWS[step], width) for step in steps)
-
-
-def text_file(raw, steps):
-    return b"".join(raw.text(step, ROWS[step], CONTACTS.header, "local") for step in steps)
 
 
 def force_file(raw, steps, scale=1.0):
@@ -82,27 +39,6 @@ def steps_of(frames):
     return [frame.step for frame in frames]
 
 
-def test_reads_a_binary_frame_written_by_hand(tmp_path: Path) -> None:
-    (tmp_path / "a.bin").write_bytes(BY_HAND)
-    (frame,) = read_frames([tmp_path / "a.bin"], PARTICLES)
-    assert frame.step == 7
-    np.testing.assert_array_equal(frame.columns["particle_id"], [3, 1])
-    np.testing.assert_array_equal(frame.columns["x_m"], [0.5, -1.0])
-    assert frame.columns["particle_id"].dtype == np.int64
-
-
-@pytest.mark.parametrize(("output", "write"), [(PARTICLES, binary_file), (CONTACTS, text_file)])
-def test_reads_frames_whose_number_of_rows_changes(tmp_path: Path, raw, output, write) -> None:
-    (tmp_path / output.pattern.format(part=1)).write_bytes(write(raw, [0, 10, 20]))
-    frames = list(iter_frames(tmp_path, output))
-    assert [(frame.step, frame.rows) for frame in frames] == [(0, 0), (10, 2), (20, 1)]
-    assert [frame.opening for frame in frames] == [True, False, False]
-    first, second = output.columns
-    np.testing.assert_array_equal(frames[1].columns[first], [1, 2])
-    np.testing.assert_array_equal(frames[1].columns[second], [0.5, 0.25])
-    assert frames[0].columns[first].dtype == np.int64
-
-
 def test_reads_a_frame_in_a_tilted_box(tmp_path: Path, raw) -> None:
     frame = raw.binary(0, [[1, 2.0]], 2, ranks=1)
     tilted = frame[:16] + struct.pack("<i", 1) + frame[20:92] + bytes(24) + frame[92:]
@@ -111,27 +47,8 @@ def test_reads_a_frame_in_a_tilted_box(tmp_path: Path, raw) -> None:
     np.testing.assert_array_equal(read.columns["x_m"], [2.0])
 
 
-@pytest.mark.parametrize(("output", "write"), [(PARTICLES, binary_file), (CONTACTS, text_file)])
-def test_every_cut_keeps_the_frames_before_it(tmp_path: Path, raw, output, write) -> None:
-    whole = write(raw, [0, 10, 20])
-    ends = [len(write(raw, [0, 10, 20][:n])) for n in range(4)]
-    file = tmp_path / output.pattern.format(part=1)
-    for size in range(len(whole)):
-        file.write_bytes(whole[:size])
-        frames = read_frames([file], output)
-        before = sum(size >= end for end in ends[1:])
-        assert steps_of(next(frames) for _ in range(before)) == [0, 10, 20][:before]
-        if size in ends:
-            assert next(frames, None) is None
-            continue
-        with pytest.raises(TruncatedDumpError, match="frames before it are intact") as caught:
-            next(frames)
-        assert (caught.value.frame, caught.value.offset) == (before, ends[before])
-        assert str(file) in str(caught.value)
-
-
 def test_a_cut_number_is_not_read_as_another_number(tmp_path: Path, raw) -> None:
-    file = tmp_path / "force.1.txt"
+    file = tmp_path / "force.1"
     file.write_bytes(b"step force_x_n\n2 1.5\n4 2.25\n6 3.1")
     with pytest.raises(TruncatedDumpError, match="rows before it are intact") as caught:
         list(read_prints(file, FORCE))
@@ -170,10 +87,10 @@ def test_refuses_a_spoilt_print_file(tmp_path: Path, content, message, row, offs
 
 
 def test_parts_are_ordered_by_number(tmp_path: Path) -> None:
-    for name in ("force.10.txt", "force.2.txt", "force.1.txt", "force.x.txt", "force.1.txt.bak"):
+    for name in ("force.10", "force.2", "force.1", "force.x", "force.1.bak"):
         (tmp_path / name).touch()
     names = [file.name for file in output_files(tmp_path, FORCE)]
-    assert names == ["force.1.txt", "force.2.txt", "force.10.txt"]
+    assert names == ["force.1", "force.2", "force.10"]
 
 
 def test_an_output_without_a_file_is_an_error(tmp_path: Path) -> None:
@@ -182,53 +99,53 @@ def test_an_output_without_a_file_is_an_error(tmp_path: Path) -> None:
 
 
 def test_the_later_part_counts(tmp_path: Path, raw) -> None:
-    (tmp_path / "force.1.txt").write_bytes(force_file(raw, [2, 4, 6, 8]))
-    (tmp_path / "force.2.txt").write_bytes(force_file(raw, [6, 8, 10], scale=-1.0))
+    (tmp_path / "force.1").write_bytes(force_file(raw, [2, 4, 6, 8]))
+    (tmp_path / "force.2").write_bytes(force_file(raw, [6, 8, 10], scale=-1.0))
     values = np.concatenate([block["force_x_n"] for block in iter_prints(tmp_path, FORCE)])
     np.testing.assert_array_equal(values, [2, 4, -6, -8, -10])
 
 
 def test_a_part_that_starts_earlier_than_the_one_before_it_counts(tmp_path: Path, raw) -> None:
-    (tmp_path / "force.1.txt").write_bytes(force_file(raw, [2, 4, 6]))
-    (tmp_path / "force.2.txt").write_bytes(force_file(raw, [6, 8], scale=2.0))
-    (tmp_path / "force.3.txt").write_bytes(force_file(raw, [4, 6, 8, 10], scale=3.0))
+    (tmp_path / "force.1").write_bytes(force_file(raw, [2, 4, 6]))
+    (tmp_path / "force.2").write_bytes(force_file(raw, [6, 8], scale=2.0))
+    (tmp_path / "force.3").write_bytes(force_file(raw, [4, 6, 8, 10], scale=3.0))
     values = np.concatenate([block["force_x_n"] for block in iter_prints(tmp_path, FORCE)])
     np.testing.assert_array_equal(values, [2, 12, 18, 24, 30])
 
 
 @pytest.mark.parametrize("cut", [1, 30, 100, 140])
 def test_a_cut_frame_that_a_later_part_covers_does_not_matter(tmp_path: Path, raw, cut) -> None:
-    (tmp_path / "particles.1.bin").write_bytes(binary_file(raw, [0, 10])[:-cut])
-    (tmp_path / "particles.2.bin").write_bytes(binary_file(raw, [10, 20]))
+    (tmp_path / "particles.1").write_bytes(binary_file(raw, [0, 10])[:-cut])
+    (tmp_path / "particles.2").write_bytes(binary_file(raw, [10, 20]))
     assert steps_of(iter_frames(tmp_path, PARTICLES)) == [0, 10, 20]
 
 
 def test_a_part_without_a_whole_frame_does_not_matter_if_covered(tmp_path: Path, raw) -> None:
-    (tmp_path / "particles.1.bin").write_bytes(binary_file(raw, [0]))
-    (tmp_path / "particles.2.bin").write_bytes(binary_file(raw, [10])[:-4])
-    (tmp_path / "particles.3.bin").write_bytes(b"")
-    (tmp_path / "particles.4.bin").write_bytes(binary_file(raw, [10, 20]))
+    (tmp_path / "particles.1").write_bytes(binary_file(raw, [0]))
+    (tmp_path / "particles.2").write_bytes(binary_file(raw, [10])[:-4])
+    (tmp_path / "particles.3").write_bytes(b"")
+    (tmp_path / "particles.4").write_bytes(binary_file(raw, [10, 20]))
     assert steps_of(iter_frames(tmp_path, PARTICLES)) == [0, 10, 20]
 
 
 def test_a_cut_frame_that_no_later_part_covers_is_an_error(tmp_path: Path, raw) -> None:
-    (tmp_path / "particles.1.bin").write_bytes(binary_file(raw, [0, 10])[:-4])
-    (tmp_path / "particles.2.bin").write_bytes(binary_file(raw, [20]))
+    (tmp_path / "particles.1").write_bytes(binary_file(raw, [0, 10])[:-4])
+    (tmp_path / "particles.2").write_bytes(binary_file(raw, [20]))
     frames = iter_frames(tmp_path, PARTICLES)
     assert next(frames).step == 0
     with pytest.raises(TruncatedDumpError) as caught:
         next(frames)
-    assert (caught.value.file.name, caught.value.frame) == ("particles.1.bin", 1)
+    assert (caught.value.file.name, caught.value.frame) == ("particles.1", 1)
 
 
 def test_a_cut_frame_in_the_last_part_is_an_error(tmp_path: Path, raw) -> None:
-    (tmp_path / "particles.1.bin").write_bytes(binary_file(raw, [0, 10]))
-    (tmp_path / "particles.2.bin").write_bytes(binary_file(raw, [10, 20])[:-1])
+    (tmp_path / "particles.1").write_bytes(binary_file(raw, [0, 10]))
+    (tmp_path / "particles.2").write_bytes(binary_file(raw, [10, 20])[:-1])
     frames = iter_frames(tmp_path, PARTICLES)
     assert steps_of([next(frames), next(frames)]) == [0, 10]
     with pytest.raises(TruncatedDumpError) as caught:
         next(frames)
-    assert (caught.value.file.name, caught.value.frame) == ("particles.2.bin", 1)
+    assert (caught.value.file.name, caught.value.frame) == ("particles.2", 1)
     assert caught.value.offset == len(binary_file(raw, [10]))
 
 
@@ -242,23 +159,23 @@ def test_a_cut_frame_in_the_last_part_is_an_error(tmp_path: Path, raw) -> None:
     ],
 )
 def test_a_missing_frame_is_an_error(tmp_path: Path, raw, steps, message) -> None:
-    (tmp_path / "particles.1.bin").write_bytes(binary_file(raw, steps))
+    (tmp_path / "particles.1").write_bytes(binary_file(raw, steps))
     with pytest.raises(DumpError, match=message):
         list(iter_frames(tmp_path, PARTICLES))
 
 
 def test_a_frame_after_the_last_step_is_an_error(tmp_path: Path, raw) -> None:
-    (tmp_path / "particles.1.bin").write_bytes(binary_file(raw, [0, 10, 20]))
+    (tmp_path / "particles.1").write_bytes(binary_file(raw, [0, 10, 20]))
     with pytest.raises(DumpError, match=r"has step 20\n  expected: no step after 10"):
         list(iter_frames(tmp_path, changed(PARTICLES, last_step=10)))
 
 
 def test_an_open_output_may_leave_out_steps_but_not_leave_the_grid(tmp_path: Path, raw) -> None:
     output = changed(FORCE, last_step=None)
-    (tmp_path / "force.1.txt").write_bytes(force_file(raw, [4, 6, 20]))
+    (tmp_path / "force.1").write_bytes(force_file(raw, [4, 6, 20]))
     (block,) = iter_prints(tmp_path, output)
     assert block["step"].tolist() == [4, 6, 20]
-    (tmp_path / "force.1.txt").write_bytes(force_file(raw, [4, 7]))
+    (tmp_path / "force.1").write_bytes(force_file(raw, [4, 7]))
     with pytest.raises(DumpError, match="continues with step 7"):
         list(iter_prints(tmp_path, output))
 
@@ -269,17 +186,7 @@ frames = st.lists(
     min_size=1,
     max_size=5,
 )
-ANY = OutputOfRun(
-    name="any",
-    kind="custom",
-    binary=True,
-    pattern="any.{part}.bin",
-    columns=("a", "b"),
-    engine_columns=None,
-    period_steps=3,
-    first_step=6,
-    last_step=None,
-)
+ANY = output_of_run("any", "custom", ("a", "b"), 3, 6, None, binary=True)
 
 
 @given(values=frames, ranks=st.integers(1, 3), first_part=st.integers(0, 5), redo=st.integers(0, 5))
@@ -296,8 +203,8 @@ def test_any_frames_dealt_to_any_ranks_and_parts_come_back(
     stale = [raw.binary(6 + 3 * i, [[0.5, 0.5]], 2, 1) for i in range(len(values))]
     redo = min(redo, len(values) - 1)
     first_part = max(redo, min(first_part, len(values)))
-    (tmp_path / "any.1.bin").write_bytes(b"".join(whole[:redo] + stale[redo:first_part]))
-    (tmp_path / "any.2.bin").write_bytes(b"".join(whole[redo:]))
+    (tmp_path / "any.1").write_bytes(b"".join(whole[:redo] + stale[redo:first_part]))
+    (tmp_path / "any.2").write_bytes(b"".join(whole[redo:]))
     read = list(iter_frames(tmp_path, output))
     assert steps_of(read) == list(range(6, last + 1, 3))
     for frame, value in zip(read, values, strict=True):

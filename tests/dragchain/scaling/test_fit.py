@@ -19,13 +19,11 @@ from dragchain.scaling.fit import (
     find,
     read_scaled_runs,
     read_scalings,
-    said,
     table,
     write_scaling,
 )
 from dragchain.statistics.estimate import Estimate
 from dragchain.statistics.power_law import RunMeans, fit_power_law
-from dragdeck.errors import DocumentError
 
 DEPTH = "motion.immersion_depth_m"
 LEVELS = (0.01, 0.02, 0.04)
@@ -147,20 +145,6 @@ def test_a_drag_along_the_motion_is_refused(write_run: Writer, tmp_path: Path) -
         write_scaling(tmp_path / "out", [folder], DEPTH)
 
 
-def test_a_document_without_a_number_is_refused(quadratic: list[Path], tmp_path: Path) -> None:
-    assert write_scaling(tmp_path / "out", quadratic, DEPTH, 2.0).startswith(f"{DEPTH}: confirmed")
-    found = find(quadratic, DEPTH, Expectation(exponent=2.0))
-    file = tmp_path / "out" / "scaling.json"
-    assert ScalingFile.read(file) == found
-    content = json.loads(file.read_text())
-    del content["levels"][1]["drag_n"]["ci95_low"]
-    file.write_text(json.dumps(content))
-    with pytest.raises(
-        DocumentError, match=r"levels\[1\]\.drag_n\.ci95_low: a required key is missing"
-    ):
-        ScalingFile.read(file)
-
-
 def test_the_scalings_of_the_package_are_whole() -> None:
     scalings = read_scalings()
     assert [found.study for found in scalings] == [
@@ -170,27 +154,6 @@ def test_the_scalings_of_the_package_are_whole() -> None:
         assert found.commands and found.engine and found.started
         assert vars(_refit(found)) == pytest.approx(vars(found.fit.exponent), abs=1e-4)
         assert list(table(found)[found.field]) == [level.x for level in found.levels]
-
-
-def test_the_words_name_a_lack_of_fit(write_run: Writer) -> None:
-    field = "motion.speed_m_s"
-    bent = {0.005: 1.0, 0.01: 1.0, 0.02: 1.0, 0.04: 1.8, 0.08: 1.0}
-    folders = [
-        write_run(drag, seed, **{field: speed}) for speed, drag in bent.items() for seed in (1, 2)
-    ]
-    found = find(folders, field, Expectation(exponent=0.0))
-    assert found.fit.lack_of_fit is not None and found.fit.lack_of_fit < 0.05
-    off = found.levels[3].deviation
-    assert off is not None and off.ci95_low > 0.0
-    assert f"40 mm/s by +{100 * off.value:.0f} %" in said(found)
-
-
-def test_one_bed_cannot_test_the_law(write_run: Writer) -> None:
-    folders = [write_run(depth, **{DEPTH: depth}) for depth in (*LEVELS, 0.05)]
-    found = find(folders, DEPTH, Expectation(exponent=1.0))
-    assert found.fit.lack_of_fit is None
-    assert {run.bed for run in found.runs} == {"filling-1"}
-    assert said(found).endswith("not in the intervals.")
 
 
 def _refit(found: ScalingFile) -> Estimate:

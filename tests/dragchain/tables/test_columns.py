@@ -1,36 +1,17 @@
-import json
-import shutil
 from pathlib import Path
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from finished_runs import write_finished_run
-from loading_files import made_contacts, write_run
-from made_run import Raw
-from report_files import (
-    ASKED,
-    DROP,
-    FILLING,
-    PICTURES,
-    case_json,
-    make_run,
-    process_findings,
-    write_quantities,
-)
-from tiny_run_files import RADIUS_M
-from tiny_run_files import case_json as tiny_case
 
-from dragchain import write_tables
 from dragchain.loading.samples import BODY as BODY_IMPULSE
-from dragchain.loading.write import write_loading
-from dragchain.report.study_report import write_study_report
 from dragchain.tables import parquet
 from dragchain.tables.columns import ATTRACTION, BODY, CLASSES, columns_of, descriptions, unit_of
 
 TABLES = (
     *("workpiece_force", "workpiece_contacts", "particles", "contacts", "network", "chains"),
-    *("clusters", "facets", "contact_events", "impacts", "thermo", "summary"),
+    *("clusters", "facets", "contact_events", "thermo"),
 )
 SOME_RUNS_ONLY = {
     *(*BODY, *BODY_IMPULSE, ATTRACTION, "fastest_particle_m_s"),
@@ -39,48 +20,11 @@ SOME_RUNS_ONLY = {
 """Columns of spinning workpieces, attraction and classes, and one the small run does not write."""
 
 
-def write_drop(folder: Path) -> None:
-    """A drop test with one impact and its table."""
-    folder.mkdir()
-    columns = ["step", "time_s", "z_m", "vz_m_s", "force_n"]
-    impacts = {
-        "kind": "print", "binary": False, "pattern": "impacts.{part}.txt", "columns": columns,
-        "engine_columns": None, "period_steps": 1, "first_step": 0, "last_step": None,
-    }  # fmt: skip
-    case = tiny_case() | {"scene": "drop_test", "phases": [], "restitution": 0.68}
-    (folder / "case.json").write_text(json.dumps(case))
-    (folder / "columns.json").write_text(json.dumps({"schema": 2, "outputs": {"impacts": impacts}}))
-    rows = [[10, 0.01, RADIUS_M, -4, 0], [11, 0.011, 0, 0, 9], [12, 0.012, RADIUS_M, 3, 0]]
-    (folder / "impacts.1.txt").write_bytes(Raw.prints(rows, columns))
-    write_tables(folder)
-
-
-def write_summary(results: Path) -> None:
-    """A report on a process run with its filling and its drop test."""
-    make_run(results, case_json("filling", "filling-1"), FILLING, [])
-    make_run(results, case_json("drop_test", "drop-1"), DROP, ["drop_test"])
-    upstream = {"filling": "filling-1", "drop_test": "drop-1"}
-    case = case_json("process", "workpiece-1", upstream=upstream, asked=ASKED)
-    run = make_run(results, case, process_findings(), PICTURES)
-    write_quantities(run, corrected=0.8)
-    made = write_run(results / "made", made_contacts())
-    write_loading(made)
-    (run / "tables/loading.json").write_bytes((made / "tables/loading.json").read_bytes())
-    shutil.rmtree(made)
-    write_study_report(results / "report", [run])
-
-
-def write_all(folder: Path) -> dict[str, Path]:
-    """All tables of a small study, by name."""
-    write_finished_run(folder / "process")
-    write_drop(folder / "drop")
-    write_summary(folder / "results")
-    return {file.stem: file for file in folder.rglob("*.parquet")}
-
-
 @pytest.fixture(scope="module")
 def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    return write_all(tmp_path_factory.mktemp("described"))
+    """All tables of a process run, by name."""
+    run = write_finished_run(tmp_path_factory.mktemp("described") / "process")
+    return {file.stem: file for file in run.rglob("*.parquet")}
 
 
 def metadata(field: pa.Field) -> dict[str, str]:
@@ -88,20 +32,17 @@ def metadata(field: pa.Field) -> dict[str, str]:
 
 
 @pytest.mark.parametrize("table", TABLES)
-def test_every_column_has_a_unit_and_a_description(files: dict[str, Path], table: str) -> None:
-    for field in pq.read_schema(files[table]):
+def test_every_column_is_described_and_every_described_one_is_there(
+    files: dict[str, Path], table: str
+) -> None:
+    schema = pq.read_schema(files[table])
+    for field in schema:
         found = metadata(field)
         assert len(found["description"]) > 5, field.name
         assert found["unit"] == unit_of(field)
         assert found["unit"] or not pa.types.is_floating(field.type), field.name
-
-
-@pytest.mark.parametrize("table", TABLES)
-def test_every_described_column_is_in_its_table(files: dict[str, Path], table: str) -> None:
     plain = {name for name in columns_of(table) if "*" not in name}
-    names = set(pq.read_schema(files[table]).names)
-    of_wakes = {name for name in plain if "wake" in descriptions(name)[table]}
-    assert plain - names <= (of_wakes if table == "summary" else SOME_RUNS_ONLY)
+    assert plain - set(schema.names) <= SOME_RUNS_ONLY
 
 
 @pytest.mark.parametrize(

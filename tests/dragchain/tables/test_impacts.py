@@ -54,11 +54,6 @@ def test_a_pull_at_the_end_belongs_to_the_impact() -> None:
     assert found["duration_s"].tolist() == [1.0]
 
 
-def test_a_particle_without_loss_rebounds_as_fast() -> None:
-    found = find_impacts(rows([(0, -2, 0), (1, 0, 8), (2, 2, 0)]), DT)
-    assert found["restitution"].tolist() == [1]
-
-
 def test_gravity_between_the_surface_and_a_sample_is_taken_out() -> None:
     """Free flight on both sides of an impact that leaves half of the speed, 3 and 2 steps away."""
     fall, up, dt = 4.0, 2.0, 0.01

@@ -100,11 +100,6 @@ def test_a_contact_seen_from_the_other_particle_is_the_same() -> None:
     assert (other.a_id[0], other.b_id[0]) == (2, 1)
 
 
-def test_a_pull_is_negative() -> None:
-    particles = [[1, 0, 0, 5, 2, *CALM], [2, 2.9, 0, 5, 1, *CALM]]
-    assert rows_of(particles, [[1, 2, 0.5, 0, 0, 0.1]]).normal_force_n == pytest.approx(-0.5)
-
-
 def test_a_particle_on_the_floor() -> None:
     rows = rows_of([[7, 1, 2, 0.8, 1, 0.3, 0, 6, 0, 0, 0]])
     assert (KINDS[rows.kind[0]], rows.a_id[0], rows.b_id[0]) == ("particle-floor", 7, -1)
@@ -169,10 +164,6 @@ def test_rows_are_sorted_by_kind_and_ids() -> None:
     rows = rows_of(particles, [[3, 1, -1, 0, 0, 0.1], [1, 3, 1, 0, 0, 0.1]])
     assert rows.kind.tolist() == [0, 0, 2]
     assert rows.a_id.tolist() == [1, 3, 2]
-
-
-def test_an_empty_frame_has_no_contacts() -> None:
-    assert len(rows_of([]).kind) == 0
 
 
 @pytest.mark.parametrize("particles", [[], [[1, 0, 0, 5, 2, *CALM]]])

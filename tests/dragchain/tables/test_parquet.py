@@ -1,12 +1,9 @@
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from made_run import Raw
 from spoilt_dumps import NAMES, ROWS, SPOILT, text
 
 from dragchain.tables.parquet import (
@@ -97,49 +94,3 @@ def test_a_table_of_the_frames_before_damage(tmp_path: Path) -> None:
     with pytest.raises(DumpError, match=f"row 0.*\n.*\n  kept:   2 frames, which are in {table}"):
         dump_to_parquet(tmp_path / "a.dump", table)
     assert pq.read_table(table)["step"].to_pylist() == [0, 0, 0]
-
-
-PEAK = """
-import re, sys
-from pathlib import Path
-from dragchain.tables.parquet import dump_to_parquet
-def peak():
-    status = Path("/proc/self/status").read_text()
-    return 1024 * int(re.search(r"VmHWM:\\s*(\\d+)", status).group(1))
-names = sys.argv[1:]
-for size in ("small", "large"):
-    for kind in ("dump", "bin"):
-        columns = names if kind == "bin" else None
-        dump_to_parquet(f"{size}.{kind}", f"{size}.{kind}.parquet", columns)
-        print(peak())
-"""
-KINDS = ["dump", "bin"]
-LARGE = 300
-
-
-@pytest.fixture(scope="module")
-def peaks(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[int]]:
-    """Folder of tables of small and twelve times larger dumps; peaks of memory on the way, B."""
-    folder = tmp_path_factory.mktemp("dumps")
-    rows = np.random.default_rng(1).normal(size=(12_000, 3))
-    rows[:, 0] = np.arange(len(rows))
-    text = Raw.text(5, rows.tolist(), NAMES, "custom")
-    frames = text, Raw.binary(5, rows.tolist(), 3)
-    for kind, frame in zip(KINDS, frames, strict=True):
-        (folder / f"small.{kind}").write_bytes(frame * (LARGE // 12))
-        (folder / f"large.{kind}").write_bytes(frame * LARGE)
-    command = [sys.executable, "-c", PEAK, *NAMES]
-    found = subprocess.check_output(command, cwd=folder, text=True)
-    return folder, [int(line) for line in found.split()]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", KINDS)
-def test_memory_does_not_grow_with_the_file(peaks, kind) -> None:
-    """Twelve times the frames may not take more than a few row groups more."""
-    folder, found = peaks
-    before, after = found[len(KINDS) - 1], found[len(KINDS) + KINDS.index(kind)]
-    table = pq.ParquetFile(folder / f"large.{kind}.parquet")
-    assert table.metadata.num_rows == LARGE * 12_000
-    assert after < 500e6
-    assert after - before < 60e6

@@ -7,23 +7,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_run import particles_kept, run_json
 
 from dragchain.errors import TableError
 from dragchain.tradeoff.measure_run import CountedPath, band_pass, write_measures
 from dragchain.tradeoff.measures import QUANTITIES, Measures
 from dragdeck.records.packing import Packing
-from dragdeck.records.run import AcceptanceCheck
 
 SPACING, COUNT = 0.1, 600
 BED = Packing(
-    bed_height_m=0.07,
-    top_m=0.08,
-    solid_fraction=0.6,
-    n_particles=4,
-    radius_mean_m=0.003,
-    radius_std_m=0.0,
-    kinetic_energy_ratio=0.0,
-)
+    bed_height_m=0.07, top_m=0.08, solid_fraction=0.6, n_particles=4, radius_mean_m=0.003,
+    radius_std_m=0.0, kinetic_energy_ratio=0.0,
+)  # fmt: skip
 
 
 def series() -> np.ndarray:
@@ -92,16 +87,11 @@ def test_squares_are_rooted_after_their_mean() -> None:
     assert named["drag_std"].of_blocks(blocks) == 2.0
 
 
-OUTCOME = {
-    "schema": 2, "inputs": "0f", "state": "complete", "checks": [],
-    "steps": 50, "wall_time_s": 2.0, "ranks": 2,
-    "engine_version": "3.8.0", "started": "2026-01-01T00:00:00+00:00",
-}  # fmt: skip
-
-
 def measured(folder: Path, **outcome: object) -> Measures:
     """The measures of the tiny run as they are read from their file."""
-    (folder / "outcome.json").write_text(json.dumps(OUTCOME | outcome))
+    (folder / "outcome.json").write_text(
+        json.dumps(run_json(steps=50, wall_time_s=2.0, checks=[]) | outcome)
+    )
     (folder / "packing.json").write_text(BED.as_text())
     found = write_measures(folder, folder / "packing.json")
     assert Measures.read(folder / "measures.json") == found
@@ -129,26 +119,14 @@ def test_a_run_by_hand(tiny_run: Path) -> None:
 
 
 def test_a_failed_run_says_only_how_it_failed(tiny_run: Path) -> None:
-    limits = AcceptanceCheck(
-        code="within_limits",
-        name="energy and speed within limits",
-        passed=False,
-        seen="3 m/s",
-        limit="1",
-    )
-    checks = [
-        {"code": "particles_kept", "name": "no particle lost", "passed": False,
-         "seen": "3 particles", "limit": "4"},
-        {"code": "finite_numbers", "name": "finite numbers", "passed": True, "seen": "all",
-         "limit": "no NaN"},
-        limits.model_dump(),
-    ]  # fmt: skip
+    kept = particles_kept(3)
+    fast = kept | {"code": "within_limits", "name": "speed within limits", "seen": "3 m/s"}
+    passed = kept | {"code": "finite_numbers", "passed": True}
+    checks = [kept, passed, fast]
     found = measured(tiny_run, state="failed", checks=checks)
     assert not found.complete and not found.blocks
     assert [check.code for check in found.failure] == ["particles_kept", "within_limits"]
-    assert (
-        found.why_failed == "no particle lost: 3 particles; energy and speed within limits: 3 m/s"
-    )
+    assert found.why_failed == "no particle lost: 3; speed within limits: 3 m/s"
     assert found.cost.cpu_time_s == 4.0
     assert found.cost.steps_per_m == pytest.approx(1.0 / (1e-4 * 1e-3))
 

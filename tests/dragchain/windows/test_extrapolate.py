@@ -2,7 +2,9 @@
 
 import json
 import math
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from figure_files import case_json
@@ -17,58 +19,61 @@ from dragchain.windows.estimate import Round, WindowedQuantity, WindowOfRun
 from dragchain.windows.extrapolate import extrapolate_run
 
 
-def test_a_run_without_windows_is_measured_and_not_corrected(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    blocks = (30.0, 31.0, 29.0, 30.5, 29.5, 30.0, 31.0, 29.0, 30.0)
-    along = PathQuantities(arc_m=0.1, block_m=0.01, blocks={"workpiece_contacts": blocks})
-    monkeypatch.setattr(extrapolate, "quantities_along", lambda *_: along)
-    for scale in (0.01, 1.0):
+@pytest.fixture
+def contacts(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Extrapolated]:
+    """What is found of a run whose blocks have these numbers of contacts."""
+
+    def found(folder: Path, blocks: tuple[float, ...], scale: float, **asked: Any) -> Extrapolated:
+        along = PathQuantities(arc_m=0.1, block_m=0.01, blocks={"workpiece_contacts": blocks})
+        monkeypatch.setattr(extrapolate, "quantities_along", lambda *_: along)
         case = case_json("process")
         case["fidelity"]["youngs_modulus_scale"] = scale
-        (tmp_path / "case.json").write_text(json.dumps(case))
-        extrapolate_run(tmp_path, WINDOWS_RECORD)
-        (contacts,) = Extrapolated.read(tmp_path / EXTRAPOLATED).quantities
-        assert contacts.measured.value == pytest.approx(30.0)
-        assert contacts.measured.ci95_low < 29.8 < 30.2 < contacts.measured.ci95_high
-        assert contacts.value == (contacts.measured if scale == 1.0 else None)
+        case |= {"asked": {**ASKED, **asked}} if asked else {}
+        (folder / "case.json").write_text(json.dumps(case))
+        extrapolate_run(folder, WINDOWS_RECORD)
+        return Extrapolated.read(folder / EXTRAPOLATED)
+
+    return found
 
 
-def test_a_stiff_run_says_whether_it_is_inside_the_tolerance(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+STEADY = (30.0, 31.0, 29.0, 30.5, 29.5, 30.0, 31.0, 29.0, 30.0)
+UNEVEN = (30.0, 40.0, 20.0, 35.0, 25.0, 30.0, 40.0, 20.0, 30.0)
+
+
+@pytest.mark.parametrize("scale", [0.01, 1.0])
+def test_a_run_without_windows_is_measured_and_not_corrected(
+    contacts: Callable[..., Extrapolated], tmp_path: Path, scale: float
 ) -> None:
-    blocks = (30.0, 40.0, 20.0, 35.0, 25.0, 30.0, 40.0, 20.0, 30.0)
-    along = PathQuantities(arc_m=0.1, block_m=0.01, blocks={"workpiece_contacts": blocks})
-    monkeypatch.setattr(extrapolate, "quantities_along", lambda *_: along)
-    case = case_json("process")
-    case["fidelity"]["youngs_modulus_scale"] = 1.0
-    case["asked"] = {
-        "tolerance": 0.1, "quantities": ["workpiece_contacts"], "error": None,
-        "relative_cost": 0.3, "largest_cost": 0.3, "fallback": None,
-    }  # fmt: skip
-    for tolerance, reached in ((0.1, False), (0.5, True)):
-        case["asked"]["tolerance"] = tolerance
-        (tmp_path / "case.json").write_text(json.dumps(case))
-        extrapolate_run(tmp_path, WINDOWS_RECORD)
-        found = Extrapolated.read(tmp_path / EXTRAPOLATED)
-        assert found.tolerance is not None and found.tolerance.reached == reached
+    (one,) = contacts(tmp_path, STEADY, scale).quantities
+    assert one.measured.value == pytest.approx(30.0)
+    assert one.measured.ci95_low < 29.8 < 30.2 < one.measured.ci95_high
+    assert one.value == (one.measured if scale == 1.0 else None)
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "more", "reached"),
+    [(0.1, [], False), (0.5, [], True), (0.5, ["drag_mean"], False)],  # no drag is known
+)
+def test_a_stiff_run_says_whether_it_is_inside_the_tolerance(
+    contacts: Callable[..., Extrapolated],
+    tmp_path: Path,
+    tolerance: float,
+    more: list[str],
+    reached: bool,
+) -> None:
+    quantities = ["workpiece_contacts", *more]
+    found = contacts(tmp_path, UNEVEN, 1.0, tolerance=tolerance, quantities=quantities)
+    assert found.tolerance is not None and found.tolerance.reached == reached
+    assert ("does not give" in found.said) == (not reached)
+    if not more:
         assert (found.tolerance.needed.packings > 1) == (not reached)
-        assert ("does not give" in found.said) == (not reached)
-    case["asked"]["quantities"] = ["workpiece_contacts", "drag_mean"]
-    (tmp_path / "case.json").write_text(json.dumps(case))
-    extrapolate_run(tmp_path, WINDOWS_RECORD)
-    found = Extrapolated.read(tmp_path / EXTRAPOLATED)
-    assert found.tolerance is not None and not found.tolerance.reached  # no drag is known
 
 
 def test_a_tolerance_of_the_restitution_says_nothing_of_the_process(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    contacts: Callable[..., Extrapolated], tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(extrapolate, "quantities_along", lambda *_: PathQuantities())
-    case = case_json("process") | {"asked": {**ASKED, "quantities": ["restitution"], "error": 0.1}}
-    (tmp_path / "case.json").write_text(json.dumps(case))
-    extrapolate_run(tmp_path, WINDOWS_RECORD)
-    assert Extrapolated.read(tmp_path / EXTRAPOLATED).tolerance is None
+    asked = {"quantities": ["restitution"], "error": 0.1}
+    assert contacts(tmp_path, STEADY, 0.01, **asked).tolerance is None
 
 
 def test_windows_give_the_values_they_have_and_say_which_they_are(tmp_path: Path) -> None:

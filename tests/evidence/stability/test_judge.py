@@ -98,38 +98,21 @@ def test_a_safe_step_has_no_unsafe_step_below(classes: tuple[str, ...], safe: fl
 
 
 def points(condition: str, classes: list[str], restitution: float = 0.9) -> pd.DataFrame:
-    fractions = [0.1, 0.2, 0.4, 0.8][: len(classes)]
-    return pd.DataFrame(
-        {
-            "regime": "settle",
-            "condition": condition,
-            "axis": "base" if condition == "a" else "restitution",
-            "label": condition,
-            "fraction": fractions,
-            "reference": [n == 0 for n in range(len(classes))],
-            "class": classes,
-            "why": "",
-            "rayleigh_time_s": 2e-5,
-            "critical_step_s": 1e-5,
-            "damped_fraction": 1.0,
-            "setting_restitution": restitution,
-        }
-    )
+    return table(*classes).assign(
+        regime="settle", condition=condition, label=condition, why="",
+        axis="base" if condition == "a" else "restitution",
+        reference=[n == 0 for n in range(len(classes))], rayleigh_time_s=2e-5,
+        critical_step_s=1e-5, damped_fraction=1.0, setting_restitution=restitution,
+    )  # fmt: skip
 
 
 def test_a_regime_is_as_safe_as_its_worst_condition() -> None:
-    found = conditions(
-        pd.concat(
-            [
-                points("a", [STABLE, STABLE, STABLE, LOST]),
-                points("b", [STABLE, STABLE, ENERGY, LOST], restitution=0.1),
-                points("c", [OVERLAP, STABLE, STABLE, STABLE]),
-            ]
-        )
+    all_points = (
+        points("a", [STABLE, STABLE, STABLE, LOST]),
+        points("b", [STABLE, STABLE, ENERGY, LOST], restitution=0.1),
+        points("c", [OVERLAP, STABLE, STABLE, STABLE]),
     )
-    rows = regimes(found)
-    assert list(rows) == ["settle"]
-    row = rows["settle"]
+    row = regimes(conditions(pd.concat(all_points)))["settle"]
     assert row.conditions == 3 and row.usable == 2
     assert row.base_fraction == 0.4 and row.ordinary_fraction == 0.4
     assert row.safe_fraction == 0.2 and row.limited_by == "b"

@@ -139,15 +139,6 @@ def test_a_list_that_cannot_be_used_is_named_with_its_field(tmp_path: Path) -> N
         read_points([listed(tmp_path, regime="bounce")])
 
 
-def test_a_label_names_what_differs_from_the_base_point(tmp_path: Path) -> None:
-    (run,) = read_points([listed(tmp_path)])
-    assert run.point.label(SETTINGS) == "base point"
-    (run,) = read_points([listed(tmp_path, settings={**SETTINGS, "friction": 2.0})])
-    assert run.point.label(SETTINGS) == "friction 2"
-    (run,) = read_points([listed(tmp_path, axis="restitution")])
-    assert run.point.label(SETTINGS) == "e 0.86"
-
-
 def test_a_run_counts_if_it_ended(tmp_path: Path) -> None:
     (run,) = read_points([listed(tmp_path)])
     assert run.record is None and not run.measurable

@@ -23,7 +23,7 @@ from evidence.verification.checks import (
     momentum_changes,
     published_curve,
 )
-from evidence.verification.report import in_words, verdict, worst_rows
+from evidence.verification.report import verdict, worst_rows
 
 
 def test_a_verdict_depends_on_the_error_and_on_the_reference() -> None:
@@ -127,9 +127,3 @@ def test_the_summary_keeps_the_worst_point_and_a_failure_is_named(tmp_path: Path
         verdict(tmp_path)
     summary.assign(verdict="pass").to_parquet(tmp_path / "verification.parquet")
     assert verdict(tmp_path).startswith("1 pass, 0 fail")
-
-
-def test_units_are_read_from_the_end_of_a_name() -> None:
-    assert in_words("floor_force_n") == "floor force (N)"
-    assert in_words("spin_up_rad_s2") == "spin up (rad/s²)"
-    assert in_words("rebound_over_approach") == "rebound over approach"

@@ -1,0 +1,459 @@
+"""Cases side by side: differences with intervals, load maps on one scale, effects of factors.
+
+Cases are compared with the first one. Where both have the same packings (seeds), the differences
+are taken packing by packing, so that what the packings have in common cancels.
+"""
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from pydantic import JsonValue
+
+from dragchain.arrays import Floats
+from dragchain.drag import circumference
+from dragchain.errors import TableError
+from dragchain.figures.panels import head, new_panels
+from dragchain.figures.style import MARKERS, SERIES, WIDE_IN, force_map
+from dragchain.report.campaign import write_report
+from dragchain.report.cases import ReportedCase, StudyRuns, cases_of, read_study_runs
+from dragchain.report.page import (
+    NETWORK_PAGE,
+    TIMES,
+    render_page,
+    with_interval,
+    write_bundle,
+)
+from dragchain.run.basis import QUANTITIES, Quantity, Standing
+from dragchain.run.case import changed_inputs
+from dragchain.statistics.estimate import Estimate, flattened, mean_of
+from dragchain.tables.by_step import read_table
+from dragchain.tradeoff.measure_run import MAP_AZIMUTHS, MAP_DEPTHS, loading_along
+
+_LARGEST_MODEL = 4
+"""Factors whose interactions are estimated at most."""
+
+
+@dataclass(frozen=True)
+class ComparedCase:
+    """A case of a comparison, with its name there."""
+
+    name: str
+    case: ReportedCase
+
+    @cached_property
+    def by_seed(self) -> Mapping[JsonValue, StudyRuns]:
+        """Its process runs by the seed of their packing."""
+        return {one.process.case.inputs.get("seed"): one for one in self.case.studies}
+
+    @cached_property
+    def load_maps(self) -> Mapping[JsonValue, Floats]:
+        """Mean normal load of each packing by depth and azimuth, N."""
+        return {seed: _load_map(one) for seed, one in self.by_seed.items()}
+
+
+@dataclass(frozen=True)
+class CaseDifference:
+    """A quantity of a case beside that of the first one.
+
+    Attributes
+    ----------
+    name : str
+        Of the case.
+    quantity : Quantity
+    first, value : Estimate
+        In the first case, and in this one.
+    difference : Estimate
+        Of the two; the interval is NaN where a single packing gives none.
+    basis : str
+        Whether both are as simulated, or from windows.
+    paired : bool
+        Whether it is the mean over packings that both cases have.
+    """
+
+    name: str
+    quantity: Quantity
+    first: Estimate
+    value: Estimate
+    difference: Estimate
+    basis: str
+    paired: bool
+
+    @property
+    def relative(self) -> Estimate:
+        """The difference over the value in the first case: positive where this one is larger."""
+        size = self.first.value
+        return self.difference.over(size) if size else Estimate(math.nan, math.nan, math.nan)
+
+    @property
+    def verdict(self) -> str:
+        """Whether the interval excludes zero, and what that says of the magnitude."""
+        if not self.difference.known or self.difference.contains(0.0):
+            return "undecided" if self.difference.known else "no interval"
+        return "larger" if self.relative.value > 0 else "smaller"
+
+
+def differences(first: ComparedCase, other: ComparedCase) -> list[CaseDifference]:
+    """Every quantity that two cases have."""
+    found = []
+    for quantity in QUANTITIES:
+        pair = [one.case.values.of(quantity.name) for one in (first, other)]
+        if all(pair):
+            found.append(_difference(quantity, first, other))
+    return found
+
+
+def _difference(quantity: Quantity, first: ComparedCase, other: ComparedCase) -> CaseDifference:
+    several = [_standings(one, quantity) for one in (first, other)]
+    corrected = all(one.corrected for packings in several for one in packings.values())
+    before, after = (_mean(one, quantity, corrected) for one in (first, other))
+    own = [
+        {seed: _number(one, corrected).value for seed, one in packings.items()}
+        for packings in several
+    ]
+    paired = len(own[0]) > 1 and own[0].keys() == own[1].keys()
+    if paired:
+        change = mean_of([own[1][seed] - own[0][seed] for seed in own[0]])
+    else:
+        widths = [one.ci95_high - one.ci95_low for one in (before, after)]
+        change = Estimate.around(after.value - before.value, 0.5 * math.hypot(*widths))
+    basis = str(next(iter(several[0].values())).basis) if corrected else "as simulated"
+    return CaseDifference(other.name, quantity, before, after, change, basis, paired)
+
+
+def _standings(one: ComparedCase, quantity: Quantity) -> dict[JsonValue, Standing]:
+    found = {seed: study.values.of(quantity.name) for seed, study in one.by_seed.items()}
+    return {seed: standing for seed, standing in found.items() if standing}
+
+
+def _number(standing: Standing, corrected: bool) -> Estimate:
+    return standing.shown if corrected else standing.run
+
+
+def _mean(one: ComparedCase, quantity: Quantity, corrected: bool) -> Estimate:
+    standing = one.case.values.of(quantity.name)
+    assert standing is not None
+    return _number(standing, corrected)
+
+
+# --- factors -------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class FactorEffect:
+    """What a factor does to a quantity, or two of them together.
+
+    Attributes
+    ----------
+    quantity : Quantity
+    factors : tuple of str
+        One: the change from its lowest to its highest level, averaged over the other factors.
+        Two: half of the difference between the effects of the first at the highest and at the
+        lowest level of the second.
+    effect : Estimate
+    """
+
+    quantity: Quantity
+    factors: tuple[str, ...]
+    effect: Estimate
+
+
+def factors_of(cases: Sequence[ComparedCase]) -> dict[str, list[JsonValue]]:
+    """Inputs that are set independently of each other, with the level of each case.
+
+    Empty unless there are at least two, and every combination of their levels is a case.
+    """
+    inputs = [one.case.first.process.case.inputs for one in cases]
+    names = {name for other in inputs[1:] for name in changed_inputs(other, inputs[0])} - {"seed"}
+    found = {name: [one.get(name) for one in inputs] for name in sorted(names)}
+    levels = [{repr(level) for level in column} for column in found.values()]
+    combined = {tuple(map(repr, row)) for row in zip(*found.values(), strict=True)}
+    crossed = len(combined) == math.prod(map(len, levels)) == len(cases)
+    return found if len(found) > 1 and crossed else {}
+
+
+def effects_of(
+    cases: Sequence[ComparedCase], factors: Mapping[str, Sequence[JsonValue]], quantity: Quantity
+) -> list[FactorEffect]:
+    """Main effects and interactions of two factors on a quantity, by least squares.
+
+    Levels are coded from -1 to 1: numbers in proportion, others in their order. A packing that all
+    cases share is a block. Interactions are left out where too few runs remain for the scatter.
+    """
+    from statsmodels.formula.api import ols
+
+    codes = {f"x{k}": _coded(levels) for k, levels in enumerate(factors.values())}
+    rows = [
+        {"y": standing.run.value, "seed": seed, **{name: code[k] for name, code in codes.items()}}
+        for k, one in enumerate(cases)
+        for seed, standing in _standings(one, quantity).items()
+    ]
+    frame = pd.DataFrame(rows)
+    if len(frame) < len(cases) or not 0.0 < np.ptp(frame["y"]) < math.inf:
+        return []
+    shared = all(one.by_seed.keys() == cases[0].by_seed.keys() for one in cases)
+    block = " + C(seed)" if shared and len(cases[0].by_seed) > 1 else ""
+    pairs = list(combinations(codes, 2)) if len(codes) <= _LARGEST_MODEL else []
+    for terms in ([*codes, *(":".join(pair) for pair in pairs)], [*codes]):
+        fit = ols(f"y ~ {' + '.join(terms)}{block}", frame).fit()
+        if fit.df_resid >= 1:
+            break
+    else:
+        return []
+    names, ends = dict(zip(codes, factors, strict=True)), fit.conf_int()
+    return [
+        FactorEffect(
+            quantity,
+            tuple(names[code] for code in term.split(":")),
+            Estimate(2 * fit.params[term], *(2 * ends.loc[term])),
+        )
+        for term in terms
+    ]
+
+
+def _coded(levels: Sequence[JsonValue]) -> Floats:
+    numeric = all(isinstance(one, int | float) for one in levels)
+    if numeric:
+        places = np.array(levels, dtype=np.float64)
+    else:
+        order = list(dict.fromkeys(map(repr, levels)))
+        places = np.array([order.index(repr(one)) for one in levels], dtype=np.float64)
+    coded: Floats = 2 * (places - places.min()) / np.ptp(places) - 1
+    return coded
+
+
+# --- figures -------------------------------------------------------------------------------------
+
+
+def _load_map(study: StudyRuns) -> Floats:
+    """Load map of a run: that from its windows where it has one."""
+    found = study.extrapolated.load_map if study.extrapolated else None
+    if found is not None:
+        return np.array(found.value).reshape(MAP_DEPTHS, MAP_AZIMUTHS)
+    return loading_along(study.process.folder, study.process.case, 1)[1]
+
+
+def draw_maps(cases: Sequence[ComparedCase]) -> Figure:
+    """Load maps on one scale and, below, the differences from the first.
+
+    A dot marks a patch whose 95 % interval over the packings excludes zero.
+    """
+    first, *others = cases
+    means = [np.mean([*one.load_maps.values()], axis=0) for one in cases]
+    figure, panels = new_panels(4.2, 2 * len(cases), WIDE_IN, len(cases), sharex=True, sharey=True)
+    scale = Normalize(0.0, max(float(mean.max()) for mean in means))
+    for axes, one, mean in zip(panels, cases, means, strict=False):
+        drawn = _patches(axes, mean, cmap=force_map(), norm=scale)
+        axes.set_title(one.name)
+    figure.colorbar(drawn, ax=panels[: len(cases)], label="normal load (N per patch)")
+    panels[len(cases)].set_visible(False)
+    changes = [mean - means[0] for mean in means[1:]]
+    largest = max(float(np.abs(change).max()) for change in changes)
+    below = panels[len(cases) + 1 :]
+    for axes, one, change in zip(below, others, changes, strict=True):
+        drawn = _patches(axes, change, cmap="RdBu_r", norm=Normalize(-largest, largest))
+        axes.set(title=f"{one.name}\nminus {first.name}", xlabel="azimuth from motion")
+        if len(one.load_maps) > 1 and one.load_maps.keys() == first.load_maps.keys():
+            _mark_certain(
+                axes, [one.load_maps[seed] - first.load_maps[seed] for seed in first.load_maps]
+            )
+    figure.colorbar(drawn, ax=below, label="difference (N per patch)")
+    for axes in panels[:: len(cases)]:
+        axes.set_ylabel("depth over immersion depth")
+    return figure
+
+
+def _patches(axes: Axes, values: Floats, **style: Any) -> Any:
+    azimuths = np.degrees(circumference(MAP_AZIMUTHS))
+    axes.set(
+        xticks=np.arange(-180, 181, 90), xticklabels=["back", "right", "ahead", "left", "back"]
+    )
+    axes.set_ylim(1.0, 0.0)
+    axes.grid(False)
+    return axes.pcolormesh(azimuths, np.linspace(0, 1, MAP_DEPTHS + 1), values, **style)
+
+
+def _mark_certain(axes: Axes, changes: Sequence[Floats]) -> None:
+    azimuths = np.degrees(circumference(MAP_AZIMUTHS))
+    for level, sector in np.ndindex(MAP_DEPTHS, MAP_AZIMUTHS):
+        if not mean_of([change[level, sector] for change in changes]).contains(0.0):
+            middle = 0.5 * (azimuths[sector] + azimuths[sector + 1])
+            axes.plot(middle, (level + 0.5) / MAP_DEPTHS, ".", color="black")
+
+
+def draw_response(
+    cases: Sequence[ComparedCase],
+    factors: Mapping[str, Sequence[JsonValue]],
+    quantities: Sequence[Quantity],
+) -> Figure:
+    """Quantities against the first factor, a line for each combination of the others."""
+    (across, places), *others = factors.items()
+    labels = [
+        ", ".join(f"{name.rpartition('.')[2]} {levels[k]}" for name, levels in others)
+        for k in range(len(cases))
+    ]
+    figure, panels = new_panels(3.4, len(quantities), WIDE_IN)
+    for axes, quantity in zip(panels, quantities, strict=True):
+        for number, label in enumerate(dict.fromkeys(labels)):
+            here = [k for k, own in enumerate(labels) if own == label]
+            found = [_mean(cases[k], quantity, corrected=False) for k in here]
+            value, low, high = np.array(
+                [(one.value, one.ci95_low, one.ci95_high) for one in found]
+            ).T
+            reach = np.nan_to_num([value - low, high - value])
+            style: dict[str, Any] = {
+                "color": SERIES[number % len(SERIES)],
+                "marker": MARKERS[number % len(MARKERS)],
+            }
+            axes.errorbar([_place(places[k]) for k in here], value, reach, label=label, **style)
+        unit = f" ({quantity.unit})" if quantity.unit else ""
+        axes.set(xlabel=across, ylabel=f"{quantity.label}{unit}")
+        axes.set_xticks(list(dict.fromkeys(map(_place, places))))
+    panels[0].legend()
+    head(figure, "bars: 95 % confidence interval of each case")
+    return figure
+
+
+def _place(level: JsonValue) -> float | str:
+    return level if isinstance(level, int | float) else str(level)
+
+
+# --- the report ----------------------------------------------------------------------------------
+
+
+def read_compared(folders: Sequence[Path]) -> list[ComparedCase]:
+    """The cases of studies and of single process runs, in the order given.
+
+    Parameters
+    ----------
+    folders : sequence of Path
+        ``results/STUDY`` with a report, or folders of process runs.
+
+    Raises
+    ------
+    TableError
+        If there are fewer than two cases, or a study has no report.
+    RejectedRunError, DocumentError
+        If a run cannot be used.
+    """
+    studies: dict[str, list[StudyRuns]] = {}
+    for folder in folders:
+        for run_dir in _process_runs(folder):
+            one = read_study_runs(run_dir)
+            studies.setdefault(one.process.case.study, []).append(one)
+    grouped = {study: cases_of(runs) for study, runs in studies.items()}
+    cases = [
+        ComparedCase(_name(study, case, len(grouped), len(found)), case)
+        for study, found in grouped.items()
+        for case in found
+    ]
+    if len(cases) < 2:
+        known = ", ".join(one.name for one in cases)
+        raise TableError(
+            f"a comparison has at least two cases, and this one has only {known}: name another "
+            "study, or one with a sweep (packings of one case are one case)"
+        )
+    return cases
+
+
+def _process_runs(folder: Path) -> list[Path]:
+    if (folder / "case.json").is_file():
+        return [folder]
+    summary = read_table(folder / "report" / "summary.parquet", ["run"])
+    return [folder / "process" / run for run in summary["run"].drop_duplicates()]
+
+
+def _name(study: str, case: ReportedCase, studies: int, cases: int) -> str:
+    if studies == 1:
+        return case.name
+    return study if cases == 1 else f"{study}: {case.name}"
+
+
+def write_comparison(out_dir: Path, folders: Sequence[Path]) -> None:
+    """Write ``comparison.html``, ``differences.csv``, ``effects.csv`` and the linked networks.
+
+    Parameters
+    ----------
+    out_dir : Path
+        Where they go; made if need be.
+    folders : sequence of Path
+        See `read_compared`, whose errors it raises.
+    """
+    cases = read_compared(folders)
+    first, *others = cases
+    rows = [row for other in others for row in differences(first, other)]
+    by_quantity = {one: [row for row in rows if row.quantity == one] for one in QUANTITIES}
+    notes = Counter(note for one in cases for note in one.case.values.notes)
+    factors = factors_of(cases)
+    measured = [one for one in QUANTITIES if first.case.values.of(one.name)]
+    effects = (
+        [row for one in measured for row in effects_of(cases, factors, one)] if factors else []
+    )
+    linked = _write_networks(out_dir, cases)
+    inputs = [one.case.first.process.case.inputs for one in cases]
+    changed = sorted({name for own in inputs[1:] for name in changed_inputs(own, inputs[0])})
+
+    def draw() -> dict[str, Figure]:
+        figures = {"maps": draw_maps(cases)}
+        if effects:
+            figures["response"] = draw_response(cases, factors, measured[:2])
+        return figures
+
+    tables = {"differences": _table(rows, "difference", "relative")}
+    if effects:
+        tables["effects"] = _table(effects, "effect")
+    write_report(
+        out_dir,
+        "compare/compare.html.j2",
+        draw=draw,
+        tables=tables,
+        name="comparison",
+        filters={"relative": _relative, "joined": f" {TIMES} ".join},
+        cases=cases,
+        rows=rows,
+        by_quantity={one: found for one, found in by_quantity.items() if found},
+        notes=notes,
+        effects=effects,
+        linked=linked,
+        changed=[(name, [own.get(name) for own in inputs]) for name in changed],
+    )
+
+
+def _relative(estimate: Estimate) -> str:
+    return with_interval(estimate.over(0.01), "%")
+
+
+def _table(rows: Sequence[CaseDifference | FactorEffect], *estimates: str) -> pd.DataFrame:
+    """Rows as a table, with their estimates in three columns each."""
+    found = []
+    for row in rows:
+        plain: dict[str, object] = {"quantity": row.quantity.name, "unit": row.quantity.unit}
+        if isinstance(row, CaseDifference):
+            plain |= {"case": row.name, "first": row.first.value, "value": row.value.value}
+            plain |= {"basis": row.basis, "paired": row.paired}
+        else:
+            plain["factors"] = " x ".join(row.factors)
+        found.append(flattened(plain | {name: getattr(row, name) for name in estimates}))
+    return pd.DataFrame(found)
+
+
+def _write_networks(out_dir: Path, cases: Sequence[ComparedCase]) -> bool:
+    """Copy the contact networks of the cases side by side on one page; whether all have one."""
+    files = [one.case.first.process.folder / NETWORK_PAGE for one in cases]
+    if not all(file.is_file() for file in files):
+        return False
+    copies = {f"network-{number}.html": file.read_bytes() for number, file in enumerate(files, 1)}
+    shown = list(zip(copies, (one.name for one in cases), strict=True))
+    page = render_page("compare/networks.html.j2", shown=shown)
+    write_bundle(out_dir, files=copies, pages={"networks": page})
+    return True

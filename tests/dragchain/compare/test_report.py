@@ -1,0 +1,103 @@
+"""Cases side by side: differences, effects of factors, and the page."""
+
+import math
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from pages import stands_alone
+from report_files import PICTURES, case_json, make_run, process_findings, write_quantities
+
+from dragchain.compare.report import read_compared, write_comparison
+from dragchain.errors import TableError
+from dragchain.report.values import EXTRAPOLATED, Extrapolated, LoadMap
+
+DEPTH, SPEED, TOGETHER = 0.8, 0.3, 0.1
+PACKING = {11: 0.5, 12: -0.2, 13: 0.05}
+"""What a packing adds to the drag of every case, N."""
+
+
+def drag(deep: int, fast: int, seed: int) -> float:
+    """Planted: effects from low to high, their interaction, the packing, a bit of scatter."""
+    x, y = 2 * deep - 1, 2 * fast - 1
+    scatter = 0.01 * math.sin(7 * deep + 3 * fast + seed)
+    return (DEPTH * x + SPEED * y + TOGETHER * x * y) / 2 + PACKING[seed] + scatter
+
+
+def study(results: Path, seeds: tuple[int, ...] = tuple(PACKING)) -> list[Path]:
+    """A sweep over two fields with their packings."""
+    folders = []
+    for deep, fast, seed in product((0, 1), (0, 1), seeds):
+        inputs = {"depth": (0.02, 0.04)[deep], "speed": (0.1, 0.3)[fast], "seed": seed}
+        name = f"deep-{deep}_fast-{fast}_seed-{seed}"
+        case = case_json("process", name, case=name, inputs=inputs)
+        folder = make_run(results, case, process_findings(drag(deep, fast, seed)), PICTURES)
+        write_quantities(folder)
+        patches = np.full(48, 0.1 + 0.1 * deep) + 0.01 * np.sin(seed * np.arange(48))
+        found = LoadMap(soft=patches, value=patches, std=np.zeros(48), soft_error=0.1, error=0.05)
+        whole = Extrapolated.read(folder / EXTRAPOLATED)
+        whole.model_copy(update={"load_map": found}).write(folder / EXTRAPOLATED)
+        (folder / "network.html").write_text("<p>network</p>")
+        folders.append(folder)
+    return folders
+
+
+def test_differences_are_taken_packing_by_packing(tmp_path: Path) -> None:
+    folders = study(tmp_path)
+    write_comparison(tmp_path / "out", folders)
+    table = pd.read_csv(tmp_path / "out/differences.csv").set_index(["case", "quantity"])
+    row = table.loc[("deep-1_fast-0", "drag_mean")]
+    own = [drag(1, 0, seed) - drag(0, 0, seed) for seed in PACKING]
+    half = 4.302652730 * np.std(own, ddof=1) / math.sqrt(3)  # Student's t with two degrees
+    assert row["paired"]
+    assert row["difference"] == pytest.approx(np.mean(own))
+    assert row["difference_ci95_high"] - row["difference"] == pytest.approx(half)
+    assert row["relative"] == pytest.approx(np.mean(own) / row["first"])
+
+
+def test_different_packings_join_their_intervals(tmp_path: Path) -> None:
+    folders = [one for one in study(tmp_path) if "fast-0" in one.name]
+    shared = [one for one in folders if "deep-0_fast-0_seed-13" not in one.name]
+    write_comparison(tmp_path / "out", shared)
+    row = pd.read_csv(tmp_path / "out/differences.csv").set_index("quantity").loc["drag_mean"]
+    halves = []
+    for deep, seeds, quantile in ((0, (11, 12), 12.706204736), (1, (11, 12, 13), 4.302652730)):
+        values = [drag(deep, 0, seed) for seed in seeds]
+        halves.append(quantile * np.std(values, ddof=1) / math.sqrt(len(seeds)))
+    assert not row["paired"]
+    assert row["difference_ci95_high"] - row["difference"] == pytest.approx(math.hypot(*halves))
+
+
+def test_planted_effects_are_found(tmp_path: Path) -> None:
+    write_comparison(tmp_path / "out", study(tmp_path))
+    table = pd.read_csv(tmp_path / "out/effects.csv")
+    found = table[table["quantity"] == "drag_mean"].set_index("factors")
+    for factors, planted in (("depth", DEPTH), ("speed", SPEED), ("depth x speed", TOGETHER)):
+        row = found.loc[factors]
+        assert row["effect_ci95_low"] < planted < row["effect_ci95_high"]
+        assert row["effect_ci95_high"] - row["effect_ci95_low"] < 0.04
+
+
+def test_a_packing_of_each_case_leaves_no_interaction(tmp_path: Path) -> None:
+    write_comparison(tmp_path / "out", study(tmp_path, seeds=(11,)))
+    table = pd.read_csv(tmp_path / "out/effects.csv")
+    assert set(table["factors"]) == {"depth", "speed"}
+
+
+def test_page_and_linked_networks(tmp_path: Path) -> None:
+    write_comparison(tmp_path / "out", study(tmp_path))
+    text = (tmp_path / "out/comparison.html").read_text(encoding="utf-8")
+    page = stands_alone(text, beside=["networks.html"])
+    assert len(page.images) == 2
+    assert "deep-1_fast-1" in page.words
+    linked = (tmp_path / "out/networks.html").read_text(encoding="utf-8")
+    assert linked.count("<iframe") == 4
+    assert (tmp_path / "out/network-4.html").is_file()
+
+
+def test_one_case_is_refused(tmp_path: Path) -> None:
+    packings = [one for one in study(tmp_path) if "deep-0_fast-0" in one.name]
+    with pytest.raises(TableError, match="at least two cases"):
+        read_compared(packings)
