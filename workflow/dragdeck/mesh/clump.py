@@ -158,10 +158,10 @@ def convex_corners(file: Path) -> Floats:
 def fit_clump(corners: Floats, count: int) -> Clump:
     """Fit spheres to the convex hull of corners.
 
-    Spheres inside the body are the start of a least-squares fit of the distances between the body's
-    surface and the union of the spheres. The best of several starts counts whose spheres overlap, if
-    need be part of the way to the fit. At last all radii change by the same length, so that the
-    union has the volume of the body.
+    Spheres inside the body are the start of a least-squares fit of the distances between the
+    body's surface and the union of the spheres. The best of several starts counts whose spheres
+    overlap, if need be part of the way to the fit. At last all radii change by the same length, so
+    that the union has the volume of the body.
 
     Parameters
     ----------
