@@ -81,7 +81,7 @@ class Bodies:
             normal_force_n=along,
             tangential_force_n=np.linalg.norm(force - along[:, None] * normal, axis=1),
             overlap_m=_largest(at, len(first), rows.overlap_m),
-            removed_n=np.bincount(at, rows.removed_n, len(first)),
+            removed_n=_sum(at, rows.removed_n, len(first)),
         )
 
     def wall(self, contacts: WallContacts, at: Ints) -> tuple[WallContacts, Ints]:
@@ -102,7 +102,7 @@ class Bodies:
             force_n=force,
             normal=normal,
             overlap_m=_largest(group, len(first), contacts.overlap_m),
-            attraction_n=np.bincount(group, contacts.attraction_n, len(first)),
+            attraction_n=_sum(group, contacts.attraction_n, len(first)),
         )
         return whole, at[strongest]
 
@@ -142,12 +142,16 @@ def _joined(
 ) -> tuple[Floats, Floats, Floats]:
     """Sum of forces, direction of the normal forces' resultant and mean point of each group."""
     weight = np.maximum(normal_n, 0.0)
-    total = np.bincount(at, weight, count)
+    total = _sum(at, weight, count)
     weight = np.where(total[at] > 0, weight, 1.0)
     resultant = sums(at, weight[:, None] * normal, count)
     length = np.linalg.norm(resultant, axis=1, keepdims=True)
-    mean = sums(at, weight[:, None] * point, count) / np.bincount(at, weight, count)[:, None]
+    mean = sums(at, weight[:, None] * point, count) / _sum(at, weight, count)[:, None]
     return sums(at, force, count), resultant / np.where(length > 0, length, 1.0), mean
+
+
+def _sum(at: Ints, values: Floats, count: int) -> Floats:
+    return np.asarray(np.bincount(at, values, count), dtype=np.float64)
 
 
 def _largest(at: Ints, count: int, values: Floats) -> Floats:

@@ -1,6 +1,6 @@
 """The media of a study as numbers: radii, Rayleigh time, time steps, neighbour skin."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -92,32 +92,27 @@ class BodySize:
 
     Attributes
     ----------
-    of : BedClass
+    type : int
+        Of their material in LIGGGHTS.
     radius_m : float
         Of the sphere of equal volume.
+    density_kg_m3, mass_kg, inertia_kg_m2
+        The last is the three principal moments.
     count, first_id, first_sphere : int
         Number of the particles, id of the first one, and of its first sphere.
-    offsets_m, radii_m : (K, 3) and (K,) array
-        Spheres, in the principal frame about the centre of mass.
+    spheres_m : (K, 4) array
+        Places of the spheres, in the principal frame about the centre of mass, and radii.
     """
 
-    of: BedClass
+    type: int
     radius_m: float
+    density_kg_m3: float
+    mass_kg: float
+    inertia_kg_m2: Sequence[float]
     count: int
     first_id: int
     first_sphere: int
-    offsets_m: Array
-    radii_m: Array
-
-    @property
-    def inertia(self) -> Array:
-        """Principal moments over the mass, (3,), m2."""
-        return self.radius_m**2 * self.of.clump.inertia
-
-    @property
-    def rows(self) -> list[tuple[float, ...]]:
-        """Place and radius of each sphere, m."""
-        return [(*at, r) for at, r in zip(self.offsets_m.tolist(), self.radii_m, strict=True)]
+    spheres_m: Array
 
 
 def body_sizes(study: Study) -> list[BodySize]:
@@ -125,13 +120,17 @@ def body_sizes(study: Study) -> list[BodySize]:
     found: list[BodySize] = []
     body = sphere = 1
     for one in bed_classes(study) if study.media.clumped else ():
-        offsets, radii = one.clump.offsets, one.clump.radii
-        if len(radii) == 1:
-            offsets, radii = np.zeros((2, 3)), np.array([1.0, _CORE])
-        for size, count in zip(*np.unique(one.radii_m, return_counts=True), strict=True):
-            of_size = body, sphere, size * offsets, size * radii
-            found.append(BodySize(one, float(size), int(count), *of_size))
-            body, sphere = body + int(count), sphere + int(count) * len(radii)
+        material, kind = study.materials[one.material], 1 + study.type_names().index(one.material)
+        spheres = np.column_stack([one.clump.offsets, one.clump.radii])
+        if len(spheres) == 1:
+            spheres = np.vstack([spheres, _CORE * spheres])
+        for size, count in zip(*map(np.ndarray.tolist, np.unique(one.radii_m, return_counts=True)),
+                               strict=True):  # fmt: skip
+            mass = particle_mass(material, size)
+            inertia = (mass * size**2 * one.clump.inertia).tolist()
+            of_size = kind, size, material.density_kg_m3, mass, inertia, count
+            found.append(BodySize(*of_size, body, sphere, size * spheres))
+            body, sphere = body + count, sphere + count * len(spheres)
     return found
 
 

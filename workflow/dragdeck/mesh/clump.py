@@ -6,7 +6,6 @@ body's own: its origin is the centre of mass, its axes are the principal axes of
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -30,11 +29,11 @@ _FINE = 64
 _SMALLEST = 0.2
 """Radius of a sphere at least: smaller ones make the time step short and add little."""
 
-_STARTS = 3
-"""Starts of a fit beside the greedy one."""
+_STARTS = 4
+"""Starts of a fit."""
 
-_PARTS = (0.0, 0.3, 0.6, 0.8, 1.0)
-"""Fractions of the way from a start to its fit that are tried, since fits may fall apart."""
+_DRAWN = (1.0, 0.9, 0.8, 0.7, 0.6)
+"""Factors by which the spheres of a fit are drawn together, since fits may fall apart."""
 
 _MARGIN = 0.93
 """Spheres count as overlapping if they do with radii smaller by this factor."""
@@ -160,7 +159,7 @@ def fit_clump(corners: Floats, count: int) -> Clump:
 
     Spheres inside the body are the start of a least-squares fit of the distances between the
     body's surface and the union of the spheres. The best of several starts counts whose spheres
-    overlap, if need be part of the way to the fit. At last all radii change by the same length, so
+    overlap, if need be drawn together. At last all radii change by the same length, so
     that the union has the volume of the body.
 
     Parameters
@@ -178,11 +177,9 @@ def fit_clump(corners: Floats, count: int) -> Clump:
 
     mesh = body(corners)
     samples = np.asarray(sample_surface(mesh, _SAMPLES, seed=1)[0])
-    fits = []
-    for start in _inscribed(mesh, count):
-        fit = _fitted(samples, *start)
-        fits += [tuple((1 - part) * a + part * b for a, b in zip(start, fit, strict=True))
-                 for part in _PARTS]  # fmt: skip
+    starts, deepest = _inscribed(mesh, count)
+    found = [_fitted(samples, *start, _LARGEST * deepest) for start in starts]
+    fits = [(part * offsets, radii) for offsets, radii in found for part in _DRAWN]
     joined = [fit for fit in fits if _pieces(fit[0], _MARGIN * fit[1]) == 1]
     offsets, radii = min(
         joined or fits, key=lambda fit: float((_outside(samples, *fit) ** 2).sum())
@@ -246,33 +243,23 @@ def _grid(mesh: Trimesh, cells: int, room: float = 1.0) -> tuple[Floats, float]:
     return points, float(np.prod(2 * half / counts))
 
 
-def _inscribed(mesh: Trimesh, count: int) -> Iterator[tuple[Floats, Floats]]:
-    """Spheres inside a convex body from which a fit may start.
+def _inscribed(mesh: Trimesh, count: int) -> tuple[list[tuple[Floats, Floats]], float]:
+    """Spheres inside a convex body from which fits may start, and the radius of the largest there.
 
-    First those that cover most of it, one after the other, then some about the centres of parts
-    into which points of a grid fall.
+    They lie about the centres of parts into which points of a grid fall.
     """
     from scipy.cluster.vq import kmeans2
 
     points, _ = _grid(mesh, _CELLS)
     normals = np.asarray(mesh.face_normals)
-    start = np.einsum("fi,fi->f", normals, mesh.triangles[:, 0])
-    pieces = np.array_split(points, 64)
-    depth = np.concatenate([(start - piece @ normals.T).min(axis=1) for piece in pieces])
+    depth = (np.einsum("fi,fi->f", normals, mesh.triangles[:, 0]) - points @ normals.T).min(axis=1)
     points, depth = points[depth > 0], depth[depth > 0]
-    order = np.lexsort((np.linalg.norm(points, axis=1), -np.round(depth, 3)))
-    points, depth = points[order], depth[order]
-    free = np.ones(len(points), dtype=np.bool_)
-    nearest = np.linalg.norm(points[:, None] - points[None], axis=2)
-    within, chosen = nearest < depth[:, None], []
-    for _ in range(count):
-        chosen.append(int((within & free).sum(axis=1).argmax()))
-        free &= ~within[chosen[-1]]
-    yield points[chosen], depth[chosen]
+    starts = []
     for seed in range(_STARTS):
         middles = kmeans2(points, count, seed=seed, minit="++")[0]
-        chosen = np.linalg.norm(points[:, None] - middles[None], axis=2).argmin(axis=0).tolist()
-        yield points[chosen], depth[chosen]
+        chosen = np.linalg.norm(points[:, None] - middles, axis=2).argmin(axis=0)
+        starts.append((points[chosen], depth[chosen]))
+    return starts, float(depth.max())
 
 
 def _outside(points: Floats, offsets: Floats, radii: Floats) -> Floats:
@@ -283,7 +270,9 @@ def _outside(points: Floats, offsets: Floats, radii: Floats) -> Floats:
     return found
 
 
-def _fitted(samples: Floats, offsets: Floats, radii: Floats) -> tuple[Floats, Floats]:
+def _fitted(
+    samples: Floats, offsets: Floats, radii: Floats, largest: float
+) -> tuple[Floats, Floats]:
     """Spheres whose union comes as near to points of a surface as it can from this start."""
     from scipy.optimize import least_squares
 
@@ -311,6 +300,6 @@ def _fitted(samples: Floats, offsets: Floats, radii: Floats) -> tuple[Floats, Fl
     # a flat face would pull the centre of a sphere far away
     start = np.column_stack([offsets, np.maximum(radii, 1.01 * _SMALLEST)]).ravel()
     low = np.append(samples.min(axis=0), _SMALLEST)
-    high = np.append(samples.max(axis=0), _LARGEST * radii.max())
+    high = np.append(samples.max(axis=0), largest)
     bounds = np.tile(low, len(radii)), np.tile(high, len(radii))
     return split(least_squares(residuals, start, slopes, bounds, max_nfev=100).x)

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
-Array, Ints = NDArray[np.float64], NDArray[np.int64]
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

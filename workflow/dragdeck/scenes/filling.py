@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -49,7 +50,7 @@ from dragdeck.records.case import FillingCase
 from dragdeck.records.run import SettlingCriterion
 from dragdeck.scenes.scene import SceneType, case_of_study, material_table
 from dragdeck.study.base import Json
-from dragdeck.study.media import Media
+from dragdeck.study.media import MOST_SIZES, Media
 from dragdeck.study.model import Study
 from dragdeck.study.shapes import SOLID_FRACTION_ESTIMATE
 
@@ -64,33 +65,9 @@ _SETTLING_ESTIMATE_S = 0.5
 """Time from the last particle's arrival to rest, an estimate used for expectations only."""
 
 
-@dataclass(frozen=True)
-class Insertion:
-    """Clumps of one class and size, and how LIGGGHTS inserts them.
-
-    Attributes
-    ----------
-    body : BodySize
-    type : int
-        Of the material.
-    density_kg_m3, mass_kg : float
-    inertia_kg_m2 : (3,) array
-        Principal moments of inertia.
-    seeds : sequence of int
-        Three primes: of template, distribution and insertion.
-    """
-
-    body: BodySize
-    type: int
-    density_kg_m3: float
-    mass_kg: float
-    inertia_kg_m2: Sequence[float]
-    seeds: Sequence[int]
-
-
 @dataclass(frozen=True, kw_only=True)
 class FillingDeck(Deck):
-    """What the fill template sees; `insertions` of clumps only, into a space with this top, m."""
+    """What the fill template sees; for clumps with primes as seeds, and the top of the space, m."""
 
     bowl_type: int
     bowl_radius_m: float
@@ -99,7 +76,8 @@ class FillingDeck(Deck):
     check_steps: int
     most_checks: int
     max_time_s: float
-    insertions: Sequence[Insertion] = ()
+    insertions: Sequence[BodySize] = ()
+    seeds: Sequence[int] = ()
     space_top_m: float = 0.0
 
 
@@ -145,7 +123,8 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
         most_checks=math.ceil(longest / (check_steps * dt)),
         max_time_s=longest,
         clumped=study.media.clumped,
-        insertions=_insertions(study),
+        insertions=body_sizes(study),
+        seeds=primes(study.seed, 3 * MOST_SIZES * len(study.media.parts)),
         space_top_m=start.top_m,
     )
     return Scene(
@@ -201,8 +180,7 @@ def _models(study: Study) -> dict[str, str]:
     }
 
 
-@dataclass(frozen=True)
-class _Start:
+class _Start(NamedTuple):
     """Highest point of the particles before they fall, m, and their largest speed, m/s."""
 
     top_m: float
@@ -216,25 +194,6 @@ def _start(study: Study) -> _Start:
         return _Start(particles.top_m, particles.fastest_m_s)
     reaches = [one.radii_m * one.clump.reach for one in bed_classes(study)]
     return _Start(room_to_insert(np.concatenate(reaches), study.bowl.radius_m), 0.0)
-
-
-def _insertions(study: Study) -> list[Insertion]:
-    """Clumps as LIGGGHTS inserts them."""
-    found, bodies = [], body_sizes(study)
-    for at, body in enumerate(bodies):
-        material = study.materials[body.of.material]
-        mass = particle_mass(material, body.radius_m)
-        found.append(
-            Insertion(
-                body=body,
-                type=1 + study.type_names().index(body.of.material),
-                density_kg_m3=material.density_kg_m3,
-                mass_kg=mass,
-                inertia_kg_m2=(mass * body.inertia).tolist(),
-                seeds=primes(study.seed, 3 * len(bodies))[3 * at : 3 * at + 3],
-            )
-        )
-    return found
 
 
 def first_particles(study: Study) -> Particles:

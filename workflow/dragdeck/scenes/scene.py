@@ -17,7 +17,6 @@ from dragdeck.physics.contact_mechanics import (
     ContactConstants,
     effective_modulus,
     effective_shear,
-    particle_mass,
 )
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import round_to
@@ -231,12 +230,10 @@ def _bodies_of(study: Study) -> tuple[BodiesOfRun, ...]:
             count=one.count,
             first_sphere=one.first_sphere,
             radius_m=one.radius_m,
-            mass_kg=particle_mass(study.materials[one.of.material], one.radius_m),
-            inertia_kg_m2=(
-                particle_mass(study.materials[one.of.material], one.radius_m) * one.inertia
-            ).tolist(),
-            offsets_m=one.offsets_m.tolist(),
-            radii_m=one.radii_m.tolist(),
+            mass_kg=one.mass_kg,
+            inertia_kg_m2=one.inertia_kg_m2,
+            offsets_m=one.spheres_m[:, :3].tolist(),
+            radii_m=one.spheres_m[:, 3].tolist(),
         )
         for one in body_sizes(study)
     )
