@@ -339,13 +339,17 @@ _DEAR = 10.0
 def _class_cautions(study: Study) -> Iterator[Caution]:
     """A warning for each class whose small particles make a run many times dearer."""
     classes = bed_classes(study) if study.media.classes else ()
-    times = [rayleigh_time(study.materials[one.material], one.radii_m[0]) for one in classes]
-    total = study.particle_count
+    times = [
+        rayleigh_time(study.materials[one.material], one.radii_m[0] * one.clump.timestep_radius)
+        for one in classes
+    ]
+    spheres = [len(one.radii_m) * len(one.clump.radii) for one in classes]
+    total = sum(spheres)
     for at, one in enumerate(classes):
         others = [time for number, time in enumerate(times) if number != at]
-        if not others or total == len(one.radii_m):
+        if not others or total == spheres[at]:
             continue
-        dearer = total / (total - len(one.radii_m)) * min(others) / min(times)
+        dearer = total / (total - spheres[at]) * min(others) / min(times)
         if dearer >= _DEAR:
             share = (one.radii_m**3).sum() / (bed_radii(study) ** 3).sum()
             yield Caution(
