@@ -25,7 +25,7 @@ SOME_RUNS_ONLY = {
     *(*BODY, *BODY_IMPULSE, *ORIENTATION, ATTRACTION, "fastest_particle_m_s"),
     *(name for columns in CLASSES.values() for name in columns),
 }
-"""Columns of spinning workpieces, clumps, attraction and classes, and one the small run does not write."""
+"""Columns of spinning workpieces, clumps, attraction and classes, and one not written here."""
 
 
 @pytest.fixture(scope="module")

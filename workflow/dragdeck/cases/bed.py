@@ -100,7 +100,7 @@ class BodySize:
         The last is the three principal moments.
     count, first_id, first_sphere : int
         Number of the particles, id of the first one, and of its first sphere.
-    spheres_m : (K, 4) array
+    spheres_m : K sequences of float
         Places of the spheres, in the principal frame about the centre of mass, and radii.
     """
 
@@ -112,7 +112,7 @@ class BodySize:
     count: int
     first_id: int
     first_sphere: int
-    spheres_m: Array
+    spheres_m: Sequence[Sequence[float]]
 
 
 def body_sizes(study: Study) -> list[BodySize]:
@@ -129,7 +129,7 @@ def body_sizes(study: Study) -> list[BodySize]:
             mass = particle_mass(material, size)
             inertia = (mass * size**2 * one.clump.inertia).tolist()
             of_size = kind, size, material.density_kg_m3, mass, inertia, count
-            found.append(BodySize(*of_size, body, sphere, size * spheres))
+            found.append(BodySize(*of_size, body, sphere, (size * spheres).tolist()))
             body, sphere = body + count, sphere + count * len(spheres)
     return found
 

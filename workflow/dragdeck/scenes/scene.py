@@ -232,8 +232,8 @@ def _bodies_of(study: Study) -> tuple[BodiesOfRun, ...]:
             radius_m=one.radius_m,
             mass_kg=one.mass_kg,
             inertia_kg_m2=one.inertia_kg_m2,
-            offsets_m=one.spheres_m[:, :3].tolist(),
-            radii_m=one.spheres_m[:, 3].tolist(),
+            offsets_m=[sphere[:3] for sphere in one.spheres_m],
+            radii_m=[sphere[3] for sphere in one.spheres_m],
         )
         for one in body_sizes(study)
     )
