@@ -1,4 +1,4 @@
-"""The cost of options that a study's input scripts omit (docs/evidence/costs.md).
+"""The cost of options that a study's input scripts omit (docs/development/benchmarks.md).
 
     python benchmarks/costs.py STUDY --out FILE [--rounds 3] [--seconds 0.5] [--only NAME ...]
 

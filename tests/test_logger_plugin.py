@@ -12,7 +12,6 @@ from snakemake.logging import DefaultFormatter
 from snakemake_interface_logger_plugins.common import LogEvent
 from snakemake_interface_logger_plugins.registry import LoggerPluginRegistry
 
-from dragdeck.engine.status import RunStatus
 from dragdeck.outlook.explain import Cost
 from dragdeck.outlook.runs import StudyRun
 from dragdeck.records.run import RunPart, RunRecord
@@ -115,22 +114,6 @@ def test_the_plan_is_what_the_whole_is_measured_by() -> None:
     shown.log("", event=LogEvent.PROGRESS, done=3, total=9)
     assert shown.text == "small: 2 runs\n"
     assert shown.handler._overall([]) == "runs 0 %, about 1 min 00 s left; 3 of 9 jobs done"
-
-
-def test_a_filling_shows_its_criterion_on_80_columns_beside_a_run_that_waits() -> None:
-    shown = Shown(terminal=True)
-    cost, folder = Cost(97_655, 15.0, "assumed"), Path("/none")
-    at_rest = RunStatus("running", 40_000, None, False, 21_234.0, 0.0, 1.4e-2, 1e-5)
-    runs = [
-        StudyRun("drop_test", folder / "ceramic-on-steel-adf6cc74", None, 1, cost, 1e6),
-        StudyRun("filling", folder / "1422-particles-cf5d5f3e", None, 1, cost, 1e6, at_rest),
-    ]
-    shown.handler._active = lambda: runs  # type: ignore[method-assign]
-    shown.handler._console.print(shown.handler._screen())
-    waits, fills, _ = shown.text.splitlines()
-    assert "speed assumed" in waits and waits.rstrip().endswith("about 15 s left")
-    assert "21,234 steps/s, energy 1.4e-02 > 1e-05 about 2.7 s left" in fills
-    assert max(len(waits), len(fills)) <= 80
 
 
 def test_runs_of_no_study_do_not_end_the_display(

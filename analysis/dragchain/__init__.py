@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from dragchain import plot
     from dragchain.errors import (
-        RecordError,
         SeriesError,
         TableError,
         UnknownNameError,
@@ -28,6 +27,7 @@ if TYPE_CHECKING:
         DocumentError,
         DragdeckError,
         DumpError,
+        RecordError,
         RejectedRunError,
         TruncatedDumpError,
     )
@@ -71,7 +71,7 @@ _MODULES = {
     "dragdeck.dumps.frame": ("Frame",),
     "dragdeck.dumps.reader": ("read_dump",),
     "dragdeck.errors": (
-        *("DocumentError", "DragdeckError", "DumpError", "RejectedRunError"),
+        *("DocumentError", "DragdeckError", "DumpError", "RecordError", "RejectedRunError"),
         "TruncatedDumpError",
     ),
     "dragdeck.records.case": ("CaseOfRun", "load_case"),

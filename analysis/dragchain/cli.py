@@ -86,7 +86,9 @@ COMMANDS = (
                   help="advice.json, made by dragdeck advise, to compare its predicted costs "
                   "with the actual ones"),
         Argument("--preview", type=Path, metavar="FILE",
-                  help="picture of the set-up, set_up.png of dragdeck preview, for the report"))),
+                  help="picture of the set-up, set_up.png of dragdeck preview, for the report"),
+        Argument("--signal", type=Path, metavar="FILE",
+                  help="measured force signal that the study names in reference.signal.file"))),
     Command("compare", "compare cases of one study or of several",
             "Compare cases: differences with intervals over the packings, load maps on one scale, "
             "contact networks side by side and, of a sweep over two or more fields, main effects "

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 
-from dragchain.calibration.force_record import Record, check_samples
 from dragchain.calibration.simulated_drops import DropRun, read_drops
 from dragdeck.campaigns.restitution_drops import Drop, full, run_drops, settings
 from dragdeck.cases.case import Case
@@ -19,6 +18,7 @@ from dragdeck.engine.batch import Batch
 from dragdeck.engine.reports import say
 from dragdeck.project import find_project, study_templates
 from dragdeck.records.calibration import IMPACTS
+from dragdeck.study.force_record import Record, check_samples
 
 LEAD_S, TAIL_S = 0.02, 0.01
 """What a record shows before the first impact and after the last, s."""

@@ -18,7 +18,6 @@ def _in_extra(text: str) -> str:
 _POPEN = ".os.popen('touch pwned').read()"
 _EXPRESSIONS = {
     "the class of the deck": "{{ deck.__class__ }}",
-    "all classes": "{{ ''.__class__.__mro__[1].__subclasses__() }}",
     "the globals of a function": "{{ deck.__init__.__globals__ }}",
     "a shell by cycler": "{{ cycler.__init__.__globals__" + _POPEN + " }}",
     "a shell by lipsum": "{{ lipsum.__globals__" + _POPEN + " }}",
@@ -32,20 +31,14 @@ _EXPRESSIONS = {
     "a class by format_map": "{{ '{a.__class__}'.format_map({'a': deck}) }}",
     "a class by map": "{{ [deck]|map(attribute='__class__')|list }}",
     "a file by the deck's path": "{{ deck.__module__ }}",
-    "a name that is unknown": "{{ deck.speeed }}",
     "a filter that is unknown": "{{ 1|speeed }}",
     "a test that is unknown": "{{ 1 is speeed }}",
-    "a division by zero": "{{ 1 / 0 }}",
     "an index beyond": "{{ deck.outputs[99].name }}",
-    "text as number": "{{ 'a'|num }}",
     "a sum of text and number": "{{ 'a' + 1 }}",
-    "a loop of 1e10": "{% for i in range(10000000000) %}{% endfor %}",
     "a loop of loops": "{% for i in range(90000) %}{% for j in range(90000) %}{% endfor %}"
     "{% endfor %}",
-    "text of 1e11 letters": "{{ 'a' * 100000000000 }}",
     "text that doubles": "{% set n = namespace(x='aaaaaaaaaa') %}{% for i in range(40) %}"
     "{% set n.x = n.x ~ n.x %}{% endfor %}{{ n.x }}",
-    "a number of 1e10 digits": "{{ 10 ** (10 ** 10) }}",
     "padding of 1e11": "{{ 'a'.rjust(100000000000) }}",
     "lorem ipsum for ever": "{{ lipsum(n=100000000) }}",
     "a macro that calls itself": "{% macro m() %}{{ m() }}{% endmacro %}{{ m() }}",
@@ -53,10 +46,8 @@ _EXPRESSIONS = {
     "it includes a study": '{% include "../study.yaml" %}',
     "it includes the password file": '{% include "/etc/passwd" %}',
     "it imports what is missing": '{% import "missing.j2" as m %}',
-    "a block without an end": "{% if true %}",
     "a tag that is unknown": "{% do deck.title %}",
     "it changes the deck": "{% set deck.title = 'b' %}",
-    "it clears the outputs": "{{ deck.outputs.clear() }}",
     "deeply nested brackets": "{{ " + "(" * 3000 + "1" + ")" * 3000 + " }}",
     "deeply nested tags": "{% if true %}" * 2000 + "{% endif %}" * 2000,
 }
@@ -66,23 +57,9 @@ _NAMED = {"it includes a study": r"study\.yaml", "it includes the password file"
 _PROCESS = "process.in.j2"
 _EITHER = r"process\.in\.j2|DRAGDECK END"
 _FILES: dict[str, tuple[str, str | bytes, str]] = {
-    "it extends itself": (_PROCESS, '{% extends "process.in.j2" %}', r"process\.in\.j2"),
     "two extend each other": (_PROCESS, '{% extends "filling.in.j2" %}',
                               r"(process|filling)\.in\.j2"),
-    "a misspelt block": (_PROCESS, _BASE + "{% block extras %}\nprint 1\n{% endblock %}\n",
-                         "extras"),
     "a block twice": (_PROCESS, _BASE + 2 * "{% block extra %}{% endblock %}", "extra"),
-    "a macro in place of another": (
-        "walls.j2", '{% extends "base/walls.j2" %}{% macro bowl(script) %}{% endmacro %}',
-        "walls.j2.*bowl"),
-    "text outside of the blocks": (_PROCESS, _BASE + "run 1\n", "outside of the blocks"),
-    "a block that no script contains": (
-        "base.in.j2", '{% extends "base/base.in.j2" %}{% block run %}{% endblock %}',
-        "changes no input script"),
-    "no outputs": (_PROCESS, _BASE + "{% block outputs %}{% endblock %}",
-                   "would not write the output files"),
-    "an endless loop": (_PROCESS, _in_extra("label again\njump SELF again"), "run for ever"),
-    "a file of no scene": ("proces.in.j2", _BASE, r"proces\.in\.j2"),
     "a file in capitals": ("Process.in.j2", _BASE, r"Process\.in\.j2"),
     "an empty one": (_PROCESS, "", _EITHER),
     "one without its end": (_PROCESS, "run 1\n", _EITHER),
@@ -101,7 +78,6 @@ _TEMPLATES: dict[str, Template] = {
     "a symlink to nothing": (_PROCESS, Path("no"), r"process\.in\.j2"),
     "a folder in its place": (_PROCESS, None, r"process\.in\.j2"),
 }  # fmt: skip
-_UNUSED = ("proces.in.j2", "Process.in.j2")
 
 
 @pytest.mark.attack(rows=_TEMPLATES, sample=2)
@@ -119,5 +95,5 @@ def test_a_hostile_template_is_refused(attack: Template, tmp_path: Path) -> None
         file.write_bytes(content.encode() if isinstance(content, str) else content)
         if name == _PROCESS and b"filling.in.j2" in file.read_bytes():
             (file.parent / "filling.in.j2").write_text('{% extends "process.in.j2" %}')
-    warning_will_do = name in _UNUSED or content is None or isinstance(content, Path)
+    warning_will_do = name == "Process.in.j2" or content is None or isinstance(content, Path)
     assert checked(project, (named,)) in ((REFUSED, WARNED) if warning_will_do else (REFUSED,))

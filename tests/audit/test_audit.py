@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from plain_run import PlainRun, bottlenecks, coordination, loads
-from snakemake_calls import copy_of_project, snakemake
+from snakemake_calls import copy_of_project, succeed
 
 pytestmark = [pytest.mark.audit, pytest.mark.engine]
 
@@ -18,8 +18,7 @@ ROUNDING = {"rtol": 1e-9, "atol": 1e-12}
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     project = copy_of_project(tmp_path_factory.mktemp("audit"))
-    done = snakemake(project, "all", "--config", "study=small")
-    assert done.returncode == 0, done.stdout + done.stderr
+    succeed(project, "all", "--config", "study=small")
     (run,) = (project / "results/small/process").iterdir()
     return run
 

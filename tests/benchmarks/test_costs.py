@@ -16,6 +16,7 @@ from dragdeck.engine.reports import silent
 from dragdeck.errors import InputError
 from dragdeck.project import Project
 from dragdeck.records.run import RunRecord
+from dragdeck.sweep.cases import load_cases
 
 SECONDS = 0.05
 
@@ -106,13 +107,15 @@ def test_what_cannot_be_timed_is_refused(
 
 
 @pytest.mark.engine
-def test_two_options_on_the_engine(made: Any, project: Project, tmp_path: Path) -> None:
-    case = made(
-        {
-            "media.count": 120, "bowl.radius_m": 0.02, "workpiece.shape.radius_m": 0.0035,
-            "motion.path.radius_m": 0.008, "motion.immersion_depth_m": 0.01,
-        }
-    )  # fmt: skip
+def test_two_options_on_the_engine(
+    small: dict[str, Any], write_study: Any, project: Project, tmp_path: Path
+) -> None:
+    small["media"]["count"] = 120
+    small["bowl"]["radius_m"] = 0.02
+    small["workpiece"]["shape"]["radius_m"] = 0.0035
+    small["motion"]["path"]["radius_m"] = 0.008
+    small["motion"]["immersion_depth_m"] = 0.01
+    (case,) = load_cases(write_study(small))
     chosen = ("restart_points", "step_0.2")
 
     def time_them(out: Path, rounds: int) -> dict[str, Any]:

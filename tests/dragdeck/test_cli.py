@@ -40,27 +40,6 @@ def test_bad_input_writes_nothing(
     assert not (project.root / "results").exists()
 
 
-@pytest.mark.engine
-def test_check_says_how_many_cases(case: Case, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["check", "small"]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert lines[-1].startswith("small: no errors, 1 warning; 1 case(s), 3 runs, about ")
-    assert "(estimates; speed assumed); LIGGGHTS 3." in lines[-1]
-    assert lines[0].startswith("warning: quick: the gap between workpiece and bowl")
-    assert [line.split(":")[0] for line in lines[1:-1]] == [
-        "note", "  drop_test", "  filling", "  process"
-    ]  # fmt: skip
-
-
-def test_explain_shows_what_is_left_out_and_the_cost(
-    case: Case, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["explain", "small", "process", "--verbose"]) == 0
-    said = capsys.readouterr().out
-    for words in ("leaves out", "facets of the bowl", "% of Rayleigh", "wall time", "assumed"):
-        assert words in said
-
-
 def test_a_process_is_never_rendered_on_a_guess(
     case: Case, project: Project, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -3,13 +3,11 @@
 import re
 import subprocess
 import sys
-from collections.abc import Callable
-from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
+from made_study import Load, Made
 from matplotlib.colors import to_rgb
 from PIL import Image
 
@@ -23,34 +21,17 @@ from dragdeck.preview.swept import swept_volume
 from dragdeck.project import Project
 from dragdeck.scenes.filling import expected_surface
 from dragdeck.scenes.workpiece import check_fit, clearances
-from dragdeck.study.drive import Drive
-from dragdeck.study.superposed.oscillation import Oscillation
-from dragdeck.study.superposed.spin import Spin
-from dragdeck.sweep.cases import load_cases
 
-Made = Callable[..., Case]
+BAR = {"workpiece.shape": {"kind": "mesh", "file": "bar.stl", "unit": "m"}}
+"""The small study drags a hexagonal bar from a file."""
 
 
 @pytest.fixture(autouse=True)
 def inside(project: Project, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(project.root)
-
-
-@pytest.fixture
-def made(small: dict[str, Any], write_study: Callable[..., Path]) -> Made:
-    """The small study with changed blocks; ``bar`` drags a hexagonal bar from a file."""
-
-    def make(bar: bool = False, **blocks: Any) -> Case:
-        for name, block in blocks.items():
-            small[name] = {**small.get(name, {}), **block} if isinstance(block, dict) else block
-        if bar:
-            small["workpiece"]["shape"] = {"kind": "mesh", "file": "bar.stl", "unit": "m"}
-        file = write_study(small)
-        bar = prism(6, 0.004, 0.05, 0.004, 0.01)
-        (file.parent / "bar.stl").write_text(stl_text(bar))
-        return load_cases(file)[0]
-
-    return make
+    file = project.studies / "small/bar.stl"
+    file.parent.mkdir()
+    file.write_text(stl_text(prism(6, 0.004, 0.05, 0.004, 0.01)))
 
 
 def picture(project: Project) -> np.ndarray:
@@ -106,8 +87,8 @@ def test_the_numbers_are_those_of_check(case: Case, capsys: pytest.CaptureFixtur
 def test_the_check_refuses_by_the_clearances(made: Made, missing_m: float) -> None:
     """One largest particle between tip and floor is enough, and a little less is not."""
     largest, media = 2 * 3.27e-3, {"radius_std_m": 0}
-    surface = expected_surface(made(media=media).study)
-    case = made(media=media, motion={"immersion_depth_m": surface - largest + missing_m})
+    surface = expected_surface(made({"media": media}).study)
+    case = made({"motion.immersion_depth_m": surface - largest + missing_m})
     assert clearances(case, surface).tip_m == pytest.approx(largest - missing_m)
     if missing_m < 0:
         check_fit(case, surface, 1e-6)
@@ -117,7 +98,7 @@ def test_the_check_refuses_by_the_clearances(made: Made, missing_m: float) -> No
 
 
 def test_the_floor_gap_counts_an_oscillation(made: Made) -> None:
-    case = made(motion={"oscillation": {"amplitude_m": 0.003, "frequency_hz": 5}})
+    case = made({"motion.oscillation": {"amplitude_m": 0.003, "frequency_hz": 5}})
     gaps = clearances(case, 0.05)
     assert gaps.tip_m == pytest.approx(0.035)
     assert gaps.floor_m == pytest.approx(0.032)
@@ -126,7 +107,7 @@ def test_the_floor_gap_counts_an_oscillation(made: Made) -> None:
 def test_a_workpiece_through_the_wall_is_drawn_and_refused(
     made: Made, project: Project, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    made(motion={"path": {"kind": "circle", "radius_m": 0.023, "revolutions": 0.1}})
+    made({"motion.path": {"kind": "circle", "radius_m": 0.023, "revolutions": 0.1}})
     assert main(["preview", "small"]) == 1
     said = capsys.readouterr()
     assert "motion.path: the workpiece does not fit between its path and the bowl" in said.err
@@ -138,8 +119,7 @@ def test_a_workpiece_through_the_wall_is_drawn_and_refused(
 def test_a_workpiece_that_cannot_be_read_is_refused_as_by_check(
     made: Made, project: Project, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    shape = {"kind": "mesh", "file": "none.stl", "unit": "m"}
-    made(workpiece={"shape": shape})
+    made({"workpiece.shape": {"kind": "mesh", "file": "none.stl", "unit": "m"}})
     assert main(["preview", "small"]) == 1
     said = capsys.readouterr().err
     assert said.count("no such mesh file") == 1 and "study.yaml:" in said
@@ -147,7 +127,7 @@ def test_a_workpiece_that_cannot_be_read_is_refused_as_by_check(
 
 
 def test_the_named_case_is_drawn_and_the_first_by_default(
-    made: Made, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    load: Load, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     drawn: list[str] = []
 
@@ -156,7 +136,7 @@ def test_the_named_case_is_drawn_and_the_first_by_default(
         return []
 
     monkeypatch.setattr("dragdeck.commands._drawn", draw)
-    made(sweep={"motion.immersion_depth_m": [0.010, 0.016]})
+    load({"sweep": {"motion.immersion_depth_m": [0.010, 0.016]}})
     assert main(["preview", "small"]) == 0
     assert "case quick_immersion_depth_m-0.01, one of 2 (--case)" in capsys.readouterr().out
     assert main(["preview", "small", "--case", "quick_immersion_depth_m-0.016"]) == 0
@@ -170,25 +150,15 @@ def test_the_named_case_is_drawn_and_the_first_by_default(
 def test_a_mesh_is_turned_to_the_direction_of_motion(made: Made) -> None:
     """A bar with a corner along +x has one along the direction of motion, and turns with it."""
     line = {"kind": "line", "start_m": [-0.005, 0], "direction_deg": 70, "length_m": 0.01}
-    (body,) = layout(made(bar=True, motion={"path": line})).workpieces
+    (body,) = layout(made({**BAR, "motion.path": line})).workpieces
     across = body.at_start.vertices[:, :2] - body.drag.poses[0, :2, 3]
     corner = across[np.hypot(*across.T) > 0.00399]
     angles = np.degrees(np.arctan2(*corner.T[::-1])) % 60
     assert angles == pytest.approx(10)
     circle = {"kind": "circle", "radius_m": 0.01, "revolutions": 0.1}
-    first, last = layout(made(motion={"path": circle})).workpieces[0].drag.poses[[0, -1]]
+    first, last = layout(made({"motion.path": circle})).workpieces[0].drag.poses[[0, -1]]
     angles = [np.degrees(np.arctan2(pose[1, 0], pose[0, 0])) for pose in (first, last)]
     assert angles == pytest.approx([90, 126])
-
-
-def test_the_legs_follow_each_other_down_to_the_immersion_depth(case: Case) -> None:
-    found = layout(case)
-    stages = found.workpieces[0].stages
-    assert [stage.name for stage in stages] == ["plunge", "approach", "drag"]
-    for before, after in pairwise(stages):
-        assert before.poses[-1] == pytest.approx(after.poses[0])
-    assert stages[-1].poses[:, 2, 3] == pytest.approx(found.surface_m - 0.015)
-    assert np.hypot(*stages[-1].poses[:, :2, 3].T) == pytest.approx(0.010)
 
 
 def test_a_swept_ring_has_the_volume_of_pappus() -> None:
@@ -210,25 +180,14 @@ def test_a_body_thinner_than_the_grid_is_not_lost() -> None:
 
 
 def test_spin_and_oscillation_enlarge_the_swept_volume(made: Made) -> None:
-    still, bounds = volume_and_bounds(layout(made(bar=True)))
-    spun, _ = volume_and_bounds(layout(made(bar=True, motion={"spin": {"rpm": 300}})))
+    still, bounds = volume_and_bounds(layout(made(BAR)))
+    spun, _ = volume_and_bounds(layout(made({"motion.spin": {"rpm": 300}})))
     assert spun > 1.02 * still
-    case = made(motion={"spin": None, "oscillation": {"amplitude_m": 0.003, "frequency_hz": 20}})
+    oscillation = {"amplitude_m": 0.003, "frequency_hz": 20}
+    case = made({"motion.spin": None, "motion.oscillation": oscillation})
     lifted, wide = volume_and_bounds(layout(case))
     assert lifted > 1.05 * still
     assert wide[:, 2] - bounds[:, 2] == pytest.approx([-0.003, 0.003], abs=3e-4)
-
-
-def test_what_is_superposed_moves_as_it_is_driven() -> None:
-    stages = [(1, 60), (2, -30), (3, 0)]
-    schedule = [{"until_s": until, "rpm": rpm} for until, rpm in stages]
-    drive = Drive(7, 9007, 1e-3, length_m=1.0)
-    spin = Spin.model_validate({"schedule": schedule, "ramp_s": 0})
-    turns = spin.turn(drive, np.array([0, 500, 1000, 1500, 2000, 9000])) / (2 * np.pi)
-    assert turns == pytest.approx([0, 0.5, 1, 0.75, 0.5, 0.5])
-    up = Oscillation(amplitude_m=0.002, frequency_hz=2, ramp_s=0)
-    lifts = up.shift(drive, np.array([0, 125, 375]))[:, 2]
-    assert lifts == pytest.approx([0, 0.002, -0.002])
 
 
 def test_other_commands_load_no_graphics(case: Case) -> None:

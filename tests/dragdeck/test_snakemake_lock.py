@@ -2,6 +2,8 @@
 
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -19,17 +21,21 @@ sys.stdin.read()
 """
 
 
+@contextmanager
+def held(folder: Path) -> Iterator[subprocess.Popen[str]]:
+    """Another process that works in a folder, killed in the end."""
+    words, pipe = [sys.executable, "-c", HOLD, str(folder)], subprocess.PIPE
+    with subprocess.Popen(words, stdin=pipe, stdout=pipe, text=True) as other:
+        assert other.stdout is not None and other.stdout.readline() == "held\n"
+        yield other
+        other.kill()
+
+
 def test_only_locks_that_nobody_holds_are_deleted(tmp_path: Path) -> None:
     lock = tmp_path / "locks/0.input.lock"
     lock.parent.mkdir()
     lines: list[str] = []
-    with subprocess.Popen(
-        [sys.executable, "-c", HOLD, str(tmp_path)],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-    ) as other:
-        assert other.stdout is not None and other.stdout.readline() == "held\n"
+    with held(tmp_path) as other:
         lock.write_text("a\n")
         hold_lock(tmp_path, lines.append)
         assert lock.exists() and lines == []
@@ -38,7 +44,6 @@ def test_only_locks_that_nobody_holds_are_deleted(tmp_path: Path) -> None:
         why = str(why_locked(tmp_path))
         assert f"process {other.pid} on " in why and f"since {named.since}" in why
         assert f"kill -INT {other.pid}" in why
-        other.kill()
     assert others_at_work(tmp_path) == [] and why_locked(tmp_path) is None
     script = "import sys; from pathlib import Path; from dragdeck.snakemake_lock import *\n"
     script += "hold_lock(Path(sys.argv[1]), print)"
@@ -63,16 +68,9 @@ def test_a_second_call_is_told_who_works(tmp_path: Path) -> None:
     project = copy_of_project(tmp_path)
     locks = project / ".snakemake/locks"
     locks.mkdir(parents=True)
-    with subprocess.Popen(
-        [sys.executable, "-c", HOLD, str(locks.parent)],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-    ) as other:
-        assert other.stdout is not None and other.stdout.readline() == "held\n"
+    with held(locks.parent) as other:
         (locks / "0.output.lock").write_text("results/small/report/report.html\n")
         done = snakemake(project, "report", "--logger", "dragdeck", "--config", "study=small")
-        other.kill()
     assert done.returncode == 1
     assert f"process {other.pid} on " in done.stderr
     assert "unlock" not in done.stderr

@@ -16,12 +16,6 @@ def test_everything_behind_the_renderer_is_found() -> None:
     assert not any(name.startswith("dragchain") for name in found)
 
 
-def test_evidence_depends_on_both_packages() -> None:
-    found = source_files("evidence.verification.report")
-    assert {"evidence.verification.checks", "evidence.verification.experiment"} <= set(found)
-    assert {"dragchain.run.run_parts", "dragdeck.records.case"} <= set(found)
-
-
 def test_lazy_imports_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     package = tmp_path / "lazybox"
     package.mkdir()

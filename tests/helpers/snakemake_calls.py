@@ -30,11 +30,16 @@ def snakemake(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]
     return subprocess.run(words, cwd=folder, env=seen, capture_output=True, text=True)
 
 
+def succeed(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Call Snakemake, which must succeed."""
+    done = snakemake(folder, *arguments)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done
+
+
 def jobs(folder: Path, *arguments: str) -> set[str]:
     """Names of the rules that would run."""
-    shown = snakemake(folder, "--dry-run", *arguments)
-    assert shown.returncode == 0, shown.stdout + shown.stderr
-    table = shown.stdout
+    table = succeed(folder, "--dry-run", *arguments).stdout
     if "Job stats:" not in table:
         return set()
     rows = table.split("Job stats:")[1].split("total")[0].splitlines()[3:]

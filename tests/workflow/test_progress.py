@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 import yaml
 from preloaded import environment
-from snakemake_calls import copy_of_project, snakemake
+from snakemake_calls import copy_of_project, snakemake, succeed
 
 from dragdeck.cli import main
 
@@ -37,9 +37,7 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def piped(project: Path) -> str:
     """What a call without a terminal says."""
-    done = snakemake(project, *SHOWN, "--logger-dragdeck-every-s", "0.2", "all", *STUDY)
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stderr
+    return succeed(project, *SHOWN, "--logger-dragdeck-every-s", "0.2", "all", *STUDY).stderr
 
 
 @pytest.fixture
@@ -87,31 +85,6 @@ def test_a_call_ends_with_the_report_and_the_main_numbers(piped: str) -> None:
 def test_the_numbers_are_those_of_the_summary(project: Path, piped: str) -> None:
     row = pd.read_csv(project / "results/tiny/report/summary.csv").iloc[0]
     assert f"  {row['headline']}\n" in piped
-
-
-def test_status_says_that_all_is_complete(
-    piped: str, inside: None, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["status", "tiny"]) == 0
-    said = capsys.readouterr().out
-    assert "tiny: runs 100 % done: 3 complete\n" in said
-    assert said.endswith("report/report.html\n")
-
-
-def test_a_call_with_nothing_to_do_says_so(project: Path, piped: str) -> None:
-    done = snakemake(project, *SHOWN, "all", *STUDY)
-    assert "Nothing to be done" in done.stderr
-
-
-def test_what_is_wrong_with_a_call_is_told(project: Path) -> None:
-    done = snakemake(project, *SHOWN, "all", "--config", "study=large")
-    assert done.returncode != 0
-    assert "unknown study 'large'" in done.stderr and "one of: tiny" in done.stderr
-
-
-def test_a_dry_run_lists_its_jobs(project: Path, piped: str) -> None:
-    done = snakemake(project, *SHOWN, "--dry-run", "--forceall", "drop_test", *STUDY)
-    assert "rule run_drop_test:" in done.stdout + done.stderr
 
 
 def on_a_terminal(project: Path, *arguments: str) -> tuple[int, str]:

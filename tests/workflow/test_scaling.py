@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 import yaml
 from paths import SMALL_STUDY
-from snakemake_calls import copy_of_project, jobs, snakemake
+from snakemake_calls import copy_of_project, jobs, snakemake, succeed
 
 pytestmark = [pytest.mark.engine, pytest.mark.slow]
 
@@ -29,8 +29,7 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_drag_grows_with_the_depth(project: Path) -> None:
-    done = snakemake(project, *SCALING)
-    assert done.returncode == 0, done.stdout + done.stderr
+    succeed(project, *SCALING)
     found = json.loads((project / "results/small/scaling/scaling.json").read_text())
     assert found["commands"] == ["snakemake scaling --config study=small"]
     assert [level["x"] for level in found["levels"]] == [0.008, 0.012, 0.016, 0.020]

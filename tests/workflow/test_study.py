@@ -17,7 +17,7 @@ import yaml
 from fat_files import fatten
 from pages import stands_alone
 from paths import PROJECT, ROOT, SMALL_STUDY
-from snakemake_calls import jobs, snakemake
+from snakemake_calls import jobs, snakemake, succeed
 
 from dragchain import read_dump, write_tables
 from dragchain.network.write import write_chains
@@ -50,8 +50,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "studies/small/templates").mkdir(parents=True)
     (folder / "studies/small/templates/process.in.j2").write_text(TOTAL_FORCES)
     (folder / "studies/small/study.yaml").write_text(yaml.safe_dump(data))
-    done = snakemake(folder, "all", "--config", "study=small")
-    assert done.returncode == 0, done.stdout + done.stderr
+    succeed(folder, "all", "--config", "study=small")
     return folder
 
 
@@ -225,14 +224,12 @@ def test_a_deleted_table_is_made_again(finished: Path) -> None:
 def test_frames_are_exported_when_asked_for(finished: Path) -> None:
     export = ("export", "--config", "study=small")
     assert jobs(finished, *export) == {"export", "export_paraview"}
-    done = snakemake(finished, *export)
-    assert done.returncode == 0, done.stderr
+    succeed(finished, *export)
     for run in (finished / "results/small/process").iterdir():
         times = set(pd.read_parquet(run / "tables/particles.parquet", columns=["time_s"])["time_s"])
         assert pv.PVDReader(run / "export/paraview/run.pvd").time_values == sorted(times)
     assert jobs(finished, *export) == set()
-    again = snakemake(finished, *export, "--forcerun", "export_paraview")
-    assert again.returncode == 0, again.stderr
+    succeed(finished, *export, "--forcerun", "export_paraview")
 
 
 def test_the_study_becomes_a_crate(finished: Path) -> None:
@@ -241,8 +238,7 @@ def test_the_study_becomes_a_crate(finished: Path) -> None:
     odd.write_text("x\n1\n")
     crate = ("crate", "--config", "study=small")
     assert jobs(finished, *crate) == {"crate", "write_crate"}
-    done = snakemake(finished, *crate)
-    assert done.returncode == 0, done.stderr
+    succeed(finished, *crate)
     folder = finished / "results/small/crate"
     graph = json.loads((folder / "ro-crate-metadata.json").read_text())["@graph"]
     named = {unquote(entity["@id"]): entity for entity in graph}
@@ -263,8 +259,7 @@ def test_an_edited_template_runs_what_depends_on_it(finished: Path) -> None:
     template = finished / "templates/process.in.j2"
     text = template.read_text()
     template.write_text(text.replace("{% block run %}", "{% block run %}\n# a remark"))
-    done = snakemake(finished, *STUDY)
-    assert done.returncode == 0, done.stderr
+    done = succeed(finished, *STUDY)
     told = done.stdout + done.stderr
     assert "rule run_process" in told
     assert "rule run_filling" not in told

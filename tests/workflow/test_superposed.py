@@ -39,7 +39,6 @@ from dragdeck.scenes.process import PROCESS
 from dragdeck.scenes.scene import read_bed
 from dragdeck.study.drive import Drive, rotated
 from dragdeck.study.superposed.motion import SuperposedMotion
-from dragdeck.study.superposed.oscillation import Oscillation
 from dragdeck.study.superposed.spin import Spin
 from dragdeck.sweep.cases import load_cases
 
@@ -103,12 +102,10 @@ MOTIONS: dict[str, dict[str, Any]] = {
         "path": CIRCLE, "orientation": "fixed", "spin": REVERSING, "oscillation": UP_AND_DOWN,
     },
     "line": {"path": LINE, "spin": REVERSING, "oscillation": UP_AND_DOWN},
-    "oscillation": {"path": LINE, "oscillation": UP_AND_DOWN},
     "tilted": {"path": CIRCLE, "tilt_deg": 20},
     "waypoints": WAYPOINTS,
     "waypoints-spin": {**WAYPOINTS, "spin": REVERSING, "oscillation": UP_AND_DOWN},
     "waypoints-turn": {**TURNING, "oscillation": UP_AND_DOWN},
-    "tilt-spin": {"path": CIRCLE, "tilt_deg": 20, "spin": {"rpm": 400}},
     "tilt-spin-fixed": {
         "path": CIRCLE | {"direction": "cw"}, "tilt_deg": -15, "orientation": "fixed",
         "spin": REVERSING, "oscillation": UP_AND_DOWN,
@@ -118,11 +115,9 @@ MOTIONS: dict[str, dict[str, Any]] = {
     "eight-fixed": {"path": EIGHT, "orientation": "fixed", "ramp_s": 0.05},
     "eight-tilt-spin": {"path": EIGHT, "tilt_deg": 20, "spin": {"rpm": -300}, "ramp_s": 0.1},
     "start": {"path": CIRCLE, "ramp_s": 0.08, "spin": {"rpm": 200}},
-    "start-fixed": {"path": CIRCLE, "ramp_s": 0.08, "orientation": "fixed"},
     "start-line": {"path": LINE, "ramp_s": 0.05},
     "inclined": INCLINED,
     "inclined-tilt": {**INCLINED, "tilt_deg": 10},
-    "turning-tilt": {**TURNING, "tilt_deg": 15, "oscillation": UP_AND_DOWN},
 }  # fmt: skip
 
 
@@ -399,22 +394,6 @@ def write_plate(
         "one particle\n\n1 atoms\n\n1 atom types\n\n-0.05 0.05 xlo xhi\n-0.05 0.05 ylo yhi\n"
         f"-0.01 0.05 zlo zhi\n\nAtoms\n\n1 1 {2 * RADIUS} {DENSITY} {place}\n"
     )
-
-
-@pytest.mark.parametrize(("ramp_s", "thrown"), [(0.0, True), (0.1, False)])
-def test_an_oscillation_below_gravity_throws_no_particle_off(
-    tmp_path: Path, ramp_s: float, thrown: bool
-) -> None:
-    """0.1 mm at 30 Hz accelerates with 0.36 g at most: only a start at full speed throws it off."""
-    motion = Oscillation(amplitude_m=1e-4, frequency_hz=30, ramp_s=ramp_s)
-    drag = Drive(0, 17_000, 1e-5, length_m=1.0)
-    force = outputs.workpiece_force(20, drag.end, "workpiece")
-    write_plate(tmp_path, motion, drag, 0.0, [force])
-    engine(tmp_path)
-    rows = np.loadtxt(tmp_path / "workpiece_force.1.txt", skiprows=1)
-    lifts = motion.shift(drag, rows[:, 0])[:, 2]
-    np.testing.assert_allclose(rows[:, 10], lifts, atol=1e-9)
-    assert (rows[:, 4] == 0.0).any() == thrown
 
 
 def test_a_particle_on_a_moving_and_spinning_plate_slips_as_it_should(tmp_path: Path) -> None:

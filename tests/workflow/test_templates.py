@@ -6,7 +6,7 @@ import pytest
 import yaml
 from doc_pages import template_examples
 from paths import DATA
-from snakemake_calls import copy_of_project, snakemake
+from snakemake_calls import copy_of_project, succeed
 
 pytestmark = [pytest.mark.engine, pytest.mark.slow]
 
@@ -15,14 +15,12 @@ def test_edited_templates_run_at_the_first_call(tmp_path: Path) -> None:
     """The contact law, damping and output of the how-to, after a filling without them."""
     study = yaml.safe_load((DATA / "tiny_study.yaml").read_text())
     project = copy_of_project(tmp_path, study)
-    done = snakemake(project, "filling", "--config", "study=small")
-    assert done.returncode == 0, done.stdout + done.stderr
+    succeed(project, "filling", "--config", "study=small")
     folder = project / "studies/small/templates"
     folder.mkdir()
     for name, text in template_examples().items():
         (folder / name).write_text(text)
-    done = snakemake(project, "process", "--config", "study=small", "--show-failed-logs")
-    assert done.returncode == 0, done.stdout + done.stderr
+    succeed(project, "process", "--config", "study=small", "--show-failed-logs")
     (filling,) = (project / "results/small/filling").iterdir()
     (process,) = (project / "results/small/process").iterdir()
     assert (

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 import yaml
 from pages import stands_alone
-from snakemake_calls import copy_of_project, jobs, snakemake
+from snakemake_calls import copy_of_project, jobs, succeed
 
 pytestmark = [pytest.mark.engine, pytest.mark.slow]
 
@@ -36,8 +36,7 @@ def traded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A copy of the project in which the plan was run on the small study."""
     folder = copy_of_project(tmp_path_factory.mktemp("tradeoff"))
     (folder / "plan.yaml").write_text(yaml.safe_dump(PLAN))
-    done = snakemake(folder, *TRADEOFF)
-    assert done.returncode == 0, done.stdout + done.stderr
+    succeed(folder, *TRADEOFF)
     return folder
 
 
@@ -79,8 +78,7 @@ VALIDATION = ("validate", "--config", "study=small", "plan=plan.yaml")
 @pytest.fixture(scope="module")
 def validated(traded: Path) -> Path:
     """The validation of the same points."""
-    done = snakemake(traded, *VALIDATION)
-    assert done.returncode == 0, done.stdout + done.stderr
+    succeed(traded, *VALIDATION)
     return traded / "results/small/validation"
 
 

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 import yaml
 from paths import SMALL_STUDY
-from snakemake_calls import copy_of_project, jobs, snakemake
+from snakemake_calls import copy_of_project, jobs, succeed
 
 from dragchain.report.values import Extrapolated
 from dragchain.run.kinematics import drag_phase
@@ -41,8 +41,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "youngs_modulus_scale": 0.1, "timestep_fraction": 0.5, "ranks": 1, "windows": WINDOWS,
     }  # fmt: skip
     folder = copy_of_project(tmp_path_factory.mktemp("windows"), data)
-    done = snakemake(folder, "all", "--config", "study=small")
-    assert done.returncode == 0, done.stdout + done.stderr
+    succeed(folder, "all", "--config", "study=small")
     return folder / "results/small"
 
 

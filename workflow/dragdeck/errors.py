@@ -98,6 +98,37 @@ def choices(word: str, known: Iterable[str]) -> str:
     return f"{near(word, names)}one of: {', '.join(names) or 'none here'}"
 
 
+class RecordError(DragdeckError):
+    """A measured record that cannot be used.
+
+    Parameters
+    ----------
+    reason : str
+        One word for what is wrong, for example ``clipped``.
+    problem : str
+        What is wrong, without a full stop.
+    value, limit, remedy : str, optional
+        What was found, what is accepted, what the user can do.
+    """
+
+    def __init__(
+        self,
+        reason: str,
+        problem: str,
+        *,
+        value: str | None = None,
+        limit: str | None = None,
+        remedy: str | None = None,
+    ) -> None:
+        self.reason = reason
+        self.problem = problem
+        self.value = value
+        self.limit = limit
+        self.remedy = remedy
+        said = f"the record cannot be used ({reason}): {problem}"
+        super().__init__(rendered(said, value=value, limit=limit, remedy=remedy))
+
+
 class EngineError(DragdeckError):
     """LIGGGHTS is missing or too old, rejected the input script, or was stopped."""
 

@@ -35,6 +35,7 @@ from dragdeck.project import (
 from dragdeck.scenes.lead import FIRST_WINDOWS, led, windows_of, with_leads
 from dragdeck.scenes.process import SCENES
 from dragdeck.study.base import Json
+from dragdeck.study.recorded import recorded_file
 
 RECORD = {place: "outcome.json" if place in OUTCOMES else "run.json" for place in PLACES}
 """How a run in each folder of runs ended."""
@@ -253,6 +254,18 @@ class Workflow:
     def calibration_inputs(self) -> list[str]:
         """What the drops of a calibration are made from: the study and the drop's templates."""
         return [self.relative(self.cases[0].file), *self.templates_of("drop_test")]
+
+    def signal_file(self) -> list[str]:
+        """The measured force signal of the study, if it names one."""
+        reference, study = self.cases[0].study.reference, self.cases[0].file
+        if reference is None or reference.signal is None:
+            return []
+        name = reference.signal.file
+        return [self.relative(or_stop(recorded_file, name, study, "reference.signal.file"))]
+
+    def signal_option(self, _: object = None) -> str:
+        """How to name that signal on the command line."""
+        return " ".join(f"--signal {quote(file)}" for file in self.signal_file())
 
     def crate_inputs(self) -> list[str]:
         """Study files, templates and meshes of all scenes."""

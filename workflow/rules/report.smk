@@ -24,6 +24,7 @@ rule write_report:
         WORK.every("process", "network.html"),
         WORK.every("process", "tables/extrapolated.json"),
         advice=ancient(WORK.needed_advice("process")),
+        signal=WORK.signal_file(),
         set_up=rules.draw_set_up.output,
         templates=WORK.page_templates("report/report.html.j2"),
     output:
@@ -40,10 +41,11 @@ rule write_report:
     params:
         runs=lambda wildcards: WORK.every_folder("process"),
         advice=WORK.advice_option,
+        signal=WORK.signal_option,
         source=source_hash("dragchain.report.study_report"),
     shell:
         "dragchain report --out $(dirname {output.csv}) {params.runs} {params.advice}"
-        " --preview {input.set_up} > {log} 2>&1"
+        " {params.signal} --preview {input.set_up} > {log} 2>&1"
 
 
 # What will be run: as text, and as data for `--logger dragdeck`.
@@ -73,8 +75,9 @@ onerror:
         advice = f"--advice {WORK.advice}" if Path(WORK.advice).is_file() else ""
         picture = f"results/{STUDY}/set_up.png"
         preview = f"--preview {picture}" if Path(picture).is_file() else ""
+        measured = WORK.signal_option()
         shell(
             "rm -f results/{STUDY}/report/complete;"
-            " dragchain report --out results/{STUDY}/report {runs} {advice} {preview} || true"
+            " dragchain report --out results/{STUDY}/report {runs} {advice} {preview} {measured} || true"
         )
         tell_numbers()

@@ -18,12 +18,12 @@ from scipy.optimize import brentq, minimize_scalar
 from scipy.stats import chi2
 
 from dragchain.arrays import Floats
-from dragchain.calibration.force_record import read_record
 from dragchain.calibration.measured_impacts import Impact, Measured, measure_impacts, pulse
 from dragchain.calibration.simulated_drops import DropRun, Drops, Emulator, Waveform
-from dragchain.errors import RecordError
 from dragchain.statistics.estimate import CONFIDENCE
+from dragdeck.errors import RecordError
 from dragdeck.records.calibration import IMPACTS, Fit
+from dragdeck.study.force_record import read_record
 
 # --- sampling ------------------------------------------------------------------------------------
 

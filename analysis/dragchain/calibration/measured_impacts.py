@@ -11,10 +11,10 @@ from pydantic.json_schema import SkipJsonSchema
 from scipy.signal import find_peaks, peak_widths
 
 from dragchain.arrays import Floats
-from dragchain.calibration.force_record import Note, Record, quiet_line
-from dragchain.errors import RecordError
 from dragdeck.documents import Document, Part
+from dragdeck.errors import RecordError
 from dragdeck.records.calibration import IMPACTS
+from dragdeck.study.force_record import Note, Record, quiet_line
 
 _QUIET_SAMPLES = 20
 """Samples needed before the first impact, to know baseline and noise."""

@@ -11,12 +11,12 @@ from matplotlib.figure import Figure
 
 from dragchain.arrays import Floats
 from dragchain.calibration.fit import RecordFit, calibrate_file
-from dragchain.calibration.force_record import Record, read_record
 from dragchain.calibration.results import bias_table, confirmed, impact_table, result
 from dragchain.calibration.simulated_drops import DropRun, Drops, read_drops
 from dragchain.figures.panels import legend_below, new_figure
 from dragchain.figures.style import BLUE, COLOURS, GREY
 from dragchain.report.campaign import write_report
+from dragdeck.study.force_record import Record, read_record
 
 # --- figures -------------------------------------------------------------------------------------
 

@@ -10,7 +10,6 @@ import numpy as np
 import pandas as pd
 
 from dragchain.calibration.fit import RecordFit, calibrate_file
-from dragchain.calibration.force_record import read_record
 from dragchain.calibration.measured_impacts import Measured, measure_impacts
 from dragchain.calibration.simulated_drops import Drops, Emulator, read_drops
 from dragchain.errors import TableError
@@ -18,6 +17,7 @@ from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate
 from dragdeck.documents import Part
 from dragdeck.files import write_text
 from dragdeck.records.calibration import DropTest, Fit, FitFile, Settings
+from dragdeck.study.force_record import read_record
 
 SweepPurpose = Literal["production", "reference"]
 PURPOSES: tuple[SweepPurpose, ...] = ("production", "reference")

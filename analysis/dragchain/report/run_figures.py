@@ -235,7 +235,7 @@ def energy_ratio(energy_j: Floats, particles: Floats, case: CaseOfRun) -> Floats
         The filling; mass and diameter are those of its mean particle.
     """
     radius = case.media.radius_mean_m
-    mass = case.media.density_kg_m3 * 4.0 / 3.0 * np.pi * radius**3
+    mass = case.media.weight_kg_m3 * 4.0 / 3.0 * np.pi * radius**3
     return np.asarray(energy_j / particles / (mass * case.gravity_m_s2 * 2.0 * radius))
 
 

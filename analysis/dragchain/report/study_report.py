@@ -19,6 +19,7 @@ from dragchain.report.cases import (
 )
 from dragchain.report.cost_check import CostRow, answers, cost_rows, prediction_for, read_advice
 from dragchain.report.findings import FIGURES, Findings
+from dragchain.report.measured_signal import SignalComparison, compare_signal
 from dragchain.report.page import (
     NETWORK_PAGE,
     data_uri,
@@ -183,6 +184,7 @@ def write_study_report(
     run_dirs: Sequence[Path],
     advice: Path | None = None,
     preview: Path | None = None,
+    signal: Path | None = None,
 ) -> None:
     """Write ``summary.csv``, ``.parquet`` and ``.xlsx``, and ``report.html``, on process runs.
 
@@ -200,6 +202,9 @@ def write_study_report(
         ``advice.json`` of the study.
     preview : Path, optional
         Picture of the set-up of its first case, PNG.
+    signal : Path, optional
+        Measured force signal that the study names, CSV; its comparison is also written as
+        ``signal.csv`` and ``.parquet``.
 
     Raises
     ------
@@ -218,14 +223,16 @@ def write_study_report(
         studies = [section.study for section in sections]
         table = summary(studies)
         cases = cases_of(studies)
-        page = _render(sections, cases, table, missing, file_uri(preview) if preview else None)
+        picture = file_uri(preview) if preview else None
+        signals = [one for case in cases if (one := compare_signal(case, signal))]
+        page = _render(sections, cases, table, missing, picture, signals)
         for section, name in zip(sections, _network_pages(sections), strict=True):
             if section.network is not None:
                 write_bytes(out_dir / name, section.network.read_bytes())
         assumed = {one.study.process.case.run: one.assumptions for one in sections}
         write_bundle(
             out_dir,
-            tables={"summary": table},
+            tables={"summary": table} | _tables(signals),
             files={"summary.xlsx": summary_workbook(table, assumed, cases)},
             pages={"report": page},
         )
@@ -307,6 +314,7 @@ def _render(
     table: pd.DataFrame,
     missing: Sequence[MissingRun],
     preview: str | None,
+    signals: Sequence[SignalComparison],
 ) -> str:
     """The page: HTML that needs no other file and no network."""
     studies = [section.study for section in sections]
@@ -324,6 +332,7 @@ def _render(
         checks=[(run, check) for run in runs for check in run.record.checks],
         costs=[(one, row) for one in sections for row in one.costs],
         compared=[(one, row) for one in cases for row in one.values.against],
+        signals=[(one, data_uri(one.picture()) if one.differences else None) for one in signals],
         overview=_overview(cases) if len(cases) > 1 else None,
         columns={str(name): table[name].tolist() for name in table},
         shown=_SHOWN,
@@ -343,6 +352,12 @@ def _engine_runs(studies: Sequence[StudyRuns]) -> list[ReportedRun[Findings]]:
     """Every run of LIGGGHTS once: cases may share one, and so may workpieces."""
     every = {(str(run.case.scene), run.case.run): run for study in studies for run in study.runs}
     return [run for run in every.values() if run.case.output_of is None]
+
+
+def _tables(signals: Sequence[SignalComparison]) -> dict[str, pd.DataFrame]:
+    """The comparison with a measured signal, if there is one."""
+    found = [one.table() for one in signals if one.differences]
+    return {"signal": pd.concat(found, ignore_index=True)} if found else {}
 
 
 def _overview(cases: Sequence[ReportedCase]) -> str:

@@ -102,7 +102,7 @@ def _read_run(folder: Path, field: str) -> RunOfScaling:
     if drag.mean >= 0.0:
         raise TableError(f"{folder}: the mean drag is {drag.mean:+.3g} N, along the motion")
     workpiece = needed(case.workpiece, "workpiece")
-    weight = case.media.density_kg_m3 * case.gravity_m_s2 * 2.0 * workpiece.radius_m
+    weight = case.media.weight_kg_m3 * case.gravity_m_s2 * 2.0 * workpiece.radius_m
     row = ScaledRun(
         run=case.run,
         seed=case.inputs.get("seed"),

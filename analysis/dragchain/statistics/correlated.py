@@ -237,7 +237,9 @@ The sum then comes from a few dozen events, and its distribution is too skew for
 """
 
 
-def estimates(sums: Floats, statistic: Callable[[Floats], Floats]) -> list[Estimate]:
+def estimates(
+    sums: Floats, statistic: Callable[[Floats], Floats], *, confidence: float = CONFIDENCE
+) -> list[Estimate]:
     """Return statistics of mean frame sums with their intervals.
 
     The ends of an interval are the values of the statistic where the means are moved as far as
@@ -250,6 +252,8 @@ def estimates(sums: Floats, statistic: Callable[[Floats], Floats]) -> list[Estim
         Sums of each frame, in the order of time.
     statistic
         Function of (..., k) mean sums that returns (..., m) numbers.
+    confidence : float
+        Level of the intervals, between 0 and 1.
 
     Raises
     ------
@@ -266,7 +270,10 @@ def estimates(sums: Floats, statistic: Callable[[Floats], Floats]) -> list[Estim
     with np.errstate(divide="ignore", invalid="ignore"):
         values = statistic(means)
         series = centred @ _slopes(sums, means, statistic)
-        found = [estimate_mean(one) if np.isfinite(one).all() else None for one in series.T]
+        found = [
+            estimate_mean(one, confidence=confidence) if np.isfinite(one).all() else None
+            for one in series.T
+        ]
         reach = [one.ci95_high - one.mean if one else np.nan for one in found]
         shares = np.nan_to_num(centred.T @ series / np.sum(series**2, axis=0))
         moves = (shares * reach).T

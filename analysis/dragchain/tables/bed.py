@@ -47,7 +47,8 @@ def describe_bed(particles: Frame, case: CaseOfRun, spheres: Frame | None = None
         density = case.density_of(particles.ids("particle_id"))
     mass = volume * density
     energy = 0.5 * mass * (particles.vectors("vx_m_s", "vy_m_s", "vz_m_s") ** 2).sum(axis=1)
-    scale = mass.mean() * case.gravity_m_s2 * 2.0 * radius.mean()
+    weight = (mass - volume * case.media.buoyancy_kg_m3).mean()
+    scale = weight * case.gravity_m_s2 * 2.0 * radius.mean()
     return Packing(
         bed_height_m=height,
         top_m=float((surface.columns["z_m"] + surface.columns["radius_m"]).max()),

@@ -114,6 +114,21 @@ def _draw_scaling() -> Figure:
     return draw_scalings(read_scalings())
 
 
+def _draw_simplifications() -> Figure:
+    """Confidence intervals of the change of the mean drag in simpler scenes."""
+    rows = record_table("scenes/simplifications")
+    places = range(len(rows), 0, -1)
+    figure = _figure(7.6, 2.8)
+    axes = figure.subplots()
+    low, high = (100 * rows[f"drag_mean_{end}"] for end in _CI)
+    axes.hlines(places, low, high, color=COLOURS["drag"], lw=4)
+    axes.axvline(0, color="black", lw=0.7)
+    axes.set_yticks(places, rows["change"])
+    axes.set_xlabel("change of the mean drag (%), 95 % CI")
+    axes.grid(axis="y", visible=False)
+    return figure
+
+
 def _draw_spin() -> Figure:
     """Mean drag and torque over the spin ratio, with 95 % confidence intervals."""
     rows = record_table("motion/spin")
@@ -241,6 +256,34 @@ def _draw_verification(smallest: float = 1e-12) -> Figure:
     axes.set(xscale="log", xlabel="largest error / tolerance", xlim=(0.5 * smallest, 10))
     axes.grid(axis="y", visible=False)
     return figure
+
+
+def _draw_windows() -> Figure:
+    """Soft run and windows in the scene of the paper, relative to a run with the physical E."""
+    rows = record_table("windows/paper").dropna(subset=["stiff"])
+    places = np.arange(len(rows), 0, -1)
+    figure = _figure(7.6, 3.0)
+    axes = figure.subplots()
+    widths = 100 * rows["stiff_half_width"]
+    axes.barh(places, 2 * widths, left=-widths, color=LIGHT, label="reference, 95 % CI")
+    ratios = {one: 100 * (rows[one] / rows["stiff"] - 1) for one in ("soft", "value", *_CI)}
+    ends = np.sort([ratios[end] for end in _CI], axis=0)
+    sides = [ratios["value"] - ends[0], ends[1] - ratios["value"]]
+    axes.plot(ratios["soft"], places, "s", color=ORANGE, label="soft run")
+    axes.errorbar(
+        ratios["value"], places, xerr=sides,
+        fmt="o", color=BLUE, capsize=3, label="windows, 95 % CI",
+    )  # fmt: skip
+    axes.axvline(0, color="black", lw=0.7)
+    labels = record_table("quantities").set_index("name")["label"]
+    axes.set_yticks(places, labels[rows["quantity"]])
+    axes.set_xlabel("difference from the reference (%)")
+    figure.legend(loc="outside upper center", ncols=3)
+    axes.grid(axis="y", visible=False)
+    return figure
+
+
+_CI = ("ci95_low", "ci95_high")
 
 
 CHARTS = {

@@ -13,8 +13,9 @@ from dragchain.calibration.fit import WIDTH_LIMIT, calibrate, observe, sample_im
 from dragchain.calibration.measured_impacts import Measured, measure_impacts
 from dragchain.calibration.results import bias_table, read_off, result
 from dragchain.calibration.simulated_drops import Drops, emulate, waveform
-from dragchain.errors import RecordError, TableError
+from dragchain.errors import TableError
 from dragchain.statistics.estimate import Estimate
+from dragdeck.errors import RecordError
 from dragdeck.records.calibration import Purpose
 
 

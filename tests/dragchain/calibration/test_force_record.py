@@ -9,9 +9,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from dragchain.calibration.force_record import check_samples, parse_record, read_record
 from dragchain.calibration.measured_impacts import Measured, measure_impacts
-from dragchain.errors import RecordError
+from dragdeck.errors import RecordError
+from dragdeck.study.force_record import check_samples, parse_record, read_record
 
 Floats = NDArray[np.float64]
 

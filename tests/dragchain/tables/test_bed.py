@@ -58,6 +58,10 @@ def test_describes_a_bed_of_one_particle_by_hand(tiny_run: Path) -> None:
     assert bed.solid_fraction == pytest.approx(4 / 3 * 0.03**3 / (0.04**2 * 0.06))
     assert bed.kinetic_energy_ratio == pytest.approx(0.5 * 0.05 / (10 * 0.06))
     assert (bed.n_particles, bed.radius_mean_m, bed.radius_std_m) == (1, 0.03, 0.0)
+    floating = case.media.density_kg_m3 / 4
+    media = case.media.model_copy(update={"buoyancy_kg_m3": floating})
+    wet = describe_bed(frame([[0, 0, 0.03, 0.1, 0, 0.2, 0.03]]), changed(case, media=media))
+    assert wet.kinetic_energy_ratio == pytest.approx(bed.kinetic_energy_ratio / 0.75)
 
 
 def test_the_spread_of_radii_is_that_of_the_bed(tiny_run: Path) -> None:

@@ -1,13 +1,11 @@
 """The drops of a calibration, and the recovery of a known restitution on the real engine."""
 
-import math
 from pathlib import Path
 from typing import Any
 
 import pytest
 from made_study import Made
 from make_record import Sensor, synthetic_record
-from scipy.integrate import solve_ivp
 
 from dragchain.calibration.fit import calibrate_file
 from dragchain.calibration.report import write_calibration_report
@@ -180,47 +178,3 @@ def test_a_known_restitution_is_recovered(measured_case: Case, project: Project)
     assert f"<b>{result.put.value:.4g}</b>" in page
     assert page.count("data:image/") == 1
     assert "http" not in page
-
-
-def truncated_rebound(deck: float) -> float:
-    """Rebound of a Hertz contact with damping whose force ends where it would pull.
-
-    m x'' = -k x^(3/2) - a sqrt(m k) x^(1/4) x' with
-    a = sqrt(5) |ln e| / sqrt(ln^2 e + pi^2) (Antypov and Elliott 2011), in units
-    of m = k = 1 and an impact speed of 1, integrated until the force is zero.
-    """
-    log = math.log(deck)
-    damping = math.sqrt(5.0) * abs(log) / math.hypot(log, math.pi)
-
-    def force(state: tuple[float, float]) -> float:
-        overlap, speed = max(state[0], 0.0), state[1]
-        return float(overlap**1.5 + damping * overlap**0.25 * speed)
-
-    def ends(_: float, state: tuple[float, float]) -> float:
-        return force(state) if state[1] < 0 else 1.0
-
-    ends.terminal = True  # type: ignore[attr-defined]
-    path = solve_ivp(
-        lambda _, state: (state[1], -force(state)), (0, 10), (1e-12, 1.0), events=ends,
-        rtol=1e-10, atol=1e-13,
-    )  # fmt: skip
-    return float(-path.y[1, -1])
-
-
-@pytest.mark.engine
-def test_limit_force_changes_the_rebound_as_the_law_says(
-    measured_case: Case, project: Project
-) -> None:
-    """The converged engine gives the deck's value back, but not with limitForce."""
-    fine = full(measured_case.study, 0.02)
-    drops = [
-        Drop(f"{o}-{e}", "reference", e, o, 0.010, fine) for o in (True, False) for e in (0.5, 0.8)
-    ]
-    batch = Batch(project.root / "two", environment(project.templates))
-    out = run_drops(measured_case, drops, batch, print)
-    for run in read_drops(out).runs:
-        deck = run.drop.restitution
-        wanted = truncated_rebound(deck) if run.drop.limit_force else deck
-        # gravity acts during the contact too, the more the slower: a few 1e-4
-        assert run.effective == pytest.approx(wanted, abs=1e-3)
-    assert truncated_rebound(0.5) - 0.5 > 0.04  # far more than what is allowed above

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from made_scenes import BED, script
 from made_study import Made
 from markupsafe import Markup
 
@@ -18,11 +19,8 @@ from dragdeck.decks.templates import (
     template_files,
 )
 from dragdeck.errors import InputError
-from dragdeck.physics.packing import Bed
 from dragdeck.project import Project
 from dragdeck.scenes.process import process_scene
-
-BED = Bed(surface_m=0.038, top_m=0.0446)
 
 
 @pytest.mark.parametrize(
@@ -42,7 +40,7 @@ def test_what_is_neither_text_nor_number_is_refused(value: object) -> None:
 
 def test_a_title_stays_in_its_comment(project: Project, made: Made) -> None:
     case = made({"title": 'R&D of "Müller" # $x &'})
-    text = deck_text(process_scene(case, BED), environment(project.templates))
+    text = script(case, project)
     assert text.splitlines()[0] == "# RD of Müller  x "
     assert comment("a\nb") == "ab"
 

@@ -100,14 +100,6 @@ def test_rows_of_unequal_lengths_are_no_table(after: int) -> None:
     assert caught.value.row == 0
 
 
-def test_a_large_text_is_read_bit_for_bit() -> None:
-    values = np.random.default_rng(3).integers(0, 2**64, 300_000, np.uint64).view(np.float64)
-    values = values[np.isfinite(values)][:240_000].reshape(-1, 3)
-    words = [(f"{one!r}", f"{two:.17g}", f"{three:.9g}") for one, two, three in values.tolist()]
-    wanted = np.array([[float(word) for word in row] for row in words])
-    assert bits(cells_of_text(text_of(words), 3)) == bits(wanted.T)
-
-
 @pytest.mark.parametrize(
     ("cells", "problem"),
     [

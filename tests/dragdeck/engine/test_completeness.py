@@ -173,18 +173,6 @@ def test_a_damaged_byte_leaves_the_frames_before_it(tmp_path: Path, name: str) -
             assert found.problem or (len(found.steps) == len(steps) and error is None)
 
 
-def test_a_header_without_columns_ends_the_whole_frames(tmp_path: Path) -> None:
-    whole = Raw.binary(7, ROWS[0], 3, 1)
-    (tmp_path / "a.bin").write_bytes(whole + whole[:92] + bytes(4) + whole[96:])
-    output = dump("a.bin").model_copy(update={"first_step": 7, "last_step": 14})
-    (damage,) = cut_outputs(tmp_path, {"a": output}, parts(0), 7)
-    assert damage == (
-        f"a.bin, frame 1, byte {len(whole)}: the rows have 0 columns, "
-        "expected the header of a binary dump with 3 columns"
-    )
-    assert (tmp_path / "a.bin").read_bytes() == whole
-
-
 def test_frames_in_a_tilted_box_are_whole(tmp_path: Path) -> None:
     frames = [Raw.binary(step, ROWS[step], 3, 2) for step in (0, 14)]
     tilted = [

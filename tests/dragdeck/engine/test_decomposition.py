@@ -16,12 +16,10 @@ from dragdeck.engine.log import decomposition
 from dragdeck.errors import InputError
 from dragdeck.outlook.process import bed_notes
 from dragdeck.physics.domain_split import FilledBowl, rank_warnings, split
-from dragdeck.physics.packing import pour
 from dragdeck.project import Project
 from dragdeck.records.run import Decomposition, ParticlesPerRank
 from dragdeck.scenes.filling import filling_scene
 from dragdeck.scenes.process import PROCESS
-from dragdeck.study.media import quantiles
 from dragdeck.sweep.cases import load_cases
 
 WriteStudy = Callable[..., Path]
@@ -57,11 +55,6 @@ def test_sixteen_ranks_do_better_than_the_square_that_the_engine_would_choose() 
     assert found.line == "8 2 1"
     square = (0.31 / 2) ** 2 / (np.pi * 0.3**2)  # a cell at the centre, all within the bowl
     assert max(found.particles) < 1000 * square
-
-
-def test_halves_and_quarters_of_a_round_bowl_are_equal() -> None:
-    assert split(2, BOWL).particles == pytest.approx([500, 500])
-    assert split(4, BOWL).particles == pytest.approx([250] * 4)
 
 
 def test_a_strip_of_a_disc_holds_what_geometry_says() -> None:
@@ -103,19 +96,6 @@ def test_an_uneven_split_gets_a_warning() -> None:
         == rank_warnings(split(caution.settings["ranks"], roomy))
         == []
     )
-
-
-def test_the_expected_share_is_that_of_the_poured_particles() -> None:
-    particles = pour([quantiles("normal", 3e-3, 1e-4, 20000)], 0.15, seed=1)
-    x, y, _ = particles.positions_m.T
-    half = 0.156
-    filled = FilledBowl(20000, 0.15, 0.1, half, -0.003, 0.3, 0.006)
-    found = split(6, filled)
-    columns = [np.clip(((v + half) / (2 * half) * n).astype(int), 0, n - 1)
-               for v, n in zip((x, y), found.grid, strict=False)]  # fmt: skip
-    counts = np.zeros(found.grid[:2])
-    np.add.at(counts, tuple(columns), 1)
-    assert counts.ravel() == pytest.approx(found.particles, rel=0.06)
 
 
 def test_many_cases_get_a_core_each_and_one_big_case_gets_them_all() -> None:

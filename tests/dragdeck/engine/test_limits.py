@@ -124,21 +124,3 @@ def test_an_unstable_run_is_stopped_early_with_the_reason(unstable: Path) -> Non
     assert list(failed_checks(unstable)) == ["within_limits"]
     assert state(unstable).stopped_early
     assert not (unstable / "run.json").exists()
-
-
-@pytest.mark.engine
-def test_an_unstable_run_fails_fast_as_it_is_rendered(unstable: Path) -> None:
-    """Whoever is first, the engine or the watcher: the run fails in its first steps."""
-    with pytest.raises(RejectedRunError):
-        run(unstable, lambda line: None)
-    failed = failed_checks(unstable)
-    assert "within_limits" in failed or failed.get("no_engine_error") == "lost_particles"
-    assert state(unstable).steps < 5000
-
-
-@pytest.mark.engine
-def test_a_healthy_run_says_that_it_met_no_limit(case: Case, project: Project) -> None:
-    folder = project.run_folder(case, FILLING)
-    write_run(filling_scene(case), folder, environment(project.templates))
-    checks = run(folder, lambda line: None).checks
-    assert [check.passed for check in checks if check.code == "within_limits"] == [True]

@@ -76,8 +76,3 @@ def test_only_a_launcher_of_ones_own_sees_the_queue(
 def test_a_resumed_run_names_its_checkpoint() -> None:
     words = command(Engine("e", "3.8.0"), "deck", 1, 2, Path("run/checkpoint.10.restart"))
     assert words[-6:] == ["-var", "resume", "1", "-var", "from", "checkpoint.10.restart"]
-
-
-@pytest.mark.engine
-def test_the_real_engine_is_found() -> None:
-    assert find_engine().version >= "3.8.0"

@@ -1,6 +1,5 @@
 """Runs on the real engine: to the end, interrupted, killed, failed, changed."""
 
-import itertools
 import os
 import re
 import signal
@@ -16,7 +15,6 @@ import pytest
 from made_study import Made
 from run_files import rewrite
 
-from dragdeck.cases.case import Case
 from dragdeck.decks.render import write_run
 from dragdeck.decks.templates import environment
 from dragdeck.engine.checkpoints import checkpoint_files, checkpoint_step
@@ -26,7 +24,6 @@ from dragdeck.engine.watch import EngineEnded, Watcher, cut_screen
 from dragdeck.errors import EngineError, InputError, RejectedRunError
 from dragdeck.project import Project
 from dragdeck.records.run import CaseFile, RunRecord
-from dragdeck.scenes.drop_test import DROP_TEST, drop_scene
 from dragdeck.scenes.filling import FILLING, filling_scene
 
 pytestmark = pytest.mark.engine
@@ -148,19 +145,6 @@ def test_a_stop_leaves_a_checkpoint_and_the_run_goes_on(
     assert result.state == "complete"
 
 
-def test_a_killed_engine_is_never_a_result(made: Made, project: Project) -> None:
-    folder = slow_filling(made, project)
-    process = start(folder)
-    wait_for(has_checkpoint(folder), process)
-    for child in psutil.Process(process.pid).children(recursive=True):
-        os.kill(child.pid, signal.SIGKILL)
-    _, said = process.communicate()
-    assert process.returncode == 1
-    assert b"LIGGGHTS was killed" in said
-    assert not (folder / "run.json").exists()
-    assert run(folder, silent).state == "complete"
-
-
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_after_a_kill_and_damage_the_run_goes_on_from_what_is_whole(
     made: Made, project: Project, ranks: int
@@ -276,18 +260,6 @@ def test_a_missing_engine_leaves_no_trace(filling: Path, monkeypatch: pytest.Mon
     with pytest.raises(EngineError):
         run(filling, silent)
     assert not (filling / "state.json").exists()
-
-
-def test_a_drop_has_three_impacts(case: Case, project: Project) -> None:
-    folder = project.run_folder(case, DROP_TEST)
-    write_run(drop_scene(case), folder, environment(project.templates))
-    run(folder, silent)
-    rows = (folder / "impacts.1.txt").read_text().splitlines()
-    assert rows.count(rows[0]) == 3
-    forces = [float(row.split()[-1]) for row in rows if row != rows[0]]
-    touching = [force > 0 for force in forces]
-    starts = sum(now and not before for before, now in itertools.pairwise([False, *touching]))
-    assert starts == 3
 
 
 def watcher(folder: Path, **changed: Any) -> Watcher:

@@ -12,7 +12,7 @@ from dragdeck.engine.process import only_runner
 from dragdeck.engine.reports import printable, shown_time, silent
 from dragdeck.engine.status import run_status
 from dragdeck.project import Project
-from dragdeck.records.run import AcceptanceCheck, RunPart, RunRecord, State
+from dragdeck.records.run import RunPart, RunRecord, State
 from dragdeck.scenes.filling import FILLING, filling_scene
 from dragdeck.scenes.process import PROCESS, process_scene
 
@@ -98,18 +98,6 @@ def test_looking_does_not_keep_a_runner_waiting(process: Path) -> None:
     with only_runner(process, said.append):
         pass
     assert said == []
-
-
-def test_a_failed_run_names_its_check_and_the_remedy(process: Path) -> None:
-    check = AcceptanceCheck(
-        code="particles_kept", name="no particle lost", passed=False,
-        seen="8 particles", limit="9 asked", remedy="choose less",
-    )  # fmt: skip
-    write_state(process, "failed", checks=[check])
-    status = run_status(process)
-    assert status.state == "failed"
-    assert "check:  no particle lost: 8 particles (limit: 9 asked)" in status.problem
-    assert "remedy: choose less" in status.problem
 
 
 def test_what_ended_a_run_before_its_start_is_in_its_log(process: Path) -> None:

@@ -149,6 +149,11 @@ BAD: list[tuple[dict[str, Any], str]] = [
 ]
 
 
+def test_no_compound_with_clumps(made: Made) -> None:
+    with pytest.raises(InputError, match="lift every sphere of a clump"):
+        made({"media": {"shape": ROD}, "compound": {"density_kg_m3": 1000, "level_m": 0.05}})
+
+
 @pytest.mark.parametrize(("media", "problem"), BAD, ids=[problem for _, problem in BAD])
 def test_refused(media: dict[str, Any], problem: str, made: Made, project: Any) -> None:
     folder: Path = project.studies / "small"

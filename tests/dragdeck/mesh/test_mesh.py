@@ -1,8 +1,6 @@
 """Meshes against what geometry says they must be, and against the engine itself."""
 
 import math
-import os
-import shutil
 import subprocess
 import time
 from pathlib import Path
@@ -15,6 +13,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from trimesh import Trimesh
 
+from dragdeck.engine.process import find_engine
 from dragdeck.errors import InputError
 from dragdeck.mesh import checks, files, shapes
 from dragdeck.mesh import surface as surfaces
@@ -49,19 +48,6 @@ def problems(mesh: Trimesh, **options: object) -> list[str]:
 
 
 # --- the properties of a mesh -------------------------------------------------
-
-
-def test_tetrahedron_by_hand():
-    assert TETRAHEDRON.is_watertight
-    assert TETRAHEDRON.is_winding_consistent
-    assert TETRAHEDRON.volume == pytest.approx(1e-6 / 6)
-    slanted = math.sqrt(3) / 2
-    assert TETRAHEDRON.area_faces == pytest.approx(np.array([0.5, 0.5, slanted, 0.5]) * 1e-4)
-    assert TETRAHEDRON.face_normals[2] == pytest.approx(np.full(3, 1 / math.sqrt(3)))
-    assert TETRAHEDRON.bounds.tolist() == [[0, 0, 0], [0.01, 0.01, 0.01]]
-    assert np.sort(np.degrees(TETRAHEDRON.face_angles[0])) == pytest.approx([45, 45, 90])
-    assert np.degrees(TETRAHEDRON.face_angles[2]) == pytest.approx([60, 60, 60])
-    assert problems(TETRAHEDRON) == []
 
 
 def test_bounds_ignore_nodes_that_no_facet_uses():
@@ -236,10 +222,6 @@ def test_open_box():
     assert str(caught.value.value).startswith("3 of 6 edges")
 
 
-def test_an_open_surface_is_fine_where_no_body_is_needed():
-    assert checks.check(with_facets([0, 2, 1], [0, 1, 3], [1, 2, 3]), workpiece=False) == []
-
-
 def turned(mesh: Trimesh, which: list[int]) -> Trimesh:
     """The same surface with the corners of some facets in the other order."""
     faces = mesh.faces.copy()
@@ -290,31 +272,24 @@ def test_a_surface_with_one_side_is_refused():
     assert "the surface has one side only" in problems(klein_bottle())
 
 
-def beside(*meshes: Trimesh) -> Trimesh:
-    """Several surfaces in one mesh, side by side."""
-    shifted = [
-        surfaces.surface(mesh.vertices + np.array([0.02 * number, 0, 0]), mesh.faces)
-        for number, mesh in enumerate(meshes)
-    ]
+def both(one: Trimesh, other: Trimesh) -> Trimesh:
+    """Two bodies in one mesh."""
     return surfaces.surface(
-        np.vstack([mesh.vertices for mesh in shifted]),
-        np.vstack([mesh.faces + 4 * number for number, mesh in enumerate(shifted)]),
+        np.vstack([one.vertices, other.vertices]),
+        np.vstack([one.faces, other.faces + len(one.vertices)]),
     )
 
 
 def test_several_bodies_are_refused():
+    beside = surfaces.surface(TETRAHEDRON.vertices + np.array([0.02, 0, 0]), TETRAHEDRON.faces)
     with pytest.raises(InputError, match="several bodies") as caught:
-        checks.check(beside(TETRAHEDRON, TETRAHEDRON))
+        checks.check(both(TETRAHEDRON, beside))
     assert str(caught.value.value).startswith("2 bodies; the largest has 4 of 8 facets")
 
 
 def test_a_hollow_body_is_refused():
     void = surfaces.surface(0.1 * TETRAHEDRON.vertices + 0.001, TETRAHEDRON.faces[:, ::-1])
-    hollow = surfaces.surface(
-        np.vstack([TETRAHEDRON.vertices, void.vertices]),
-        np.vstack([TETRAHEDRON.faces, void.faces + 4]),
-    )
-    assert problems(hollow) == ["the mesh contains several bodies"]
+    assert problems(both(TETRAHEDRON, void)) == ["the mesh contains several bodies"]
 
 
 def test_sharp_angles():
@@ -571,39 +546,26 @@ run 0
 
 
 def engine_reads(mesh: Trimesh, folder: Path) -> tuple[bool, str]:
-    engine = os.environ.get("DRAGDECK_ENGINE") or "liggghts"
-    assert shutil.which(engine), f"{engine} is missing: ./run installs it"
     (folder / "workpiece.stl").write_text(files.stl_text(mesh))
     (folder / "in.liggghts").write_text(DECK)
     done = subprocess.run(
-        [engine, "-in", "in.liggghts"],
-        cwd=folder,
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        encoding="utf-8",
-        check=False,
+        [find_engine().path, "-in", "in.liggghts"], cwd=folder, capture_output=True, text=True
     )
     return done.returncode == 0, done.stdout + done.stderr
 
 
-@pytest.mark.engine
-@pytest.mark.parametrize("facet_size_m", [0.0005, 0.002, 0.005])
-def test_engine_reads_every_cylinder_without_a_warning(tmp_path: Path, facet_size_m: float):
-    workpiece = shapes.cylinder(0.005, 0.08, facet_size_m)
-    read, output = engine_reads(workpiece, tmp_path)
-    assert read, output
-    assert f"containing {len(workpiece.faces)} triangle(s) successful" in output
-    assert "WARNING" not in output
-
-
-@pytest.mark.engine
-@pytest.mark.parametrize("name", ["shaft.step", "cutter.step"])
-def test_engine_reads_the_parts_without_a_warning(tmp_path: Path, name: str):
+def part(name: str) -> Trimesh:
     pytest.importorskip("gmsh", reason="gmsh is not made for every machine")
-    part = surfaces.place(files.read(MESHES / name, "mm", 0.0015, 0.0007))
-    read, output = engine_reads(part, tmp_path)
+    return surfaces.place(files.read(MESHES / name, "mm", 0.0015, 0.0007))
+
+
+@pytest.mark.engine
+@pytest.mark.parametrize("made", [0.0005, 0.005, "shaft.step", "cutter.step"])
+def test_engine_reads_cylinders_and_parts_without_a_warning(tmp_path: Path, made: float | str):
+    body = part(made) if isinstance(made, str) else shapes.cylinder(0.005, 0.08, made)
+    read, output = engine_reads(body, tmp_path)
     assert read, output
-    assert f"containing {len(part.faces)} triangle(s) successful" in output
+    assert f"containing {len(body.faces)} triangle(s) successful" in output
     assert "WARNING" not in output
 
 

@@ -8,7 +8,7 @@ import pytest
 from dragdeck.cases.case import Case
 from dragdeck.engine.space import expected_bytes
 from dragdeck.engine.status import RunStatus
-from dragdeck.outlook.explain import Cost, scene_lines
+from dragdeck.outlook.explain import Cost
 from dragdeck.outlook.runs import (
     StudyRun,
     alike_but_for_seed,
@@ -20,7 +20,7 @@ from dragdeck.outlook.runs import (
 )
 from dragdeck.project import Project
 from dragdeck.scenes.filling import FILLING
-from dragdeck.scenes.process import PROCESS, SCENES
+from dragdeck.scenes.process import PROCESS
 
 
 def a_run(
@@ -118,13 +118,3 @@ def test_runs_that_differ_in_the_seed_are_built_once(case: Case) -> None:
     third = replace(case, study=case.study.model_copy(update={"motion": deeper}))
     groups = alike_but_for_seed({Path("a"): case, Path("b"): other, Path("c"): third})
     assert [list(group) for group in groups] == [[Path("a"), Path("b")], [Path("c")]]
-
-
-def test_a_page_of_all_scenes_fits_a_terminal(case: Case) -> None:
-    lines = [
-        line
-        for kind in SCENES.values()
-        for line in scene_lines(kind.build(case, None), Cost(12345678, 5e5, "assumed"), 200, 80)
-    ]
-    assert len(lines) <= 22
-    assert max(map(len, lines)) <= 80

@@ -10,7 +10,6 @@ from paths import ROOT
 
 from dragdeck.cases.bed import particle_material, smallest_radius
 from dragdeck.cases.case import Case
-from dragdeck.cli import main
 from dragdeck.errors import InputError
 from dragdeck.outlook.timestep import (
     check_timestep,
@@ -22,11 +21,9 @@ from dragdeck.outlook.timestep import (
     stable_step_note,
 )
 from dragdeck.physics.contact_mechanics import effective_modulus, rayleigh_time
-from dragdeck.project import Project
 from dragdeck.records.stability import (
     RestitutionErrors,
     StableStepLaw,
-    stability_map,
     stable_step_law,
 )
 from dragdeck.scenes.filling import FILLING
@@ -59,17 +56,6 @@ def test_what_lies_outside_of_the_measured_range_is_said(case: Case) -> None:
         for pair in outlook(case, PROCESS, step):
             assert pair.measured is not outside
             assert ("outside the measured range" in str(pair)) is outside
-
-
-def test_the_measured_table_is_of_a_real_map() -> None:
-    known = stability_map()
-    steps = known.restitution_error.steps_per_contact
-    assert list(steps) == sorted(steps) and len(steps) == len(known.restitution_error.worst)
-    assert known.engine_versions and known.measured
-    for row in known.regimes.values():
-        assert row.ordinary_fraction is not None
-        assert 0 < row.safe_fraction <= row.ordinary_fraction
-    assert 0 < known.safety_factor < 1
 
 
 def test_unlike_bodies_are_looked_at_too(case: Case) -> None:
@@ -113,20 +99,6 @@ def test_strong_damping_has_its_own_safe_step(made: Made) -> None:
     ordinary, _ = safe_fraction(case, FILLING)
     damped = made({"pairs.ceramic-steel.restitution": 0.1})
     assert safe_fraction(damped, FILLING)[0] < ordinary
-
-
-@pytest.mark.engine
-def test_check_says_what_the_step_means(
-    case: Case,
-    project: Project,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    monkeypatch.chdir(project.root)
-    assert main(["check", "small", "--verbose"]) == 0
-    said = capsys.readouterr().out
-    assert "particle on workpiece: " in said and "particle on plate: " in said
-    assert "error of restitution up to" in said
 
 
 def paper(scale: float, fraction: float) -> Case:

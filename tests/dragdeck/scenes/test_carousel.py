@@ -8,17 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from made_scenes import BED, script
 
 from dragdeck.cases.case import Case, of_each_workpiece
-from dragdeck.decks.render import deck_text
-from dragdeck.decks.templates import environment
 from dragdeck.errors import InputError
-from dragdeck.physics.packing import Bed
 from dragdeck.project import Project, by_folder
 from dragdeck.scenes.process import PROCESS, process_scene
 from dragdeck.sweep.cases import load_cases
 
-BED = Bed(surface_m=0.038, top_m=0.0446)
 THIN = {"kind": "cylinder", "radius_m": 0.002, "facet_size_m": 0.001}
 LINE = {"kind": "line", "start_m": [0.005, 0.012], "direction_deg": 180, "length_m": 0.01}
 WAYPOINTS = {"kind": "waypoints", "points": [[0, 0.012, 0], [1, 0.01, 0.004], [2, 0.009, 0.002]]}
@@ -56,10 +53,6 @@ def test_a_warning_says_which_workpiece_is_meant(carousel: Carousel) -> None:
     assert one.startswith("workpiece 1: the gap between workpiece and bowl is 1.8")
     both = gaps(*({**station, "shape": dict(thick)} for station in each))
     assert len(both) == 1 and both[0].startswith("the gap between workpiece and bowl is 1.8")
-
-
-def script(case: Case, project: Project) -> str:
-    return deck_text(process_scene(case, BED), environment(project.templates))
 
 
 def test_one_workpiece_is_as_none_were_asked_for(carousel: Carousel, project: Project) -> None:
@@ -146,20 +139,16 @@ def test_the_wake_begins_where_the_next_one_ahead_began(
     assert seen == pytest.approx([around * gap / 360 for gap in gaps])
 
 
-def test_no_wake_on_a_short_path(carousel: Carousel) -> None:
-    (first, *_) = of_each_workpiece(carousel({"count": 3}))
-    assert process_scene(first, BED).case.workpiece.wake_from_m is None
-
-
-def test_a_single_revolution_has_no_wake(carousel: Carousel) -> None:
-    path = {"kind": "circle", "radius_m": 0.012, "revolutions": 1}
-    assert process_scene(carousel(None, path=path), BED).case.workpiece.wake_from_m is None
-
-
-def test_a_second_revolution_is_in_the_own_wake(carousel: Carousel) -> None:
-    path = {"kind": "circle", "radius_m": 0.012, "revolutions": 1.5}
-    wake = process_scene(carousel(None, path=path), BED).case.workpiece.wake_from_m
-    assert wake == pytest.approx(2 * math.pi * 0.012)
+@pytest.mark.parametrize(
+    ("count", "revolutions", "wake_m"),
+    [(3, 0.1, None), (1, 1, None), (1, 1.5, 2 * math.pi * 0.012)],
+)
+def test_only_a_long_path_leads_through_a_wake(
+    carousel: Carousel, count: int, revolutions: float, wake_m: float | None
+) -> None:
+    path = {"kind": "circle", "radius_m": 0.012, "revolutions": revolutions}
+    (first, *_) = of_each_workpiece(carousel({"count": count}, path=path))
+    assert process_scene(first, BED).case.workpiece.wake_from_m == pytest.approx(wake_m)
 
 
 @pytest.mark.parametrize(

@@ -9,24 +9,20 @@ from typing import Any
 
 import numpy as np
 import pytest
+from made_scenes import BED, script
 
 from dragdeck.cases.case import Case, of_each_workpiece
-from dragdeck.decks.render import deck_text
-from dragdeck.decks.templates import environment
 from dragdeck.errors import InputError
-from dragdeck.physics.packing import Bed
 from dragdeck.project import Project
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.lead import RAMP_STAGES, covered, led, step_at, windows_of
 from dragdeck.scenes.motion import course
 from dragdeck.scenes.process import PROCESS, process_scene
-from dragdeck.scenes.scene import StudyScene
 from dragdeck.scenes.workpiece import reference_height
 from dragdeck.study.base import Json
 from dragdeck.study.drive import Drive, by_vector, rotated
 from dragdeck.sweep.cases import load_cases
 
-BED = Bed(surface_m=0.038, top_m=0.0446)
 START = {"youngs_modulus_scale": 0.01, "timestep_fraction": 0.5}
 STIFF = {"youngs_modulus_scale": 1, "soft_start": START, "timestep_fraction": 0.5, "ranks": 1}
 WINDOWS = {"tolerance": 0.1, "quantities": ["drag_mean", "workpiece_contacts"], "most": 5}
@@ -58,11 +54,6 @@ def made(small: dict[str, Any], write_study: Callable[..., Path]) -> Make:
     return make
 
 
-def script(scene: StudyScene, project: Project) -> str:
-    """The input script of a scene."""
-    return deck_text(scene, environment(project.templates, project.studies / "none"))
-
-
 @pytest.mark.parametrize("path", PATHS)
 @pytest.mark.parametrize("more", [{}, {"orientation": "fixed"}, {"spin": {"rpm": 100}}])
 def test_a_run_begins_where_its_course_is(path: str, more: Json, made: Make) -> None:
@@ -92,8 +83,7 @@ def test_a_run_begins_with_an_inclined_workpiece_as_far_as_it_has_spun(made: Mak
 
 def test_the_moduli_are_raised_to_those_of_the_run(made: Make, project: Project) -> None:
     case = made(STIFF)
-    scene = process_scene(case, BED)
-    text = script(scene, project)
+    text = script(case, project)
     stages = re.findall(
         r"youngsModulus peratomtype (\S+) (\S+)\n(?:if.*reset.*\n)?if.*< (\d+)", text
     )
@@ -115,7 +105,7 @@ def test_a_lead_is_soft_and_ends_where_the_run_goes_on(made: Make, project: Proj
     scene = process_scene(lead, BED)
     assert scene.deck.materials.youngs_modulus_scale == 0.01
     assert scene.case.marks == ("state.1.restart",)
-    text = script(scene, project)
+    text = script(lead, project)
     last = scene.case.phases[-1].end_step
     assert f'"run {last} upto" "write_restart state.1.restart"' in text
     assert (

@@ -1,22 +1,17 @@
 """Motions that are superposed on the path: study fields, speeds, checks, input scripts."""
 
 import math
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-import yaml
+from made_scenes import BED
+from made_study import Made
 from pydantic import ValidationError
 
 from dragdeck.cases.bed import bed_timestep, skin
 from dragdeck.cases.case import Case
-from dragdeck.decks.render import deck_text
-from dragdeck.decks.templates import environment
 from dragdeck.errors import InputError
-from dragdeck.physics.packing import Bed
-from dragdeck.project import Project
 from dragdeck.scenes.motion import surface_speed
 from dragdeck.scenes.process import PROCESS, process_scene
 from dragdeck.scenes.workpiece import describe, fastest_motion, workpiece_length
@@ -24,53 +19,25 @@ from dragdeck.study.drive import Drive
 from dragdeck.study.model import Motion
 from dragdeck.study.superposed.oscillation import Oscillation
 from dragdeck.study.superposed.spin import Spin
-from dragdeck.sweep.cases import load_cases
 
-BED = Bed(surface_m=0.038, top_m=0.0446)
 RATE = 300 * 2 * math.pi / 60
 SCHEDULE = [{"until_s": 0.1, "rpm": 300}, {"until_s": 0.15, "rpm": -300}]
-
-WriteStudy = Callable[..., Path]
-
-
-@pytest.fixture
-def with_motion(small: dict[str, Any], write_study: WriteStudy) -> Callable[..., Case]:
-    """The small study with these fields of its motion and fidelity."""
-
-    def make(fidelity: dict[str, Any] | None = None, **motion: Any) -> Case:
-        small["motion"] |= motion
-        small["fidelities"]["quick"] |= fidelity or {}
-        (only,) = load_cases(write_study(small))
-        return only
-
-    return make
-
-
-def script(case: Case, project: Project) -> str:
-    return deck_text(process_scene(case, BED), environment(project.templates))
 
 
 def superposed(case: Case) -> Any:
     return process_scene(case, BED).case.model_dump(mode="json").get("superposed")
 
 
-def test_a_study_without_them_is_as_it_was(case: Case, project: Project) -> None:
-    assert superposed(case) is None
-    assert "superpose" not in script(case, project)
-    assert not {"spin", "oscillation", "counted_from_revolution"} & set(case.study.motion.plain())
-    assert "superposed_speed" not in describe(case)
-
-
-def test_every_speed_grows_by_the_speed_factor(with_motion: Callable[..., Case]) -> None:
+def test_every_speed_grows_by_the_speed_factor(moved: Made) -> None:
     """Stages are as much shorter, so that the workpiece turns as far per metre of path."""
     motion = {
         "spin": {"schedule": SCHEDULE},
         "oscillation": {"amplitude_m": 1e-3, "frequency_hz": 5},
     }
-    slow = with_motion(**motion)
+    slow = moved(**motion)
     one, both = superposed(slow), []
     assert [each["kind"] for each in one] == ["oscillation", "spin"]
-    fast = with_motion({"speed_factor": 2}, **motion)
+    fast = moved({"speed_factor": 2}, **motion)
     for before, after in zip(one[1]["stages"], superposed(fast)[1]["stages"], strict=True):
         assert after["rate_rad_s"] == pytest.approx(2 * before["rate_rad_s"])
         both.append(after["steps"] / before["steps"])
@@ -79,18 +46,6 @@ def test_every_speed_grows_by_the_speed_factor(with_motion: Callable[..., Case])
     assert superposed(fast)[0]["amplitude_m"] == 1e-3
     assert fastest_motion(fast) == pytest.approx(2 * fastest_motion(slow))
     assert describe(fast) == describe(slow)
-
-
-def test_the_stages_fill_the_drag() -> None:
-    """A stage that ends after the drag ends with it; the last one always does."""
-    spin = Spin.model_validate({"schedule": [*SCHEDULE, {"until_s": 5, "rpm": 100}]})
-
-    def steps(end: int) -> list[int]:
-        return [steps for steps, _ in spin.stages(drag(end, 1e-3))]
-
-    assert steps(400) == [100, 50, 250]
-    assert steps(120) == [100, 20]
-    assert steps(60) == [60]
 
 
 def drag(steps: int, timestep_s: float) -> Drive:
@@ -130,22 +85,22 @@ def test_a_motion_starts_smoothly_from_rest() -> None:
     assert np.abs(np.diff(lift, 2)).max() / dt**2 <= most * math.tau * 9
 
 
-def test_no_statistic_includes_the_start(with_motion: Callable[..., Case]) -> None:
+def test_no_statistic_includes_the_start(moved: Made) -> None:
     """The transient lasts at least as long, whatever the speed; a ramp to the end is refused."""
     ramp = {"spin": {"rpm": 60, "ramp_s": 0.2}}
     for factor in (1, 3):
-        made = process_scene(with_motion({"speed_factor": factor}, **ramp), BED).case
+        made = process_scene(moved({"speed_factor": factor}, **ramp), BED).case
         (spin,) = made.model_dump()["superposed"]
         assert spin["ramp_steps"] * made.timestep_s == pytest.approx(0.2 / factor, rel=1e-3)
         assert made.statistics.transient_s == pytest.approx(0.2 / factor, rel=1e-3)
     with pytest.raises(InputError, match=r"motion\.spin\.ramp_s") as caught:
-        with_motion(spin={"rpm": 60, "ramp_s": 0.31})
+        moved(spin={"rpm": 60, "ramp_s": 0.31})
     assert "at most" in str(caught.value)
 
 
-def test_the_highest_surface_speed_counts_all_that_moves(with_motion: Callable[..., Case]) -> None:
+def test_the_highest_surface_speed_counts_all_that_moves(moved: Made) -> None:
     motion = {"spin": {"rpm": 300}, "oscillation": {"amplitude_m": 2e-3, "frequency_hz": 5}}
-    case = with_motion(**motion)
+    case = moved(**motion)
     radius = 0.004
     whole = 0.02 + RATE * radius + 2e-3 * 2 * math.pi * 5
     assert surface_speed(case.study.motion, radius) == pytest.approx(whole)
@@ -155,14 +110,14 @@ def test_the_highest_surface_speed_counts_all_that_moves(with_motion: Callable[.
     assert surface_speed(plain, radius) == 0.02
 
 
-def test_a_drag_at_another_pace_spins_as_much_faster(with_motion: Callable[..., Case]) -> None:
-    motion = with_motion(spin={"rpm": 300}, counted_from_revolution=1).study.motion.at(2.0, 0.05)
+def test_a_drag_at_another_pace_spins_as_much_faster(moved: Made) -> None:
+    motion = moved(spin={"rpm": 300}, counted_from_revolution=1).study.motion.at(2.0, 0.05)
     assert motion.spin is not None and motion.spin.rpm == 600
 
 
-def test_a_workpiece_that_oscillates_is_as_much_longer(with_motion: Callable[..., Case]) -> None:
-    length = workpiece_length(with_motion())
-    moving = with_motion(oscillation={"amplitude_m": 1e-3, "frequency_hz": 5})
+def test_a_workpiece_that_oscillates_is_as_much_longer(moved: Made) -> None:
+    length = workpiece_length(moved())
+    moving = moved(oscillation={"amplitude_m": 1e-3, "frequency_hz": 5})
     assert workpiece_length(moving) == pytest.approx(length + 1e-3)
 
 
@@ -181,23 +136,23 @@ def test_a_workpiece_that_oscillates_is_as_much_longer(with_motion: Callable[...
     ],
 )  # fmt: skip
 def test_motions_that_cannot_be(
-    with_motion: Callable[..., Case], motion: dict[str, Any], field: str, words: str
+    moved: Made, motion: dict[str, Any], field: str, words: str
 ) -> None:
     with pytest.raises(InputError, match=words) as caught:
-        process_scene(with_motion(**motion), BED)
+        process_scene(moved(**motion), BED)
     text = str(caught.value)
     assert field in text
     assert "limit:" in text
     assert "remedy:" in text
 
 
-def test_the_limit_of_a_spin_is_the_skin(with_motion: Callable[..., Case]) -> None:
-    case = with_motion()
+def test_the_limit_of_a_spin_is_the_skin(moved: Made) -> None:
+    case = moved()
     step, radius = bed_timestep(case.study, "timestep_fraction"), 0.004
     most = (skin(case.study) / step - 0.02) / radius * 60 / (2 * math.pi)
-    process_scene(with_motion(spin={"rpm": 0.99 * most}), BED)
+    process_scene(moved(spin={"rpm": 0.99 * most}), BED)
     with pytest.raises(InputError, match="skin"):
-        process_scene(with_motion(spin={"rpm": 1.01 * most}), BED)
+        process_scene(moved(spin={"rpm": 1.01 * most}), BED)
 
 
 @pytest.mark.parametrize(
@@ -220,46 +175,29 @@ def test_blocks_that_cannot_be(block: dict[str, Any], words: str) -> None:
         Motion.model_validate(given | block)
 
 
-def test_a_slip_of_the_unit_in_a_schedule_is_named(with_motion: Callable[..., Case]) -> None:
+def test_a_slip_of_the_unit_in_a_schedule_is_named(moved: Made) -> None:
     with pytest.raises(InputError, match=r"motion\.spin\.schedule\.0\.rpm: is not plausible"):
-        with_motion(spin={"schedule": [{"until_s": 1, "rpm": 1e6}]})
+        moved(spin={"schedule": [{"until_s": 1, "rpm": 1e6}]})
 
 
-def test_a_long_schedule_is_refused_after_one_look_at_its_file(
-    with_motion: Callable[..., Case], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    looks: list[str] = []
-    compose = yaml.compose
-
-    def counted(text: str, Loader: Any) -> Any:
-        looks.append(text)
-        return compose(text, Loader=Loader)
-
-    monkeypatch.setattr(yaml, "compose", counted)
-    schedule = [{"until_s": 1e-3 * n, "rpm": 10.0} for n in range(1, 1001)]
-    with pytest.raises(InputError, match=r"spin\.schedule: the list has 1000 entries"):
-        with_motion(spin={"schedule": schedule})
-    assert len(looks) == 1
-
-
-def test_a_spin_of_zero_is_a_level_of_a_sweep(with_motion: Callable[..., Case]) -> None:
-    still = with_motion(spin={"rpm": 0})
+def test_a_spin_of_zero_is_a_level_of_a_sweep(moved: Made) -> None:
+    still = moved(spin={"rpm": 0})
     assert superposed(still) == [
         {"kind": "spin", "ramp_steps": 1724, "stages": [{"steps": 5416, "rate_rad_s": 0.0}]}
     ]
-    assert PROCESS.run_id(still) != PROCESS.run_id(with_motion(spin={"rpm": 1}))
+    assert PROCESS.run_id(still) != PROCESS.run_id(moved(spin={"rpm": 1}))
 
 
-def test_statistics_from_a_revolution_on(with_motion: Callable[..., Case]) -> None:
+def test_statistics_from_a_revolution_on(moved: Made) -> None:
     """The later of the two counts: the end of the transient, or the start of the revolution."""
     path = {"kind": "circle", "radius_m": 0.01, "revolutions": 2.5}
 
     def transient(**more: Any) -> float:
-        return process_scene(with_motion(path=path, **more), BED).case.statistics.transient_s
+        return process_scene(moved(path=path, **more), BED).case.statistics.transient_s
 
     assert transient() == pytest.approx(0.001 / 0.02, rel=1e-4)
     assert transient(counted_from_revolution=1) == pytest.approx(0.001 / 0.02, rel=1e-4)
     wanted = 4 * math.pi * 0.01 / 0.02
     assert transient(counted_from_revolution=3) == pytest.approx(wanted, rel=1e-4)
     with pytest.raises(InputError, match="counted_from_revolution: no path is left"):
-        with_motion(path=path, counted_from_revolution=4)
+        moved(path=path, counted_from_revolution=4)

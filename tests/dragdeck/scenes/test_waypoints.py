@@ -3,30 +3,24 @@
 import math
 import re
 from collections.abc import Callable
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 import yaml
+from made_scenes import BED, script
 
 from dragdeck.cases.case import Case
-from dragdeck.decks.render import deck_text
-from dragdeck.decks.templates import environment
 from dragdeck.errors import InputError
-from dragdeck.physics.packing import Bed
 from dragdeck.preview.layout import layout
 from dragdeck.project import Project
-from dragdeck.scenes.motion import driven, path_heights, surface_speed
+from dragdeck.scenes.motion import surface_speed
 from dragdeck.scenes.process import PROCESS, process_scene
 from dragdeck.scenes.workpiece import clearances, describe, fastest_motion, workpiece_length
 from dragdeck.study.check import warnings
 from dragdeck.study.drive import in_steps
-from dragdeck.study.paths.waypoints import WaypointsPath
 from dragdeck.sweep.cases import load_cases
 
-BED = Bed(surface_m=0.038, top_m=0.0446)
 POINTS = [[2, -0.01, 0], [2.2, -0.006, 0], [2.3, -0.006, 0, 0.001], [2.5, -0.006, 0, 0.001],
           [2.7, -0.006, 0.008]]  # fmt: skip
 """Along x at 0.02 m/s, up, a pause, and along y and down at about 0.04 m/s."""
@@ -77,11 +71,6 @@ def test_a_file_is_what_stands_in_it(made: Made) -> None:
         assert case.study == inline.study
         assert PROCESS.run_id(case) == PROCESS.run_id(inline)
     assert "file" not in case.study.motion.path.plain()
-
-
-def test_heights_may_be_left_out(made: Made) -> None:
-    case = made("time_s,x_m,y_m\n0,0,0\n1,0.01,0\n")
-    assert path_heights(case.study.motion) == (0, 0)
 
 
 def test_a_study_finds_the_file_of_the_one_it_extends(made: Made, project: Project) -> None:
@@ -281,33 +270,6 @@ def test_the_fastest_stretch_widens_the_speed_limit(made: Made) -> None:
     assert other > one
 
 
-def test_every_speed_grows_by_the_speed_factor(made: Made) -> None:
-    slow, fast = (motion_of_run(made(factor=factor)) for factor in (1, 2))
-    assert fast["axis_speed_m_s"] == pytest.approx(2 * slow["axis_speed_m_s"], rel=2e-4)
-    for before, after in zip(slow["stages"], fast["stages"], strict=True):
-        assert after["steps"] / before["steps"] == pytest.approx(0.5, rel=0.05)
-        np.testing.assert_allclose(
-            after["velocity_m_s"], 2 * np.array(before["velocity_m_s"]), rtol=2e-3
-        )
-
-
-@pytest.mark.parametrize("modulus", [1.0, 1e-3, 1e-6])
-def test_rounded_stages_reach_the_waypoints(made: Made, modulus: float) -> None:
-    """Whatever the step: places after whole steps are the waypoints, also the last one."""
-    study = made().study
-    quick = study.chosen_fidelity().model_copy(update={"youngs_modulus_scale": modulus})
-    way = driven(study.model_copy(update={"fidelity": quick}))
-    dt, path = way.drive.timestep_s, way.motion.path
-    assert isinstance(path, WaypointsPath)
-    stages = path.stages(way.drive)
-    at = np.diff([[0, 0, *point[1:], *[0] * (4 - len(point))][-3:] for point in POINTS], axis=0)
-    moved = np.array([one.steps * dt * np.array(one.velocity_m_s) for one in stages])
-    np.testing.assert_allclose(moved, at, atol=1e-15)
-    ends = np.cumsum([stage.steps for stage in stages])
-    assert ends[-1] == way.drive.steps
-    np.testing.assert_allclose(ends * dt, [0.2, 0.3, 0.5, 0.7], atol=dt)
-
-
 def test_no_stage_is_without_a_step() -> None:
     """A stage shorter than a step takes one, and those beyond the end of the drag are left out."""
     stages = list(in_steps([1e-6, 2e-6, 0.5, 1.0], 40, 0.01))
@@ -364,8 +326,8 @@ def test_a_path_that_crosses_particles_in_a_step_is_refused(made: Made) -> None:
 def test_long_paths_take_several_formulas(made: Made, project: Project) -> None:
     """Each has the steps and values of its stages, and no line is too long for the engine."""
     points = [[n / 100, 0.01 * math.sin(n), 0.01 * math.cos(n)] for n in range(100)]
-    scene = process_scene(made(points=points), BED)
-    text = deck_text(scene, environment(project.templates))
+    case = made(points=points)
+    scene, text = process_scene(case, BED), script(case, project)
     assert "v_stage_vx_10 v_stage_vy_10 v_stage_vz_10\n" in text
     assert max(map(len, text.splitlines())) < 1000
     rows = dict(re.findall(r"^variable (stage_v[xyz]_\d+) equal (.*)$", text, re.MULTILINE))
@@ -397,30 +359,6 @@ def test_the_drag_starts_at_the_height_of_the_first_waypoint(made: Made) -> None
 
     higher = made(points=[[0, 0, 0, 0.002], [1, 0.01, 0]])
     assert lowest(higher) == pytest.approx(lowest(made()) + 0.002)
-
-
-@pytest.mark.parametrize("factor", [1, 3])
-def test_the_preview_goes_from_waypoint_to_waypoint(made: Made, factor: float) -> None:
-    case = made(factor=factor)
-    places = layout(case).workpieces[0].drag.poses[:, :3, 3]
-    start = np.array([0, 0, places[0, 2]])
-    corners = [np.array([*point[1:], *[0] * (4 - len(point))]) + start for point in POINTS]
-    np.testing.assert_allclose(places[[0, -1]], [corners[0], corners[-1]], atol=1e-15)
-    for one, other in pairwise(corners):
-        along = np.linspace(0, 1, 7)[:, None]
-        wanted = one + along * (other - one)
-        gap = np.linalg.norm(places[:, None] - wanted, axis=2).min(axis=0)
-        assert gap.max() < 0.001
-
-
-def test_a_fraction_of_the_path(made: Made) -> None:
-    whole, part = made(), made(fraction=0.4)
-    assert part.study.motion.axis_speed_m_s == pytest.approx(whole.study.motion.axis_speed_m_s)
-    assert part.study.motion.path_length_m == pytest.approx(0.4 * LENGTH)
-    assert PROCESS.run_id(part) != PROCESS.run_id(whole)
-    every, some = motion_of_run(whole)["stages"], motion_of_run(part)["stages"]
-    for one, other in zip(some, every[:2], strict=True):
-        np.testing.assert_allclose(one["velocity_m_s"], other["velocity_m_s"], rtol=2e-4)
 
 
 def test_a_drag_at_another_pace_and_length(made: Made) -> None:

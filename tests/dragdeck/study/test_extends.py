@@ -86,12 +86,6 @@ def test_null_removes_one_value(extend: Callable[..., Path]) -> None:
     assert case.study.filling == Filling(max_time_s=7)
 
 
-def test_a_study_may_extend_one_that_extends(extend: Callable[..., Path]) -> None:
-    extend("extends: small\nseed: 7\ntitle: middle\n", "middle")
-    data = read_study(extend("extends: middle\ntitle: last\n"))
-    assert (data["seed"], data["title"]) == (7, "last")
-
-
 @pytest.mark.parametrize(
     ("text", "words"),
     [

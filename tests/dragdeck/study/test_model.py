@@ -92,6 +92,10 @@ def test_a_wrong_value_is_named_and_explained(
         (b"? [a, b]\n: 1\n", "not YAML"),
         (b"a: " + 5000 * b"[", "nested too deeply"),
         (5000 * b"{a: ", "nested too deeply"),
+        (b"title: !!python/object/apply:os.system ['touch pwned']\n", "not YAML"),
+        (b"title: a\n---\ntitle: b\n", "not YAML"),
+        (b"title: &a [*a]\n", "aliases are not supported"),
+        (b"title: !!omap [a: 1]\n", "not YAML"),
     ],
 )
 def test_a_file_that_is_no_study_is_refused(tmp_path: Path, content: bytes, words: str) -> None:

@@ -7,18 +7,14 @@ from typing import Any, get_args
 
 import numpy as np
 import pytest
+from made_scenes import script
 
-from dragdeck.decks.render import deck_text
-from dragdeck.decks.templates import environment
-from dragdeck.physics.packing import Bed
 from dragdeck.project import Project
-from dragdeck.scenes.process import process_scene
 from dragdeck.study.drive import rotated
 from dragdeck.study.driven import DrivenMotion
 from dragdeck.study.model import AnyPath, Motion
 from dragdeck.sweep.cases import load_cases
 
-BED = Bed(surface_m=0.038, top_m=0.0446)
 POINTS = [[2, 0.001, 0, 0.002], [2.2, 0.006, 0.002], [2.3, 0.006, 0.002], [2.7, 0.001, 0.003]]
 TURNS = [[0, 0, 0], [30, 10, 0], [30, 10, 0], [-20, -5, 15]]
 EXAMPLES: dict[str, list[dict[str, Any]]] = {
@@ -150,7 +146,7 @@ def test_the_drag_moves_the_workpiece_or_the_bowl(
     if path["kind"] in ("rest", "waypoints"):
         del small["motion"]["speed_m_s"]
     (case,) = load_cases(write_study(small))
-    text = deck_text(process_scene(case, BED), environment(project.templates))
+    text = script(case, project)
     moved = "fix move_drag all move/mesh mesh workpiece" in text
     assert moved != ("surface_ang_vel" in text)
     assert max(map(len, text.splitlines())) < 1000

@@ -1,6 +1,5 @@
 """Cases, and what their runs are named by."""
 
-import copy
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -17,27 +16,9 @@ from dragdeck.scenes.process import PROCESS, SCENES, process_scene
 from dragdeck.sweep.cases import load_cases, new_study, study_file
 
 
-@pytest.fixture
-def ids(small: dict[str, Any], write_study: Callable[..., Path]) -> Callable[..., dict[str, str]]:
-    """Run ids of the small study after a change."""
-
-    def changed(change: Callable[[dict[str, Any]], object] = lambda data: None) -> dict[str, str]:
-        data = copy.deepcopy(small)
-        change(data)
-        (case,) = load_cases(write_study(data))
-        return {name: scene.run_id(case) for name, scene in SCENES.items()}
-
-    return changed
-
-
-def put(path: str, value: Any) -> Callable[[dict[str, Any]], None]:
-    def change(data: dict[str, Any]) -> None:
-        *parents, last = path.split(".")
-        for name in parents:
-            data = data.setdefault(name, {})
-        data[last] = value
-
-    return change
+def ids(case: Case) -> dict[str, str]:
+    """Name of its run of every scene."""
+    return {name: scene.run_id(case) for name, scene in SCENES.items()}
 
 
 @pytest.mark.parametrize(
@@ -60,18 +41,17 @@ def put(path: str, value: Any) -> Callable[[dict[str, Any]], None]:
     ],
 )
 def test_a_run_is_named_by_what_it_depends_on(
-    ids: Callable[..., dict[str, str]], field: str, value: Any, scenes: set[str]
+    case: Case, made: Made, field: str, value: Any, scenes: set[str]
 ) -> None:
-    before, after = ids(), ids(put(field, value))
+    before, after = ids(case), ids(made({field: value}))
     assert {scene for scene in SCENES if before[scene] != after[scene]} == scenes
 
 
-def test_the_order_of_keys_does_not_matter(ids: Callable[..., dict[str, str]]) -> None:
-    def reverse(data: dict[str, Any]) -> None:
-        for key in reversed(list(data)):
-            data[key] = data.pop(key)
-
-    assert ids(reverse) == ids()
+def test_the_order_of_keys_does_not_matter(
+    case: Case, small: dict[str, Any], write_study: Callable[..., Path]
+) -> None:
+    (reversed_,) = load_cases(write_study(dict(reversed(small.items()))))
+    assert ids(reversed_) == ids(case)
 
 
 def test_a_matrix_makes_every_combination(load: Load) -> None:

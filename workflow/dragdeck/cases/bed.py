@@ -10,6 +10,7 @@ from dragdeck.errors import Caution, InputError
 from dragdeck.mesh.clump import SPHERE, Clump, fit_clump
 from dragdeck.physics.contact_mechanics import (
     ENGINE_SOFTEST_PA,
+    bed_height,
     bed_pressure,
     effective_modulus,
     hertz_contact_time,
@@ -20,7 +21,7 @@ from dragdeck.physics.contact_mechanics import (
 from dragdeck.physics.rounding import round_to, rounded, timestep
 from dragdeck.study.media import Array, Media, few_sizes
 from dragdeck.study.model import Study
-from dragdeck.study.shapes import AnyShape
+from dragdeck.study.shapes import SOLID_FRACTION_ESTIMATE, AnyShape
 from dragdeck.study.workpiece import Material
 
 JUST_BEYOND = 1 + 1e-6
@@ -180,6 +181,37 @@ def bed_density(study: Study) -> float:
     return densities[0] if len(densities) == 1 else float(np.average(densities, weights=volumes))
 
 
+def submerged_fraction(study: Study, depth_m: float | None = None) -> float:
+    """Part of the expected bed that is below the compound's surface.
+
+    Parameters
+    ----------
+    study : Study
+    depth_m : float, optional
+        Of the part of the bed that counts, from its surface; all of it by default.
+    """
+    surface = bed_height(bed_volume(study), study.bowl.radius_m, SOLID_FRACTION_ESTIMATE)
+    depth = min(depth_m or surface, surface)
+    return min(max((study.liquid_level_m - surface) / depth + 1, 0.0), 1.0)
+
+
+def buoyancy_density(study: Study, depth_m: float | None = None) -> float:
+    """Mass of displaced liquid per volume of the particles down to a depth, kg/m3."""
+    if study.compound is None:
+        return 0.0
+    return study.compound.density_kg_m3 * submerged_fraction(study, depth_m)
+
+
+def weight_density(study: Study, depth_m: float | None = None) -> float:
+    """Density of the particles' weight minus buoyancy, kg/m3: of those down to a depth, or all."""
+    return bed_density(study) - buoyancy_density(study, depth_m)
+
+
+def weight_acceleration(study: Study) -> float:
+    """Mean weight minus buoyancy of the particles over their mass, m/s2."""
+    return study.gravity_m_s2 * (weight_density(study) / bed_density(study))
+
+
 def bed_timestep(study: Study, field: str) -> float:
     """Time step of the process or of the filling, by its field of the fidelity, s."""
     return timestep(bed_rayleigh_time(study), getattr(study.chosen_fidelity(), field))
@@ -238,8 +270,8 @@ def particle_material(study: Study) -> Material:
 
 def tip_pressure(study: Study) -> float:
     """Pressure of the bed at the depth of the workpiece's tip, Pa."""
-    density, depth = bed_density(study), study.motion.immersion_depth_m
-    return bed_pressure(density, study.gravity_m_s2, depth)
+    depth = study.motion.immersion_depth_m
+    return bed_pressure(weight_density(study, depth), study.gravity_m_s2, depth)
 
 
 def full_stiffness_number(study: Study) -> float:
@@ -254,7 +286,7 @@ def skin(study: Study) -> float:
 
 
 def widest_skin(study: Study) -> float:
-    """Widest neighbour skin without a measurable cost, m (docs/evidence/costs.md)."""
+    """Widest neighbour skin without a measurable cost, m (docs/development/benchmarks.md)."""
     return round_to(0.3 * study.media.typical_radius_m, 3)
 
 

@@ -10,8 +10,8 @@ CORES_VARIABLE = "DRAGDECK_CORES"
 
 FEWEST_PARTICLES_A_RANK = 5000
 """``ranks: auto`` assigns no rank fewer particles. Two ranks of this size cost little more CPU time
-than one rank with all particles (docs/evidence/scale.md). Smaller runs are short in any case, and
-on a shared machine their ranks wait for each other."""
+than one rank with all particles (docs/development/benchmarks.md). Smaller runs are short in any
+case, and on a shared machine their ranks wait for each other."""
 
 _ALWAYS_ACCEPTED = 2
 """Ranks that a study may have on any machine: the default."""

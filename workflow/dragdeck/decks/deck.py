@@ -101,6 +101,25 @@ def contact_law(pairs: Sequence[Sequence[Pair]]) -> ContactLaw:
     return ContactLaw(tables, contact_model(every), contact_settings(every))
 
 
+NOT_OF_LIQUID = (
+    "drag of the liquid",
+    "added mass",
+    "lubrication",
+    "buoyancy of the workpiece",
+    "liquid bridges",
+)
+"""What no run models of a liquid."""
+
+
+@dataclass(frozen=True)
+class Liquid:
+    """A liquid at rest: the height of its surface, m, and its density, kg/m3."""
+
+    level_m: float
+    density_kg_m3: float
+    leaves_out: Sequence[str] = NOT_OF_LIQUID
+
+
 @dataclass(frozen=True, kw_only=True)
 class Deck:
     """What every template sees as ``deck``.
@@ -111,6 +130,8 @@ class Deck:
         The data or restart file that the run starts from.
     gravity_direction : (float, float, float)
         Unit vector of gravity.
+    liquid : Liquid or None
+        It carries a part of the particles' weight.
     checkpoint_steps : int
         Steps between restart points; 0 for none.
     processors : str
@@ -137,6 +158,7 @@ class Deck:
     timestep_s: float
     outputs: Sequence[Output]
     gravity_direction: tuple[float, float, float] = (0, 0, -1)
+    liquid: Liquid | None = None
     thermo_steps: int = 0
     checkpoint_steps: int = 0
     processors: str = ENGINE_CHOOSES

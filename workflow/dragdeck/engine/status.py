@@ -130,7 +130,7 @@ def _rest(
         return None, None
     case = FillingCase.read(folder / CASE_FILE)
     media = case.media
-    unit = fall_energy(1, media.density_kg_m3, media.radius_mean_m, case.gravity_m_s2)
+    unit = fall_energy(1, media.weight_kg_m3, media.radius_mean_m, case.gravity_m_s2)
     return sample.mean_energy_j / unit, inputs.settled.energy_ratio
 
 

@@ -164,6 +164,22 @@ def points_below(mesh: Trimesh, height_m: float) -> Floats:
     return np.concatenate([begin[first], end[second], cut[crossing]])
 
 
+def volume_below(mesh: Trimesh, height_m: float) -> float:
+    """Volume of what a closed body has below a height, m3.
+
+    By the divergence theorem it is the integral of n_z (z - height) over the surface below: the
+    plane that closes it adds nothing. On a facet whose lowest corner a alone is below,
+    the mean of min(z - height, 0) is ``a^3 / (3 (a - b) (a - c))`` of the corners' heights.
+    """
+    low, middle, high = np.sort(mesh.triangles[:, :, 2] - height_m, axis=1).T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        lower = low**3 / (3 * (low - middle) * (low - high))
+        upper = high**3 / (3 * (high - low) * (high - middle))
+    mean = (low + middle + high) / 3
+    below = np.select([low >= 0, middle > 0, high > 0], [0.0, lower, mean - upper], mean)
+    return float((below * mesh.triangles_cross[:, 2]).sum() / 2)
+
+
 def place(mesh: Trimesh, axis_m: tuple[float, float] | None = None) -> Trimesh:
     """Move an upright mesh to the workpiece's coordinates.
 

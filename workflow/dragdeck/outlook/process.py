@@ -20,6 +20,7 @@ _RATIOS = {
     "bowl_to_particle": "diameter of the bowl / mean particle diameter",
     "superposed_speed": "(highest surface speed - speed along the path) / speed along the path",
     "bowl_froude_number": "Froude number of the bowl's rotation",
+    "submerged_weight_ratio": "weight of the particles minus buoyancy / weight",
     "tilt_deg": "tilt of the workpiece (degrees)",
 }
 

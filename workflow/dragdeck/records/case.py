@@ -55,11 +55,19 @@ class MediaOfRun(CountOfRun):
         Mean and standard deviation of the radii, m.
     density_kg_m3 : float
         Density, kg/m3.
+    buoyancy_kg_m3 : float
+        Mass of liquid that the particles of a bed displace per volume, kg/m3; absent if dry.
     """
 
     radius_mean_m: PositiveFloat
     radius_std_m: float
     density_kg_m3: PositiveFloat
+    buoyancy_kg_m3: float = omitted(0.0)
+
+    @property
+    def weight_kg_m3(self) -> float:
+        """Density that belongs to the weight minus buoyancy, kg/m3."""
+        return self.density_kg_m3 - self.buoyancy_kg_m3
 
 
 class ClassOfRun(Part):

@@ -18,12 +18,15 @@ from dragdeck.cases.bed import (
     bed_timestep,
     bed_volume,
     body_sizes,
+    buoyancy_density,
     farthest_point,
     media_classes,
     outrun,
     particle_material,
     skin,
     smallest_radius,
+    weight_acceleration,
+    weight_density,
 )
 from dragdeck.cases.case import Case, materials_content
 from dragdeck.decks import outputs
@@ -48,7 +51,15 @@ from dragdeck.physics.rounding import rounded
 from dragdeck.physics.run_limits import RunLimits, run_limits
 from dragdeck.records.case import FillingCase
 from dragdeck.records.run import SettlingCriterion
-from dragdeck.scenes.scene import SceneType, case_of_study, material_table
+from dragdeck.scenes.scene import (
+    SceneType,
+    case_of_study,
+    liquid,
+    liquid_leaves_out,
+    liquid_models,
+    material_table,
+    media_of_run,
+)
 from dragdeck.study.base import Json
 from dragdeck.study.media import MOST_SIZES, Media
 from dragdeck.study.model import Study
@@ -108,6 +119,7 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
         materials=material_table(study, types, fidelity.youngs_modulus_scale, case),
         limit_force=study.contact.limit_force,
         gravity_m_s2=study.gravity_m_s2,
+        liquid=liquid(study),
         skin_m=skin(study),
         timestep_s=dt,
         rayleigh_time_s=rayleigh,
@@ -136,6 +148,7 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
             filling_content(case),
             dt,
             rayleigh,
+            media=media_of_run(study, buoyancy_density(study)),
             settled=SettlingCriterion(
                 energy_ratio=study.filling.energy_ratio, highest_m=study.bowl.height_m
             ),
@@ -148,8 +161,10 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
             "settling by a criterion": f"kinetic energy below {study.filling.energy_ratio:g} m "
             f"g d per particle",
             "a separate time step": "falling particles collide faster than a packing at rest",
+            **liquid_models(study),
         },
         leaves_out={
+            **liquid_leaves_out(study),
             "the workpiece": LeftOut("added later; cases with other workpieces share this filling"),
             "contact output": LeftOut(
                 "contacts before the drag are not analysed", "filling_contacts"
@@ -284,7 +299,7 @@ def floor_overlap(study: Study) -> float:
     An estimate.
     """
     particle, scale = particle_material(study), study.chosen_fidelity().youngs_modulus_scale
-    pressure = bed_pressure(bed_density(study), study.gravity_m_s2, expected_surface(study))
+    pressure = bed_pressure(weight_density(study), study.gravity_m_s2, expected_surface(study))
     return bed_overlap(effective_modulus(particle, particle, scale), pressure)
 
 
@@ -323,7 +338,7 @@ def _cohesion_caution(study: Study) -> Iterator[Caution]:
     one, half = np.ones(1), np.full(1, radius / 2)
     slope = float(FrictionLimit(0.0, pair.attractive(), wall=False).attraction_n(half, one)[0])
     largest = pull_off_force(slope, effective_modulus(particle, particle), radius / 2)
-    bond = largest / (particle_mass(particle, radius) * study.gravity_m_s2)
+    bond = largest / (particle_mass(particle, radius) * weight_acceleration(study))
     if bond > 1:
         yield Caution(
             "cohesion",
@@ -371,7 +386,7 @@ def bed_limits(study: Study, top_m: float, speed_m_s: float) -> RunLimits:
 def _energy_unit(study: Study) -> float:
     """Number of particles times m g d of the mean particle, J."""
     radius, count = study.media.typical_radius_m, study.particle_count
-    return fall_energy(count, bed_density(study), radius, study.gravity_m_s2)
+    return fall_energy(count, weight_density(study), radius, study.gravity_m_s2)
 
 
 def expected_time(study: Study) -> float:
@@ -428,6 +443,7 @@ def filling_content(case: Case) -> Json:
         "gravity_m_s2": study.gravity_m_s2,
         "contact": study.contact.plain(),
         "filling": study.filling.plain(),
+        **{name: value for name, value in study.plain().items() if name == "compound"},
         "seed": study.seed,
         "fidelity": {name: fidelity[name] for name in settings if name in fidelity},
     }

@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
-from dragdeck.cases.bed import bed_timestep
+from dragdeck.cases.bed import bed_timestep, weight_acceleration
 from dragdeck.cases.case import Case, Stretch, of_each_workpiece
 from dragdeck.decks.deck import Materials
 from dragdeck.errors import InputError
@@ -198,7 +198,7 @@ def stops(case: Case, drag: Drive, steps: Covered, materials: Materials) -> Iter
 
 def _before_counted(study: Study) -> tuple[float, float]:
     """Time in which the moduli are raised, and in which the bed relaxes then, s."""
-    fall = math.sqrt(2 * study.media.typical_radius_m / study.gravity_m_s2)
+    fall = math.sqrt(2 * study.media.typical_radius_m / weight_acceleration(study))
     return max(_SHORTEST_RAMP_S, _RAMP_FALLS * fall), _SETTLING_FALLS * fall
 
 

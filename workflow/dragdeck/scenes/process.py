@@ -5,10 +5,16 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from functools import partial
 
-from dragdeck.cases.bed import bed_rayleigh_time, bed_timestep, farthest_point, skin
+from dragdeck.cases.bed import (
+    bed_rayleigh_time,
+    bed_timestep,
+    buoyancy_density,
+    farthest_point,
+    skin,
+)
 from dragdeck.cases.case import Case, Stretch, materials_content, mesh_file, of_each_workpiece
 from dragdeck.decks import PACKING_FILE, WORKPIECE_MESH, outputs
-from dragdeck.decks.deck import LeftOut, Scene
+from dragdeck.decks.deck import NOT_OF_LIQUID, LeftOut, Scene
 from dragdeck.decks.outputs import Output
 from dragdeck.errors import Caution
 from dragdeck.files import file_checksum
@@ -19,7 +25,7 @@ from dragdeck.physics.domain_split import rank_warnings
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import round_to
 from dragdeck.physics.run_limits import RunLimits
-from dragdeck.records.case import ProcessCase, StatisticsOfRun, WorkpieceOfRun
+from dragdeck.records.case import AssumptionOfRun, ProcessCase, StatisticsOfRun, WorkpieceOfRun
 from dragdeck.records.run import Phase, SteadyCriterion
 from dragdeck.scenes.drop_test import DROP_TEST
 from dragdeck.scenes.filling import (
@@ -40,7 +46,15 @@ from dragdeck.scenes.motion import (
     moved_workpiece,
     output_periods,
 )
-from dragdeck.scenes.scene import SceneType, case_of_study, material_table
+from dragdeck.scenes.scene import (
+    SceneType,
+    case_of_study,
+    liquid,
+    liquid_leaves_out,
+    liquid_models,
+    material_table,
+    media_of_run,
+)
 from dragdeck.scenes.workpiece import (
     PARTICLE_STEPS_PER_S,
     check_apart,
@@ -50,6 +64,7 @@ from dragdeck.scenes.workpiece import (
     fastest_motion,
     process_cautions,
     reference_height,
+    workpiece_buoyancy,
     workpiece_facets,
     workpiece_length,
     workpiece_mesh,
@@ -108,6 +123,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         materials=materials,
         limit_force=study.contact.limit_force,
         gravity_m_s2=study.gravity_m_s2,
+        liquid=liquid(study),
         skin_m=skin(study),
         timestep_s=dt,
         rayleigh_time_s=bed_rayleigh_time(study),
@@ -229,6 +245,8 @@ def _process_case(
         drag.timestep_s,
         bed_rayleigh_time(study),
         settings=study.chosen_fidelity().model_dump(include={"timestep_fraction", "speed_factor"}),
+        media=media_of_run(study, buoyancy_density(study)),
+        assumed=_of_liquid(case, surface_m),
         asked=case.advised,
         unsafe_timestep=study.accepted.unsafe_timestep,
         case=case.name,
@@ -263,6 +281,20 @@ def _process_case(
     )
 
 
+def _of_liquid(case: Case, surface_m: float) -> Iterator[AssumptionOfRun]:
+    """What the report says of the compound."""
+    if (compound := case.study.compound) is None:
+        return
+    lifted = workpiece_buoyancy(case, surface_m)
+    why = (
+        "the liquid is at rest and lifts the particles only; not modelled: "
+        f"{', '.join(NOT_OF_LIQUID)}. The vertical force lacks the buoyancy of the workpiece, "
+        f"{lifted:+.3g} N at the start of the drag. Coefficients are those of pairs, which are "
+        "taken as measured in the liquid"
+    )
+    yield AssumptionOfRun(field="compound", value=compound.density_kg_m3, why=why)
+
+
 def _wake_from(each: Sequence[Case], number: int) -> float | None:
     """Path length after which a workpiece on a circle comes to where one began, itself included."""
     path = each[number].study.motion.path
@@ -277,7 +309,7 @@ def _wake_from(each: Sequence[Case], number: int) -> float | None:
 
 _INPUTS = (
     *("materials", "pairs", "media", "bowl", "workpiece", "motion", "contact", "drop_test"),
-    *("filling", "outputs", "gravity_m_s2", "seed"),
+    *("filling", "outputs", "gravity_m_s2", "seed", "compound"),
 )
 
 
@@ -317,6 +349,7 @@ def _models(study: Study) -> dict[str, str]:
         "particle-particle, particle-workpiece, particle-bowl": "force chains run through all",
         f"bowl: {bowl}": "force chains end there; the force on each particle gives its contacts",
         **{words: "as given in the study" for words in optional},
+        **liquid_models(study),
         "workpiece as facets": "LIGGGHTS moves meshes only",
         **{f"{name} of the workpiece": "as given in the study" for name in superposed},
         f"total force, {study.outputs.workpiece_force_hz:g} Hz": "drag, its spread and its peaks",
@@ -330,6 +363,7 @@ def _leaves_out(study: Study) -> dict[str, LeftOut]:
     _, absent = coefficient_words(study.pairs.values())
     workpiece, network = study.outputs.workpiece_contacts_hz, study.outputs.network_hz
     found = {
+        **liquid_leaves_out(study),
         "positions, torques, areas of contacts": LeftOut(
             "the particles of the same step have the positions; no report uses the rest",
             "contact_columns",

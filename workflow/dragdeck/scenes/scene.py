@@ -1,6 +1,6 @@
 """What a scene is to the rest of the project, and what all scenes share."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, TypeVar
@@ -10,7 +10,14 @@ import numpy as np
 from dragdeck import __version__
 from dragdeck.cases.bed import bed_classes, bed_density, body_sizes, skin
 from dragdeck.cases.case import Case, digest, slug
-from dragdeck.decks.deck import Materials, Scene, contact_law
+from dragdeck.decks.deck import (
+    NOT_OF_LIQUID,
+    LeftOut,
+    Liquid,
+    Materials,
+    Scene,
+    contact_law,
+)
 from dragdeck.errors import InputError
 from dragdeck.physics.contact_mechanics import (
     ENGINE_SOFTEST_PA,
@@ -139,6 +146,7 @@ def case_of_study(
     rayleigh_time_s: float,
     *,
     settings: Json | None = None,
+    assumed: Iterable[AssumptionOfRun] = (),
     **own: Any,
 ) -> C:
     """The content of ``case.json`` of a run of a study's case.
@@ -155,6 +163,8 @@ def case_of_study(
     timestep_s, rayleigh_time_s : float
     settings : mapping, optional
         What is not the case's modulus, skin and ranks, the given step, and no faster workpiece.
+    assumed : iterable of AssumptionOfRun
+        What the scene assumes beside the study.
     **own
         What this scene's case file has beyond the others', or has otherwise.
     """
@@ -178,13 +188,7 @@ def case_of_study(
         "gravity_m_s2": study.gravity_m_s2,
         "fidelity": fidelity,
         "inputs": flat(inputs),
-        "media": MediaOfRun(
-            count=study.particle_count,
-            spheres=study.sphere_count if study.media.clumped else 0,
-            radius_mean_m=study.media.typical_radius_m,
-            radius_std_m=study.media.typical_std_m,
-            density_kg_m3=bed_density(study),
-        ),
+        "media": media_of_run(study),
         "bowl": BowlOfRun(
             radius_m=study.bowl.radius_m,
             walls="primitive" if study.bowl_facet_size_m is None else "mesh",
@@ -193,11 +197,50 @@ def case_of_study(
         "attractive": _attractive(study, main, fidelity.youngs_modulus_scale),
         "classes": _classes(study, fidelity.youngs_modulus_scale),
         "bodies": _bodies_of(study),
-        "assumptions": _assumptions(study),
+        "assumptions": [*_assumptions(study), *assumed],
         "reference": study.reference,
         "versions": {"dragdeck": __version__},
     }
     return kind(**{**entries, **own})
+
+
+def media_of_run(study: Study, buoyancy_kg_m3: float = 0.0) -> MediaOfRun:
+    """The media, whose particles displace that mass of liquid per volume, kg/m3."""
+    return MediaOfRun(
+        count=study.particle_count,
+        spheres=study.sphere_count if study.media.clumped else 0,
+        radius_mean_m=study.media.typical_radius_m,
+        radius_std_m=study.media.typical_std_m,
+        density_kg_m3=bed_density(study),
+        buoyancy_kg_m3=buoyancy_kg_m3,
+    )
+
+
+def liquid(study: Study) -> Liquid | None:
+    """The compound as an input script has it."""
+    compound = study.compound
+    return Liquid(study.liquid_level_m, compound.density_kg_m3) if compound else None
+
+
+def liquid_models(study: Study) -> dict[str, str]:
+    """What a run with particles in a compound models of it."""
+    compound, level = study.compound, study.liquid_level_m
+    if compound is None:
+        return {}
+    return {
+        "buoyancy of particles": f"liquid of {compound.density_kg_m3:g} kg/m3 up to {level:g} m",
+        "friction and restitution in liquid": "the values of pairs, those of wet contacts",
+    }
+
+
+def liquid_leaves_out(study: Study) -> dict[str, LeftOut]:
+    """What it leaves out."""
+    left = {
+        f"{NOT_OF_LIQUID[0]}, {NOT_OF_LIQUID[1]} and {NOT_OF_LIQUID[2]}": "the liquid has no flow",
+        NOT_OF_LIQUID[3]: "LIGGGHTS has none for meshes; the report states the force",
+        NOT_OF_LIQUID[4]: "not offered: docs/explanation/limitations.md has the reasons",
+    }
+    return {name: LeftOut(why) for name, why in left.items()} if study.compound else {}
 
 
 def _classes(study: Study, scale: float) -> tuple[ClassOfRun, ...]:

@@ -27,6 +27,7 @@ from dragdeck.cases.bed import (
     smallest_radius,
     tip_pressure,
     typical_reach,
+    weight_acceleration,
 )
 from dragdeck.cases.case import Case, mesh_file, of_each_workpiece
 from dragdeck.errors import Caution, InputError, together
@@ -41,6 +42,7 @@ from dragdeck.mesh.surface import (
     surface,
     tilted,
     upright,
+    volume_below,
 )
 from dragdeck.physics.contact_mechanics import fall_speed, inertial_number
 from dragdeck.physics.packing import Bed
@@ -544,6 +546,24 @@ def check_headroom(case: Case, tip_m: float, top_m: float) -> None:
         )
 
 
+def workpiece_buoyancy(case: Case, surface_m: float) -> float:
+    """Buoyancy of a case's workpiece as its drag starts, which LIGGGHTS does not have, N.
+
+    Parameters
+    ----------
+    case : Case
+    surface_m : float
+        Height of the settled bed.
+    """
+    study, motion, compound = case.study, case.study.motion, case.study.compound
+    if compound is None:
+        return 0.0
+    lowest = surface_m - motion.immersion_depth_m + motion.path.start_height_m
+    level = study.liquid_level_m - lowest - reference_height(case)
+    volume = volume_below(workpiece_mesh(case), level)
+    return compound.density_kg_m3 * study.gravity_m_s2 * volume
+
+
 # --- dimensionless numbers -----------------------------------------------------------------------
 
 
@@ -555,8 +575,9 @@ def describe(case: Case) -> dict[str, float]:
     difference of this speed and the mean speed along the path divided by the latter, is absent
     without superposed motions on a path of one speed; ``bowl_froude_number``, the centripetal
     acceleration at the bowl's wall over gravity, is absent if the bowl stands still, and so are
-    ``tilt_deg`` without a tilt and ``further_workpieces`` of a single one. Other ratios
-    are diameters, or the depth, over the mean diameter of a particle.
+    ``submerged_weight_ratio`` without compound, ``tilt_deg`` without a tilt and
+    ``further_workpieces`` of a single one. Other ratios are diameters, or the depth, over the mean
+    diameter of a particle.
     """
     study = case.study
     particle, diameter = particle_material(study), 2 * study.media.typical_radius_m
@@ -565,9 +586,11 @@ def describe(case: Case) -> dict[str, float]:
     rate = speed / diameter
     added = speed / motion.axis_speed_m_s - 1
     superposed = {"superposed_speed": added} if motion.superposed() or added > 1e-9 else {}
+    own = weight_acceleration(study)
     optional = {
-        "bowl_froude_number": motion.bowl_rad_s**2 * study.bowl.radius_m / study.gravity_m_s2,
+        "bowl_froude_number": motion.bowl_rad_s**2 * study.bowl.radius_m / own,
         "tilt_deg": abs(motion.tilt_deg or 0.0),
+        "submerged_weight_ratio": own / study.gravity_m_s2 if study.compound else 0.0,
         "further_workpieces": float(len(of_each_workpiece(case.all_workpieces)) - 1),
     }
     names = study.media.main_material, study.workpiece.material

@@ -12,11 +12,11 @@ from typing import get_args
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from dragdeck.errors import Caution, InputError, choices, near, together
+from dragdeck.errors import Caution, InputError, RecordError, choices, near, together
 from dragdeck.study.base import Json, Model, flat
 from dragdeck.study.model import BUILT_IN_FIDELITIES, AnyPath, Scaling, Study
 from dragdeck.study.plausible import implausible
-from dragdeck.study.recorded import Places, with_recording
+from dragdeck.study.recorded import Places, recorded_file, with_recording
 from dragdeck.study.workpiece import CylinderShape, Shape
 from dragdeck.study.yaml import located, shown
 
@@ -40,6 +40,7 @@ def contradictions(study: Study, whole: bool) -> Iterator[InputError]:
         _names,
         _pairs,
         _media,
+        _compound,
         _shape,
         _motion,
         _assumptions,
@@ -95,6 +96,23 @@ def _media(study: Study) -> _Found:
             if not count:
                 field = f"media.classes.{name}" if name else "media"
                 yield field, "not one particle of it", "a larger total or fraction"
+
+
+def _compound(study: Study) -> _Found:
+    compound, rim = study.compound, study.bowl.height_m
+    if compound is None:
+        return
+    if study.media.clumped:
+        problem = "LIGGGHTS would lift every sphere of a clump by its whole volume"
+        yield "compound", problem, "spherical particles, or no compound"
+    if study.liquid_level_m > rim:
+        problem = "the liquid stands above the rim of the bowl"
+        yield "compound.level_m", problem, f"at most {rim:g} m"
+    for name in sorted({*study.media.materials} & {*study.materials}):
+        lightest = study.materials[name].density_kg_m3
+        if compound.density_kg_m3 >= lightest:
+            problem = f"particles of {name} float, so that there is no bed at the floor"
+            yield "compound.density_kg_m3", problem, f"below {lightest:g} kg/m3"
 
 
 def _shape(study: Study) -> _Found:
@@ -201,6 +219,30 @@ def _scaling(scaling: Scaling, study: Study) -> _Found:
         yield f"sweep.{field}", problem, f"{_LEAST_LEVELS} levels or more"
 
 
+def _signal(study: Study, file: Path) -> Iterator[InputError]:
+    """What keeps the measured force signal from being compared with that of a run."""
+    signal = study.reference.signal if study.reference else None
+    if signal is None:
+        return
+    from dragdeck.study.force_record import RATES_PER_BANDWIDTH, measured_signal
+
+    motion, most = study.motion, study.outputs.workpiece_force_hz / RATES_PER_BANDWIDTH
+    if signal.low_pass_hz > most * (1 + 1e-9):
+        field, problem = "reference.signal.low_pass_hz", "the simulated force is sampled too slowly"
+        limit = f"at most {most:g} Hz, a fifth of outputs.workpiece_force_hz"
+        yield InputError(problem, field=field, value=signal.low_pass_hz, limit=limit)
+    transient_s = motion.uncounted_m / motion.axis_speed_m_s + motion.ramp_s / 2
+    field = "reference.signal.file"
+    try:
+        measured_signal(recorded_file(signal.file, file, field), signal, transient_s)
+    except RecordError as error:
+        problem, value = f"({error.reason}) {error.problem}", error.value or signal.file
+        more = {"limit": error.limit, "remedy": error.remedy}
+        yield InputError(problem, field=field, value=value, **more)
+    except InputError as error:
+        yield error
+
+
 def _level(value: object) -> float:
     """A level of a scaling as a number, NaN if it is none."""
     try:
@@ -239,7 +281,7 @@ def validate(data: Json, file: Path | str, *, whole: bool = False) -> Study:
     doubts = [row for row in implausible({**data, **implied}) if row[0].field not in wrong]
     found += [error for error, _ in doubts]
     known = {error.field for error, refused in doubts if refused}
-    others = contradictions(study, whole) if study else iter(())
+    others = [*contradictions(study, whole), *_signal(study, Path(file))] if study else []
     more = [error for error in others if error.field not in known]
     if study is None or more or any(refused for _, refused in doubts):
         raise _of_file([*found, *more], file, places)

@@ -54,6 +54,19 @@ class Bowl(Model):
     )
 
 
+class Compound(Model):
+    """A liquid at rest in the bowl: it carries a part of the particles' weight.
+
+    Nothing else of it is modelled. `pairs` has the coefficients of wet contacts.
+    """
+
+    density_kg_m3: Positive = Field(description="density of the liquid, kg/m3")
+    level_m: Positive | None = Field(
+        default=None,
+        description="height of the liquid's surface above the floor, m; none: the rim of the bowl",
+    )
+
+
 class Superposed(Model):
     """The registry of superposed motions: the block of each kind, in the order of application.
 
@@ -519,6 +532,7 @@ class Study(Model):
     )
     media: Media
     bowl: Bowl
+    compound: Compound | None = Field(default=None, exclude_if=lambda value: value is None)
     workpiece: Workpiece
     workpieces: Carousel | None = None
     motion: Motion
@@ -614,6 +628,12 @@ class Study(Model):
             if key in self.pairs:
                 return self.pairs[key]
         raise ValueError(f"pairs has no entry '{first}-{second}', although these come into contact")
+
+    @property
+    def liquid_level_m(self) -> float:
+        """Height of the compound's surface above the floor, m; 0 without compound."""
+        compound = self.compound
+        return (compound.level_m or self.bowl.height_m) if compound else 0.0
 
     @property
     def bowl_facet_size_m(self) -> float | None:

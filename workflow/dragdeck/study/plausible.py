@@ -59,6 +59,8 @@ _RANGES = {
     "media.fill_height_m": _Range(1e-4, 1e-3, 2, 10, _LENGTH),
     "bowl.radius_m": _Range(1e-3, 5e-3, 2, 10, _LENGTH),
     "bowl.height_m": _Range(1e-3, 5e-3, 2, 10, _LENGTH),
+    "compound.density_kg_m3": _Range(50, 500, 2e3, 2e4, {"g/cm3": 1e3}),
+    "compound.level_m": _Range(1e-4, 1e-3, 2, 10, _LENGTH),
     "workpiece*.shape.radius_m": _Range(1e-5, 2e-4, 0.3, 2, _LENGTH),
     "*facet_*_m": _Range(1e-6, 5e-5, 0.1, 1, _LENGTH),
     "workpiece*.shape.offset_m.*": _Range(-10, -2, 2, 10, _LENGTH),
@@ -113,6 +115,10 @@ _RANGES = {
     "accepted.cases": _Range(1, 1, 1e5, 1e6, {}),
     "scaling.expected_exponent": _Range(-20, -5, 5, 20, {}),
     "scaling.fit_range.*": _Range(1e-30, 1e-20, 1e20, 1e30, {}),
+    "reference.signal.*_hz": _Range(1e-3, 0.1, 1e6, 1e8, _RATE),
+    "reference.signal.*_s*": _Range(-1e10, -1e3, 1e5, 1e10, {"ms": 1e-3}),
+    "reference.signal.margin": _Range(1e-4, 1e-3, 0.5, 1, {"%": 0.01}),
+    "reference.signal.sign": _Range(-1, -1, 1, 1, {}),
     "reference.*_n": _Range(-1e5, -1e3, 1e3, 1e5, {"mN": 1e-3}),
 }
 """By dotted field, every number of a study; the first that fits counts. Assumptions: they span

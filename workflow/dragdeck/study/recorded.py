@@ -50,7 +50,7 @@ def _waypoints(path: Any, study: Path, places: dict[str | None, _Place]) -> Any:
     name = path.get("file")
     if not isinstance(name, str):
         return path
-    file = _found(name, study, "motion.path.file")
+    file = recorded_file(name, study, "motion.path.file")
     points = _read(file, Waypoint, MOST_POINTS, "motion.path.points", places)
     return {**path, "file": None, "points": points}
 
@@ -61,7 +61,7 @@ def _with_files(grains: Any, field: str, study: Path, places: dict[str | None, _
     shape = grains.get("shape") if isinstance(grains, dict) else None
     if not isinstance(shape, dict) or not isinstance(shape.get("points"), str):
         return grains
-    file = _found(shape["points"], study, f"{field}.shape.points")
+    file = recorded_file(shape["points"], study, f"{field}.shape.points")
     return {**grains, "shape": {**shape, "points": convex_corners(file).tolist()}}
 
 
@@ -70,12 +70,18 @@ def _sieved(grains: Any, field: str, study: Path, places: dict[str | None, _Plac
     name = grains.get("sieve") if isinstance(grains, dict) else None
     if not isinstance(name, str):
         return grains
-    file = _found(name, study, f"{field}.sieve")
+    file = recorded_file(name, study, f"{field}.sieve")
     return {**grains, "sieve": _read(file, Sieve, MOST_SIEVES, f"{field}.sieve", places)}
 
 
-def _found(name: str, study: Path, field: str) -> Path:
-    """The file beside the study, or beside one that it extends."""
+def recorded_file(name: str, study: Path, field: str) -> Path:
+    """The file beside the study, or beside one that it extends.
+
+    Raises
+    ------
+    InputError
+        There is none, or the path leaves the folder.
+    """
     folders = study_folders(study)
     inside = not Path(name).is_absolute() and ".." not in Path(name).parts
     for folder in folders if inside else ():

@@ -1,8 +1,10 @@
 """Published figures to compare the results with."""
 
+from typing import Annotated, Literal
+
 from pydantic import Field
 
-from dragdeck.study.base import Model, NonNegative, Number
+from dragdeck.study.base import Line, Model, NonNegative, Number, Positive
 
 
 class Drag(Model):
@@ -16,9 +18,47 @@ class Drag(Model):
     )
 
 
+Span = tuple[Number, Number]
+"""Beginning and end, s."""
+
+
+class Signal(Model):
+    """A measured force signal, with which that of the simulation is compared."""
+
+    file: Line = Field(pattern=r"^[^{}]*$", description="CSV file of force against time, <= 64 MB")
+    column: Line = Field(description="name of the force column; ends in `_n`, `_mn` or `_kn`")
+    rate_hz: Positive | None = Field(
+        default=None, description="sampling rate, Hz; none: a column `time_s`, `_ms` or `_us`"
+    )
+    component: Literal["drag", "lateral", "vertical"] = Field(
+        default="drag", description="axis: along the motion, to its left, or upwards"
+    )
+    sign: Literal[1, -1] = Field(
+        default=1, description="1: force on the workpiece along this axis; -1: resistance"
+    )
+    rest_s: Annotated[tuple[Span, ...], Field(max_length=2)] = Field(
+        default=(), description="stretches without load, s: one for the offset, two for a drift too"
+    )
+    starts_at_s: Number | None = Field(
+        default=None, description="start of the drag in the file, s; none: found after `rest_s`"
+    )
+    ends_at_s: Number | None = Field(
+        default=None, description="end of the drag in the file, s; none: of the file, or rest_s.1"
+    )
+    low_pass_hz: Positive = Field(description="bandwidth, Hz: at most a fifth of both rates")
+    margin: Annotated[Number, Field(gt=0, lt=1)] = Field(
+        default=0.1, description="largest relative difference that is called equivalent"
+    )
+
+
 class Reference(Model):
     """Published values with which the results are compared."""
 
     source: str = Field(description="publication from which the values are taken")
     experiment: Drag | None = Field(default=None, description="values measured in an experiment")
     simulation: Drag | None = Field(default=None, description="values simulated by others")
+    signal: Signal | None = Field(
+        default=None,
+        exclude_if=lambda value: value is None,
+        description="a measured force signal to compare with",
+    )

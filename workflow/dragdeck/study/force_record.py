@@ -1,0 +1,390 @@
+"""Measured forces over time as CSV files: drop tests, and signals of a process."""
+
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.signal import butter, correlate, sosfiltfilt
+from scipy.stats import theilslopes
+
+from dragdeck.errors import RecordError
+from dragdeck.study.reference import Signal, Span
+
+Floats = NDArray[np.float64]
+
+TIME_COLUMNS = {"time_s": 1.0, "time_ms": 1e-3, "time_us": 1e-6}
+FORCE_COLUMNS = {"force_n": 1.0, "force_mn": 1e-3, "force_kn": 1e3}
+"""Accepted column names and their units in SI; ``force_mn`` is millinewton."""
+
+_LEAST_SAMPLES = 100
+_BLOCKS = 50
+"""Blocks of a record whose medians a line is put through: impacts touch few of them."""
+
+_MOST_BYTES = 64_000_000
+
+_JITTER = 0.25
+"""A time may be off an even grid by this fraction of the interval (rounded stamps)."""
+
+Note = Literal["sign_turned", "two_impacts"]
+"""What was done to a record, and what its reader should know; the page has the words."""
+
+
+@dataclass(frozen=True)
+class Record:
+    """Samples of a force sensor under the plate.
+
+    Attributes
+    ----------
+    time_s : (N,) ndarray
+        Even times, s.
+    force_n : (N,) ndarray
+        Force, N, compression positive, offset still in it.
+    interval_s : float
+        Sampling interval, s.
+    notes : tuple of str
+        What was done to the samples.
+    """
+
+    time_s: Floats
+    force_n: Floats
+    interval_s: float
+    notes: tuple[Note, ...] = ()
+
+
+def read_record(file: Path) -> Record:
+    """Read a CSV of a drop test.
+
+    Parameters
+    ----------
+    file : Path
+        A header line, then one row per sample; ``,`` or ``;`` or a tab between
+        columns, a point in numbers; lines that begin with ``#`` are comments.
+        One column of `TIME_COLUMNS` and one of `FORCE_COLUMNS`; others are
+        left alone.
+
+    Raises
+    ------
+    RecordError
+        The file cannot be used; `reason` says why: ``file``, ``columns``,
+        ``numbers``, ``short``, ``time``, ``uneven``.
+    """
+    return check_samples(*parse_record(_text(file)))
+
+
+def _text(file: Path) -> str:
+    try:
+        if file.stat().st_size > _MOST_BYTES:
+            value, limit = (f"{size / 1e6:.0f} MB" for size in (file.stat().st_size, _MOST_BYTES))
+            raise RecordError(
+                "huge", "the file is too large", value=value, limit=f"at most {limit}"
+            )
+        return file.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise RecordError("file", f"{file} cannot be read: {error}") from None
+
+
+def parse_record(
+    text: str, column: str | None = None, rate_hz: float | None = None
+) -> tuple[Floats, Floats]:
+    """Times in s and forces in N of a CSV text; see `read_record`.
+
+    `column` names the force where it is not one of `FORCE_COLUMNS`; `rate_hz` stands in for times.
+    """
+    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
+    if not lines:
+        raise RecordError("columns", "the file is empty", remedy="write a header line and samples")
+    separator = next((mark for mark in (";", "\t") if mark in lines[0]), ",")
+    names = [name.strip().strip('"').lower() for name in lines[0].split(separator)]
+    forces = FORCE_COLUMNS if column is None else {column.lower(): _unit(column)}
+    force_name = _column(names, forces)
+    time_name = _column(names, TIME_COLUMNS) if rate_hz is None else force_name
+    try:
+        table = pd.read_csv(
+            io.StringIO("\n".join(lines[1:])), sep=separator, names=names, index_col=False
+        )
+        time, force = (table[name].to_numpy(np.float64) for name in (time_name, force_name))
+    except (ValueError, pd.errors.ParserError) as error:
+        raise RecordError(
+            "numbers",
+            f"a value is not a number: {error}",
+            remedy="use a decimal point, and a comma, semicolon or tab between columns",
+        ) from None
+    if rate_hz is not None:
+        return np.arange(len(force)) / rate_hz, force * forces[force_name]
+    return time * TIME_COLUMNS[time_name], force * forces[force_name]
+
+
+def _unit(column: str) -> float:
+    """The unit of a force column in N, by the end of its name."""
+    for name, unit in FORCE_COLUMNS.items():
+        if column.lower().endswith(name.removeprefix("force")):
+            return unit
+    problem, limit = "the force column has no unit", "a name that ends in _n, _mn or _kn"
+    raise RecordError("columns", problem, value=column, limit=limit, remedy="rename the column")
+
+
+def _column(names: Sequence[str], known: dict[str, float]) -> str:
+    found = [name for name in names if name in known]
+    if len(found) != 1:
+        raise RecordError(
+            "columns",
+            f"{len(found) or 'no'} column(s) with a recognised name",
+            value=", ".join(names)[:200] if {*names} & {*TIME_COLUMNS, *FORCE_COLUMNS} else None,
+            limit=f"one of {', '.join(known)}",
+            remedy="name the columns in the first line, for example time_s,force_n",
+        )
+    return found[0]
+
+
+def check_samples(time_s: Floats, force_n: Floats) -> Record:
+    """Check that samples are numbers at even times, and turn compression positive.
+
+    Raises
+    ------
+    RecordError
+        ``short``, ``numbers``, ``time`` or ``uneven``.
+    """
+    even, interval = _even(time_s, force_n)
+    rest = force_n - np.polyval(quiet_line(even, force_n), even)
+    if -float(rest.min()) > float(rest.max()):
+        return Record(even, -force_n, interval, ("sign_turned",))
+    return Record(even, force_n, interval)
+
+
+def _even(time_s: Floats, force_n: Floats) -> tuple[Floats, float]:
+    """Even times and their interval, s; errors are those of `check_samples`."""
+    if len(time_s) < _LEAST_SAMPLES:
+        raise RecordError(
+            "short", "too few samples", value=str(len(time_s)), limit=f"at least {_LEAST_SAMPLES}"
+        )
+    bad = np.flatnonzero(~(np.isfinite(time_s) & np.isfinite(force_n)))
+    if len(bad):
+        raise RecordError(
+            "numbers",
+            "a sample is not a finite number",
+            value=f"{len(bad)} samples, the first in row {bad[0] + 1}",
+            remedy="remove these samples, or record again",
+        )
+    back = np.flatnonzero(np.diff(time_s) <= 0.0)
+    if len(back):
+        row = int(back[0])
+        word = "stands still" if time_s[row + 1] == time_s[row] else "runs backwards"
+        raise RecordError(
+            "time",
+            f"time {word}",
+            value=f"{time_s[row]:.9g} s then {time_s[row + 1]:.9g} s, rows {row + 1}, {row + 2}",
+            remedy="export a single trigger, with enough decimals in the time",
+        )
+    interval = float((time_s[-1] - time_s[0]) / (len(time_s) - 1))
+    even = time_s[0] + interval * np.arange(len(time_s))
+    off = np.abs(time_s - even)
+    if float(off.max()) > _JITTER * interval:
+        row = int(np.argmax(off))
+        raise RecordError(
+            "uneven",
+            "the sampling interval is not constant",
+            value=f"row {row + 1} is {off[row] / interval:.2g} intervals off",
+            limit=f"{_JITTER:g} intervals of {interval:.3g} s",
+            remedy="export every sample at the sampling rate of the sensor",
+        )
+    return even, interval
+
+
+def quiet_line(time_s: Floats, force_n: Floats) -> Floats:
+    """A first line through what lies between the impacts, however steep the drift.
+
+    Its slope is the median of the slopes between the medians of all pairs of blocks (Theil-Sen
+    estimator), its offset the median of what is left.
+
+    Parameters
+    ----------
+    time_s, force_n : (N,) ndarray
+        Times, s, and forces, N; at least two samples per block.
+
+    Returns
+    -------
+    (2,) ndarray
+        Slope, N/s, and force at time 0, N.
+    """
+    time = np.array([np.mean(block) for block in np.array_split(time_s, _BLOCKS)])
+    force = np.array([np.median(block) for block in np.array_split(force_n, _BLOCKS)])
+    slope = float(theilslopes(force, time).slope)
+    return np.array([slope, float(np.median(force_n - slope * time_s))])
+
+
+# --- signals of a process ------------------------------------------------------------------------
+
+
+RATES_PER_BANDWIDTH = 5.0
+"""Least ratio of a sampling rate to the bandwidth, and that of the common rate."""
+
+_ORDER = 4
+_ONSET_STDS, _QUIET_STDS = 6.0, 3.0
+_RISE = 0.35
+"""Rise time of a low-pass filter from 10 to 90 %, times its bandwidth."""
+
+_LEAST_LENGTHS = 20.0
+"""Least duration of the counted signal, in its correlation times."""
+
+_CLIPPED = 4, 0.125
+"""Equal extreme samples in a row that no signal has: so many, and for so long times bandwidth."""
+
+
+@dataclass(frozen=True)
+class MeasuredSignal:
+    """A measured force signal during the drag, corrected and low-pass filtered.
+
+    Attributes
+    ----------
+    time_s, force_n : (N,) ndarray
+        Times from the start of the drag, s, and the force along the axis of its component, N, at
+        `RATES_PER_BANDWIDTH` samples per period of the bandwidth.
+    start_s, start_error_s : float
+        Start of the drag in the time of the file, and its uncertainty, s.
+    """
+
+    time_s: Floats
+    force_n: Floats
+    start_s: float
+    start_error_s: float
+
+
+def low_passed(time_s: Floats, force_n: Floats, low_pass_hz: float) -> tuple[Floats, Floats]:
+    """A signal at the common rate of a comparison, low-pass filtered without a shift in time.
+
+    A Butterworth filter of fourth order is applied forwards and backwards: the power at
+    `low_pass_hz` becomes a quarter.
+
+    Parameters
+    ----------
+    time_s, force_n : (N,) ndarray
+        Even times, s, and forces, N.
+    low_pass_hz : float
+
+    Returns
+    -------
+    (M,) ndarray, (M,) ndarray
+        Times from 0 on, s, and forces, N.
+
+    Raises
+    ------
+    RecordError
+        ``slow``: the sampling rate is less than `RATES_PER_BANDWIDTH` times the bandwidth.
+    """
+    rate = (len(time_s) - 1) / (time_s[-1] - time_s[0])
+    if rate < RATES_PER_BANDWIDTH * low_pass_hz * (1 - 1e-6):
+        problem, remedy = "sampled too slowly for the bandwidth", "reduce low_pass_hz"
+        value, limit = f"{rate:.4g} Hz", f"at least {RATES_PER_BANDWIDTH * low_pass_hz:.4g} Hz"
+        raise RecordError("slow", problem, value=value, limit=limit, remedy=remedy)
+    smooth = sosfiltfilt(butter(_ORDER, low_pass_hz, fs=rate, output="sos"), force_n)
+    grid = np.arange(0.0, time_s[-1], 1.0 / (RATES_PER_BANDWIDTH * low_pass_hz))
+    return grid, np.asarray(CubicSpline(time_s, smooth)(grid))
+
+
+def measured_signal(file: Path, signal: Signal, transient_s: float) -> MeasuredSignal:
+    """Read a measured force signal, and refuse one that no comparison can use.
+
+    Parameters
+    ----------
+    file : Path
+        As for `read_record`, with the column that `signal` names.
+    signal : Signal
+    transient_s : float
+        Time from the start of the drag that no statistic includes, s.
+
+    Raises
+    ------
+    RecordError
+        ``huge``, ``file``, ``columns``, ``numbers``, ``time``, ``uneven``, ``short``,
+        ``start``, ``clipped`` or ``slow``.
+    """
+    time, raw = parse_record(_text(file), signal.column, signal.rate_hz)
+    time, interval = _even(time, raw)
+    rests = [_within(time, span, "rest_s") for span in signal.rest_s]
+    force = signal.sign * (raw - _baseline(time, raw, rests))
+    start, error = _start(time, force, signal, interval)
+    end = float(time[-1]) if signal.ends_at_s is None else signal.ends_at_s
+    if signal.ends_at_s is None and len(rests) > 1 and signal.rest_s[1][0] > start:
+        end = signal.rest_s[1][0]
+    used = _within(time, (start + transient_s, end), "starts_at_s, ends_at_s")
+    _check_clipped(raw[used], interval, signal.low_pass_hz)
+    kept = time <= end
+    grid, found = low_passed(time[kept] - start, force[kept], signal.low_pass_hz)
+    _check_length(found[grid >= transient_s], signal.low_pass_hz)
+    return MeasuredSignal(grid, found, start, error)
+
+
+def _within(time: Floats, span: Span, field: str) -> slice:
+    """The samples between two times; at least `_BLOCKS` of them."""
+    first, last = np.searchsorted(time, span)
+    if last - first < _BLOCKS:
+        problem = f"too few samples from {span[0]:.6g} to {span[1]:.6g} s"
+        limit = f"at least {_BLOCKS}; the file is from {time[0]:.6g} to {time[-1]:.6g} s"
+        value, remedy = f"{max(last - first, 0)}", f"correct {field}, or record for a longer time"
+        raise RecordError("short", problem, value=value, limit=limit, remedy=remedy)
+    return slice(int(first), int(last))
+
+
+def _baseline(time: Floats, force: Floats, rests: Sequence[slice]) -> Floats:
+    """Offset and drift at all times, from the means of stretches without load."""
+    if not rests:
+        return np.zeros(len(time))
+    at, level = ([float(values[rest].mean()) for rest in rests] for values in (time, force))
+    return np.asarray(np.polyval(np.polyfit(at, level, len(rests) - 1), time))
+
+
+def _start(time: Floats, force: Floats, signal: Signal, interval: float) -> tuple[float, float]:
+    """When the drag starts, and the uncertainty of that, s.
+
+    The force leaves the noise where it first exceeds six standard deviations of the rest. The
+    uncertainty is the time since it was last below three of them, at least the rise time of the
+    filter. The filter itself, which spreads a step to both sides, is not applied before.
+    """
+    if signal.starts_at_s is not None:
+        return signal.starts_at_s, interval
+    remedy = "add starts_at_s: the time in the file at which the drag starts"
+    if not signal.rest_s:
+        raise RecordError("start", "neither starts_at_s nor rest_s is given", remedy=remedy)
+    rest = force[(time >= signal.rest_s[0][0]) & (time <= signal.rest_s[0][1])]
+    size, after = np.abs(force), time > signal.rest_s[0][1]
+    onset = np.flatnonzero(after & (size > _ONSET_STDS * rest.std()))
+    if not len(onset):
+        value = f"standard deviation {rest.std():.3g} N"
+        problem = "the force never leaves the noise of rest_s"
+        raise RecordError("start", problem, value=value, remedy=remedy)
+    quiet = np.flatnonzero(size[: onset[0]] < _QUIET_STDS * rest.std())
+    last = time[quiet[-1]] if len(quiet) else time[0]
+    return float(time[onset[0]]), max(float(time[onset[0]] - last), _RISE / signal.low_pass_hz)
+
+
+def _check_clipped(raw: Floats, interval: float, low_pass_hz: float) -> None:
+    """Refuse runs of identical extreme values."""
+    least, long = _CLIPPED
+    most = max(least, long / low_pass_hz / interval)
+    for extreme in (raw.max(), raw.min()):
+        ends = np.flatnonzero(np.diff(np.pad((raw == extreme).astype(int), 1)))
+        longest = int(np.max(ends[1::2] - ends[::2]))
+        if longest >= most:
+            problem = "the signal is clipped: sensor or amplifier reached its limit"
+            value, limit = f"{longest} samples of {extreme:.6g} in a row", f"fewer than {most:.0f}"
+            remedy = "measure in a wider range"
+            raise RecordError("clipped", problem, value=value, limit=limit, remedy=remedy)
+
+
+def _check_length(force: Floats, low_pass_hz: float) -> None:
+    """Refuse a signal of few correlation times: lags at which the autocorrelation is 1/e."""
+    rest = force - force.mean()
+    products = correlate(rest, rest, method="fft")[len(rest) - 1 :]
+    lag = max(int(np.argmax(products < products[0] / np.e)), 1)
+    if len(force) < _LEAST_LENGTHS * lag or not products[0] > 0.0:
+        step = 1.0 / (RATES_PER_BANDWIDTH * low_pass_hz)
+        problem = "after the transient it is too short for its own correlation"
+        value = f"{len(force) * step:.3g} s, correlation time {lag * step:.3g} s"
+        limit, remedy = f"at least {_LEAST_LENGTHS * lag * step:.3g} s", "record for a longer time"
+        raise RecordError("short", problem, value=value, limit=limit, remedy=remedy)
