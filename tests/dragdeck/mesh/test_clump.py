@@ -33,6 +33,10 @@ def _cylinder(aspect: float) -> list[float]:
 ELLIPSOID = [(a**2 + b**2) / 5 for a, b in ((1, 1), (2, 1), (2, 1))]
 MOMENTS = [
     (ROD, _cylinder(1.5)),
+    (
+        {"kind": "cone", "aspect": 1, "spheres": 4},
+        [_radius(math.pi / 12) ** -2 * one for one in (3 / 40, 3 / 80 + 3 / 80, 3 / 80 + 3 / 80)],
+    ),
     ({"kind": "tetrahedron", "spheres": 4}, [1 / 20 * _radius(1 / (6 * math.sqrt(2))) ** -2] * 3),
     (
         {"kind": "ellipsoid", "axes": [2, 1, 1], "spheres": 5},
@@ -47,6 +51,11 @@ def test_inertia_is_that_of_the_body(shape: dict[str, Any], moments: list[float]
     clump = fit_clump(found.corners(), found.spheres)
     assert sorted(clump.inertia) == pytest.approx(moments, rel=0.01)
     assert abs(clump.volume_error) < 0.005
+    whole = body(found.corners())
+    np.testing.assert_allclose(whole.center_mass, 0, atol=1e-9)
+    np.testing.assert_allclose(
+        whole.moment_inertia, np.diag(np.diag(whole.moment_inertia)), atol=1e-9
+    )
     assert clump.reach < 1.3 * np.linalg.norm(body(found.corners()).vertices, axis=1).max()
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from dragdeck.errors import InputError
 from dragdeck.mesh.files import read
-from dragdeck.mesh.surface import Floats, surface
+from dragdeck.mesh.surface import Floats
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
@@ -43,6 +43,9 @@ _LARGEST = 1.5
 
 _DENTED = 0.02
 """Volume that the convex hull of a particle may have more than the particle."""
+
+_FLAT = 1e-3
+"""Extent of a body across over its extent along from which it is no body."""
 
 _DIGITS = 5
 """Decimals of places and radii: far below the errors of a clump."""
@@ -111,22 +114,16 @@ def body(corners: Floats) -> Trimesh:
     InputError
         The corners lie in a plane.
     """
-    from scipy.spatial import ConvexHull, QhullError
+    from trimesh.convex import convex_hull
 
-    try:
-        hull = ConvexHull(corners)
-    except QhullError:
-        raise InputError("the corners of a particle lie in a plane, or are too few") from None
-    points = corners - corners.mean(axis=0)
-    triangles = points[hull.simplices]
-    inward = np.einsum("fi,fi->f", np.cross(*np.diff(triangles, axis=1).swapaxes(0, 1)),
-                       hull.equations[:, :3]) < 0  # fmt: skip
-    faces = np.where(inward[:, None], hull.simplices[:, ::-1], hull.simplices)
-    points -= surface(points, faces).center_mass
-    points *= (4 / 3 * np.pi / hull.volume) ** (1 / 3)
-    _, axes = np.linalg.eigh(surface(points, faces).moment_inertia)
-    axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])
-    return surface(points @ axes, faces)
+    lengths = np.linalg.svd(corners - corners.mean(axis=0), compute_uv=False)
+    if lengths[-1] < _FLAT * lengths[0]:
+        raise InputError("the corners of a particle lie in a plane, or are too few")
+    mesh = convex_hull(corners)
+    mesh.apply_transform(mesh.principal_inertia_transform)
+    mesh.apply_translation(-mesh.center_mass)
+    mesh.apply_scale((4 / 3 * np.pi / float(mesh.volume)) ** (1 / 3))
+    return mesh
 
 
 def convex_corners(file: Path) -> Floats:
