@@ -107,9 +107,12 @@ def _speed(case: CaseOfRun) -> Iterator[str]:
 def _media(case: CaseOfRun) -> Iterator[str]:
     media, material = case.media, _text(case.inputs.get("media.material"))
     if case.classes:
-        yield f"{number(media.count)} spheres in {len(case.classes)} classes"
+        what = "particles" if case.bodies else "spheres"
+        yield f"{number(media.count)} {what} in {len(case.classes)} classes"
         return
-    yield " ".join(filter(None, (number(media.count), material, "spheres")))
+    shape = _text(case.inputs.get("media.shape.kind"))
+    what = f"particles ({shape.replace('_', ' ')})" if shape else "spheres"
+    yield " ".join(filter(None, (number(media.count), material, what)))
     spread = (
         f" \N{PLUS-MINUS SIGN} {_mm(2 * media.radius_std_m)} (standard deviation)"
         if media.radius_std_m

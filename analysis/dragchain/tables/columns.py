@@ -27,6 +27,9 @@ SIDE_FORCES = vector("side_force", "n")
 CENTRE = ("x_m", "y_m", "z_m")
 VELOCITY = ("vx_m_s", "vy_m_s", "vz_m_s")
 SPIN = ("wx_rad_s", "wy_rad_s", "wz_rad_s")
+ORIENTATION = ("orientation_w", "orientation_x", "orientation_y", "orientation_z")
+"""Columns of ``particles`` beside its own where particles are clumps."""
+
 KINEMATICS = ("particle_id", *CENTRE, *VELOCITY, *SPIN, "radius_m")
 
 WORKPIECE_FORCE = (

@@ -192,6 +192,7 @@ _VELOCITY = tuple(Column(f"v{axis}_m_s", f"v{axis}") for axis in "xyz")
 _SPIN = tuple(Column(f"w{axis}_rad_s", f"omega{axis}") for axis in "xyz")
 _ID = Column("particle_id", "id", whole=True)
 _RADIUS = Column("radius_m", "radius")
+_BODY = Column("body_id", "id_multisphere", whole=True)
 _STEP = Column("step", "step", whole=True)
 _TIME = Column("time_s", "step*dt")
 
@@ -216,9 +217,9 @@ def thermo(period: int, last: int | None, entry: int = 0) -> Output:
     return Output("thermo", "print", columns, period, entry + period, last, purpose=purpose)
 
 
-def settled_particles() -> Output:
-    """Every particle of the settled bed, one frame."""
-    columns = (_ID, *_POSITION, *_VELOCITY, *_SPIN, _RADIUS)
+def settled_particles(clumped: bool = False) -> Output:
+    """Every particle of the settled bed, or every sphere of clumps, one frame."""
+    columns = (_ID, *_POSITION, *_VELOCITY, *_SPIN, _RADIUS, *([_BODY] if clumped else []))
     purpose = "settled packing, one frame, for packing.json"
     return Output("particles", "custom", columns, 1, 0, None, True, 1.0, purpose)
 
@@ -305,13 +306,16 @@ def contacts(period: int, first: int, last: int) -> Output:
     )
 
 
-def particles(period: int, first: int, last: int, bowl_facets: bool) -> Output:
-    """Every particle, with the forces of an exact bowl on it as applied."""
+def particles(
+    period: int, first: int, last: int, bowl_facets: bool, clumped: bool = False
+) -> Output:
+    """Every particle or sphere of a clump, with the forces of an exact bowl on it as applied."""
     bowl = (
         *_vector("floor_force", "n", "f_force_floor"),
         *_vector("side_force", "n", "f_force_side"),
     )
     columns = (_ID, *_POSITION, *_VELOCITY, *_SPIN, _RADIUS, *(() if bowl_facets else bowl))
+    columns += (_BODY,) if clumped else ()
     purpose = "all particles, for particles.parquet and force chains"
     return Output("particles", "custom", columns, period, first, last, True, 1.0, purpose)
 

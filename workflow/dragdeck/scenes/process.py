@@ -5,7 +5,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from functools import partial
 
-from dragdeck.cases.bed import bed_radii, bed_rayleigh_time, bed_timestep, buoyancy_density, skin
+from dragdeck.cases.bed import (
+    bed_rayleigh_time,
+    bed_timestep,
+    buoyancy_density,
+    farthest_point,
+    skin,
+)
 from dragdeck.cases.case import Case, Stretch, materials_content, mesh_file, of_each_workpiece
 from dragdeck.decks import PACKING_FILE, WORKPIECE_MESH, outputs
 from dragdeck.decks.deck import NOT_OF_LIQUID, LeftOut, Scene
@@ -124,7 +130,15 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         timestep_s=dt,
         rayleigh_time_s=bed_rayleigh_time(study),
         neighbours=max(ENGINE_NEIGHBOURS, _bowl_neighbours(study), *counts),
-        outputs=_outputs(periods, drag, steps, [one.name for one in moved], facets, touches),
+        outputs=_outputs(
+            periods,
+            drag,
+            steps,
+            [one.name for one in moved],
+            facets,
+            touches,
+            study.media.clumped,
+        ),
         thermo_steps=periods.network,
         checkpoint_steps=_checkpoint_steps(study, steps.end - steps.entry),
         processors=parts.line,
@@ -132,6 +146,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         bowl_radius_m=study.bowl.radius_m,
         bowl_facets=facets,
         bowl_rad_s=courses[0].driven.bowl_rad_s,
+        clumped=study.media.clumped,
         workpiece_type=types.index(study.workpiece.material) + 1,
         workpieces=moved,
         stops=list(stops(whole, drag, steps, materials)),
@@ -192,6 +207,7 @@ def _outputs(
     workpieces: Sequence[str],
     facets: bool,
     touches: float,
+    clumped: bool,
 ) -> tuple[Output, ...]:
     several = facets or len(workpieces) > 1
     begin = max(drag.start, steps.ramp_end)
@@ -208,7 +224,7 @@ def _outputs(
         *(outputs.workpiece_force(periods.force, force, name, steps.entry) for name in workpieces),
         outputs.workpiece_particles(periods.contacts, first_touching, touching),
         outputs.workpiece_contacts(periods.contacts, first_touching, touching, several),
-        outputs.particles(periods.network, first, network, facets),
+        outputs.particles(periods.network, first, network, facets, clumped),
         outputs.contacts(periods.network, first, network),
         *(outputs.first_touch(last_part, steps.end, several) if touches else ()),
     )
@@ -322,7 +338,7 @@ def _bowl_neighbours(study: Study) -> int:
     size = study.bowl_facet_size_m
     if size is None:
         return 0
-    reach_m = float(bed_radii(study).max()) + skin(study) + 2 * size
+    reach_m = farthest_point(study) + skin(study) + 2 * size
     return math.ceil(3 * math.pi * reach_m**2 / (0.4 * size**2))
 
 

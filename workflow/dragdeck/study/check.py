@@ -110,6 +110,9 @@ def _compound(study: Study) -> _Found:
     compound, rim = study.compound, study.bowl.height_m
     if compound is None:
         return
+    if study.media.clumped:
+        problem = "LIGGGHTS would lift every sphere of a clump by its whole volume"
+        yield "compound", problem, "spherical particles, or no compound"
     if study.liquid_level_m > rim:
         problem = "the liquid stands above the rim of the bowl"
         yield "compound.level_m", problem, f"at most {rim:g} m"

@@ -601,6 +601,14 @@ class Study(Model):
         """Number of particles."""
         return sum(self.class_counts.values())
 
+    @property
+    def sphere_count(self) -> int:
+        """Number of spheres in LIGGGHTS: more than that of particles if these are clumps."""
+        media = self.media
+        return sum(
+            count * media.spheres_of(media.parts[name]) for name, count in self.class_counts.items()
+        )
+
     def pair(self, first: str, second: str) -> Pair:
         """The contact coefficients of two materials.
 
