@@ -77,7 +77,7 @@ rule crate:
         rules.write_crate.output,
 
 
-# Fit of the restitution to a measured drop test.
+# Fit of coefficients to a measured drop test, to measured angles, or to both.
 rule calibrate:
     input:
         rules.write_calibration_report.output,

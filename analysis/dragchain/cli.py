@@ -198,12 +198,22 @@ STEPS = (
             "the simulated drop tests, writes result.json, impacts.csv and bias.csv to the folder, "
             "and prints the value for the study.",
             "calibration.results:calibrate_command", (RECORD, DROPS, OUT_DIR)),
+    Command("angles", "fit friction and rolling friction to measured angles",
+            "Fit friction and rolling friction to measured angles. It reads the simulated heaps "
+            "and drums, writes angles.json and angles.csv to the folder, and prints the values "
+            "for the study.",
+            "calibration.friction:write_friction", (
+                Argument("runs_file", type=Path, metavar="RUNS",
+                          help="runs.json, made by dragdeck step angles"), OUT_DIR)),
     Command("calibration-report", "write the report on a calibration",
-            "Write the report on a calibration. It reads the CSV file and the results in DIR, and "
-            "writes report.html and figures to DIR.",
+            "Write the report on a calibration. It reads the results in DIR, and writes "
+            "report.html and figures to DIR.",
             "calibration.report:write_calibration_report", (
-                RECORD,
-                Argument("folder", type=Path, metavar="DIR", help="folder of the calibration"))),
+                Argument("folder", type=Path, metavar="DIR", help="folder of the calibration"),
+                Argument("--record", type=Path, nargs="?", metavar="RECORD",
+                          help="measured drop test: CSV file of force against time"),
+                Argument("--angles", action="store_true",
+                          help="report on measured angles, from angles.json and angles.csv"))),
 )  # fmt: skip
 """What the rules call: ``dragchain step NAME``."""
 

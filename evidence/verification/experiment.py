@@ -12,10 +12,11 @@ from dragdeck.cases.case import digest
 from dragdeck.decks import outputs
 from dragdeck.decks.deck import Body as DataBody
 from dragdeck.decks.deck import Deck, Materials, Scene, Vector, contact_law, data_file
+from dragdeck.documents import omitted
 from dragdeck.physics.contact_mechanics import rayleigh_time
 from dragdeck.physics.rounding import round_to
 from dragdeck.records.run import CaseFile, CountOfRun, RanksOfRun
-from dragdeck.study.contact_law import Pair
+from dragdeck.study.contact_law import Contact, Pair, RollingModel
 from dragdeck.study.workpiece import Material
 
 _FRAMES_TIMES_BODIES = 25_000
@@ -86,6 +87,8 @@ class CollideCase(CaseFile):
         What differs from contact to contact.
     steps_per_contact : int
         Time steps in the shortest contact of the run.
+    rolling_model : str
+        Of the study's contact law.
     impacts, angle_deg : int, float
         Of a bouncing particle and of an incline alone.
     """
@@ -107,6 +110,7 @@ class CollideCase(CaseFile):
     angle_deg: float | None = None
     gravity_m_s2: Vector = (0.0, 0.0, 0.0)
     limit_force: bool = True
+    rolling_model: RollingModel = omitted("epsd2")
     fidelity: RanksOfRun = RanksOfRun(ranks=1)
     media: CountOfRun
     types: Sequence[NamedMaterial]
@@ -228,7 +232,8 @@ def _pair_table(case: CollideCase) -> Materials:
     """The engine's constants; pairs that never meet repeat one that does."""
     pairs, size = {pair.types: pair for pair in case.pairs}, range(1, len(case.types) + 1)
     other = case.pairs[0]
-    law = contact_law([[pairs.get((min(i, j), max(i, j)), other) for j in size] for i in size])
+    table = [[pairs.get((min(i, j), max(i, j)), other) for j in size] for i in size]
+    law = contact_law(table, Contact(rolling_model=case.rolling_model))
     return Materials(
         names=[material.name for material in case.types],
         youngs_moduli_pa=[material.youngs_modulus_pa for material in case.types],

@@ -132,6 +132,13 @@ STEPS = (
                           help="sweep: a range of restitutions; confirm: the fitted one"),
                 Argument("--fit", type=Path, metavar="FILE",
                           help="result.json of the fit; required for confirm"))),
+    Command("angles", "simulate the measured angles of a calibration",
+            "Simulate the heaps and drums that the calibration of friction and rolling friction "
+            "requires, and write runs.json to the folder.",
+            "commands:angles_command", (
+                STUDY, FIDELITY, OUT_DIR,
+                Argument("--cores", type=int, default=1, metavar="N",
+                          help="runs at the same time (default: %(default)s)"))),
 )  # fmt: skip
 """What the rules call: ``dragdeck step NAME``."""
 

@@ -16,6 +16,7 @@ from rich.table import Table
 
 from dragdeck.advice.advise import advised_settings
 from dragdeck.advice.forecast import advice_file, advice_tables, advised_case, question
+from dragdeck.campaigns.angle_runs import run_angles
 from dragdeck.campaigns.restitution_drops import confirmation, run_drops, sweep
 from dragdeck.cases.bed import clump_of
 from dragdeck.cases.case import Case
@@ -455,3 +456,10 @@ def drops_command(
         )
     batch = Batch(out, environment(project.templates, study_templates(case)))
     run_drops(case, drops, batch, say)
+
+
+def angles_command(study: str, fidelity: str | None, out: Path, cores: int) -> None:
+    """Simulate the measured angles of a study."""
+    project = find_project(Path.cwd())
+    case = project.cases(study, fidelity)[0]
+    run_angles(case, Batch(out, environment(project.templates, study_templates(case))), say, cores)

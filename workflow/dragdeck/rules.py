@@ -247,13 +247,20 @@ class Workflow:
         own = [f"{package}/{name}" for name in names]
         return [str(self.project.root / name) for name in (*own, *shared)]
 
-    def drop_record(self, _: object = None) -> str:
-        """The measured drop test of the study."""
-        return self.relative(or_stop(record_file, self.cases[0]))
+    def if_measured(self, part: str, *files: str) -> list[str]:
+        """Files in the folder of the calibration, if the study has this part of it."""
+        known = self.cases[0].study.calibration
+        asked = part == "record" if known is None else getattr(known, part) is not None
+        return [self.of_study("calibration", file) for file in files] if asked else []
 
-    def calibration_inputs(self) -> list[str]:
-        """What the drops of a calibration are made from: the study and the drop's templates."""
-        return [self.relative(self.cases[0].file), *self.templates_of("drop_test")]
+    def drop_record(self, _: object = None) -> str | list[str]:
+        """The measured drop test of the study; nothing if it has measured angles only."""
+        there = self.if_measured("record", "") or not self.if_measured("angles", "")
+        return self.relative(or_stop(record_file, self.cases[0])) if there else []
+
+    def calibration_inputs(self, scene: str = "drop_test") -> list[str]:
+        """What the runs of a calibration are made from: the study and the scene's templates."""
+        return [self.relative(self.cases[0].file), *self.templates_of(scene)]
 
     def signal_file(self) -> list[str]:
         """The measured force signal of the study, if it names one."""

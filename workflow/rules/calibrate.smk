@@ -1,5 +1,5 @@
-# The restitution that a measured drop test asks for. A record that cannot be
-# used is refused before any drop is run.
+# The restitution that a measured drop test asks for, and the friction and rolling friction that
+# measured angles ask for. A record that cannot be used is refused before any drop is run.
 
 
 rule read_drop_record:
@@ -67,24 +67,60 @@ rule confirm_restitution:
         " --out $(dirname {output}) 2>&1 | tee -i {log}"
 
 
+rule simulate_angles:
+    input:
+        WORK.calibration_inputs("angles"),
+    output:
+        WORK.of_study("calibration", "angles/runs.json"),
+    threads: workflow.cores
+    resources:
+        prints=1,
+    params:
+        study=STUDY,
+        fidelity=WORK.fidelity_option,
+        source=source_hash("dragdeck.campaigns.angle_runs"),
+    shell:
+        "dragdeck step angles {params.study} {params.fidelity} --cores {threads}"
+        " --out $(dirname {output}) 2>&1 | tee -i {log}"
+
+
+rule fit_friction:
+    input:
+        rules.simulate_angles.output,
+    output:
+        result=WORK.of_study("calibration", "angles.json"),
+        table=WORK.of_study("calibration", "angles.csv"),
+    resources:
+        prints=1,
+    params:
+        source=source_hash("dragchain.calibration.friction"),
+    shell:
+        "dragchain step angles {input} --out $(dirname {output.result}) 2>&1 | tee -i {log}"
+
+
 rule write_calibration_report:
     input:
-        rules.fit_restitution.output,
-        WORK.of_study("calibration", "sweep/drops.json"),
-        WORK.of_study("calibration", "confirm/drops.json"),
+        WORK.if_measured(
+            "record",
+            *("result.json", "impacts.csv", "bias.csv", "sweep/drops.json", "confirm/drops.json"),
+        ),
         record=WORK.drop_record,
+        angles=WORK.if_measured("angles", "angles.json", "angles.csv"),
         templates=WORK.page_templates("calibration/calibration.html.j2"),
     output:
+        WORK.if_measured("record", "figures/impacts.png"),
+        WORK.if_measured("angles", "figures/angles.png"),
         page=report(
             WORK.of_study("calibration", "report.html"),
             caption="../report/calibration.rst",
             category="Calibration",
-            labels={"run": "drop test", "figure": "report"},
+            labels={"run": "calibration", "figure": "report"},
         ),
-        figure=WORK.of_study("calibration", "figures/impacts.png"),
     resources:
         prints=1,
     params:
         source=source_hash("dragchain.calibration.report"),
+        angles=lambda wildcards, input: "--angles" if input.angles else "",
     shell:
-        "dragchain step calibration-report {input.record:q} $(dirname {output.page}) 2>&1 | tee -i {log}"
+        "dragchain step calibration-report $(dirname {output.page}) {params.angles}"
+        " --record {input.record:q} 2>&1 | tee -i {log}"

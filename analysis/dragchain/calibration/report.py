@@ -11,10 +11,11 @@ from matplotlib.figure import Figure
 
 from dragchain.arrays import Floats
 from dragchain.calibration.fit import RecordFit, calibrate_file
+from dragchain.calibration.friction import FrictionFile, Posterior, angle_models
 from dragchain.calibration.results import bias_table, confirmed, impact_table, result
 from dragchain.calibration.simulated_drops import DropRun, Drops, read_drops
-from dragchain.figures.panels import legend_below, new_figure
-from dragchain.figures.style import BLUE, COLOURS, GREY
+from dragchain.figures.panels import key, legend_below, new_figure, new_panels
+from dragchain.figures.style import BLUE, COLOURS, GREY, LIGHT, ORANGE
 from dragchain.report.campaign import write_report
 from dragdeck.study.force_record import Record, read_record
 
@@ -78,39 +79,90 @@ def _one_impact(
     axes.set(xlabel="time (µs)")
 
 
+_RIGS: Mapping[str, tuple[str, str]] = {
+    "repose": ("angle of repose", BLUE),
+    "drum": ("angle in the drum", ORANGE),
+}
+
+
+def draw_angles(found: FrictionFile, runs: pd.DataFrame) -> Figure:
+    """The joint probability of both coefficients, and the angles that were simulated."""
+    models = angle_models(found, runs)
+    posterior = Posterior.of(models, found.measured)
+    figure, (joint, *others) = new_panels(3.2, 1 + len(models))
+    x, y = posterior.axes
+    weights = [*posterior.weights.values()][-1].T
+    levels = np.sort(weights, axis=None)
+    inside = np.interp([0.05, 0.5], np.cumsum(levels), levels)
+    joint.contourf(x, y, weights, [*inside, np.inf], colors=[LIGHT, GREY])
+    for axes, name in zip(others, models, strict=True):
+        label, colour = _RIGS[name]
+        joint.contour(x, y, posterior.misfit[name].T, [-1.0, 1.0], colors=colour, linestyles="-")
+        key(joint, f"{label}, within one standard uncertainty", color=colour, ls="-", marker="")
+        own = runs[runs["rig"] == name]
+        dots = axes.scatter(own["friction"], own["angle_deg"], c=own["rolling_friction"], s=14)
+        axes.axhline(found.measured[name][0], color=colour)
+        axes.set(xlabel="friction", ylabel=f"{label} (degrees)")
+    figure.colorbar(dots, ax=others[-1], label="rolling friction")
+    joint.plot(*found.best, "k+")
+    joint.set(
+        xlabel="friction", ylabel="rolling friction", title="95 % and 50 % of the probability"
+    )
+    return legend_below(figure)
+
+
 # --- report --------------------------------------------------------------------------------------
 
 
-def write_calibration_report(record: Path, folder: Path) -> None:
-    """Draw the figure and write ``report.html`` of a calibration.
+def write_calibration_report(folder: Path, record: Path | None, angles: bool = False) -> None:
+    """Draw the figures and write ``report.html`` of a calibration.
 
     Parameters
     ----------
-    record : Path
-        The CSV.
     folder : Path
-        With ``sweep/drops.json`` and ``confirm/drops.json``.
+        With ``sweep/drops.json`` and ``confirm/drops.json`` of a drop test, and ``angles.json``
+        and ``angles.csv`` of measured angles.
+    record : Path, optional
+        The CSV of a measured drop test.
+    angles : bool
+        Whether angles were measured.
 
     Raises
     ------
     DragdeckError
         A file is missing, or the record cannot be used.
     """
-    sweep, confirm = (read_drops(folder / name / "drops.json") for name in ("sweep", "confirm"))
-    found = calibrate_file(record, sweep)
+    figures, drops, friction = dict[str, Figure](), None, None
+    if record:
+        sweep, confirm = (read_drops(folder / name / "drops.json") for name in ("sweep", "confirm"))
+        found = calibrate_file(record, sweep)
+        drops = _of_drops(found, sweep, confirm)
+    if angles:
+        friction = FrictionFile.read(folder / "angles.json")
+
+    def draw() -> Mapping[str, Figure]:
+        if record:
+            figures["impacts"] = draw_impacts(read_record(record), found, confirm)
+        if friction:
+            figures["angles"] = draw_angles(friction, pd.read_csv(folder / "angles.csv"))
+        return figures
+
+    template = "calibration/calibration.html.j2"
+    write_report(folder, template, draw=draw, friction=friction, drops=drops)
+
+
+def _of_drops(found: RecordFit, sweep: Drops, confirm: Drops) -> Mapping[str, object]:
+    """What the page shows of a drop test."""
     observed = found.observed
     names = [f"time of impact {k + 2}" for k in range(len(observed.times_s))]
     names += [f"peak {k + 2} / peak 1" for k in range(len(observed.log_peaks))]
-    write_report(
-        folder,
-        "calibration/calibration.html.j2",
-        draw=lambda: {"impacts": draw_impacts(read_record(record), found, confirm)},
-        result=result(found),
-        impacts=impact_table(found).to_dict("records"),
-        residuals=list(zip(names, found.fit.residuals, strict=True)),
-        bias=_by_deck_value(bias_table(sweep)),
-        confirm=confirmed(confirm),
-    )
+    return {
+        "result": result(found),
+        "impacts": impact_table(found).to_dict("records"),
+        "residuals": list(zip(names, found.fit.residuals, strict=True)),
+        "bias": _by_deck_value(bias_table(sweep)),
+        "confirm": confirmed(confirm),
+    }
 
 
 def _by_deck_value(bias: pd.DataFrame) -> Sequence[Mapping[Hashable, object]]:

@@ -15,6 +15,8 @@ import numpy as np
 from pydantic import JsonValue
 
 from dragchain.loading.document import Loading
+from dragchain.loading.wear import FILE as WEAR
+from dragchain.loading.wear import Wear
 from dragchain.report.findings import (
     FILE,
     DropFindings,
@@ -194,7 +196,8 @@ class StudyRuns:
     """A process run with the filling and the drop test it belongs to, None where it names none.
 
     `loading`: load, sliding and friction work on the workpiece; `extrapolated`: its quantities at
-    the physical Young's modulus. Both are None where they were not computed.
+    the physical Young's modulus; `wear`: what laws of removal read. Each is None where it was not
+    computed.
     """
 
     process: ReportedRun[ProcessFindings]
@@ -202,6 +205,7 @@ class StudyRuns:
     drop_test: ReportedRun[DropFindings] | None
     loading: Loading | None = None
     extrapolated: Extrapolated | None = None
+    wear: Wear | None = None
 
     @cached_property
     def values(self) -> Values:
@@ -241,7 +245,8 @@ def read_study_runs(run_dir: Path) -> StudyRuns:
     with suppress(RejectedRunError, DocumentError):
         if "drop_test" in upstream:
             drop_test = read_reported(upstream["drop_test"], DropFindings)
-    return StudyRuns(process, filling, drop_test, *read_optional(run_dir))
+    wear = Wear.read(run_dir / WEAR) if (run_dir / WEAR).is_file() else None
+    return StudyRuns(process, filling, drop_test, *read_optional(run_dir), wear)
 
 
 def read_reported(run_dir: Path, findings: type[F]) -> ReportedRun[F]:

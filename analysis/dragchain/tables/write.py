@@ -49,8 +49,9 @@ from dragchain.tables.network_contacts import (
     count_corrections,
 )
 from dragchain.tables.parquet import Rows, category, table_writer
-from dragchain.tables.run_folder import Run
-from dragchain.tables.workpiece_contacts import WallContacts
+from dragchain.tables.run_folder import ON_WORKPIECE, Run
+from dragchain.tables.workpiece_contacts import WallContacts, WorkpieceFrames
+from dragdeck.decks.outputs import TOUCHES
 from dragdeck.dumps.frame import Columns
 from dragdeck.errors import RejectedRunError
 from dragdeck.records.case import CaseOfRun
@@ -183,6 +184,11 @@ class WorkpieceSamples:
         force, place = np.split(self._values[rows], 2, axis=1)
         return np.where((steps < self._steps[0])[:, None], np.nan, force), place
 
+    def places_between(self, steps: Ints) -> Floats:
+        """Places at N steps, (N, 3), on the straight line between the samples around each."""
+        columns = (np.interp(steps, self._steps, column) for column in self._values[:, 3:].T)
+        return np.stack(list(columns), axis=1)
+
 
 # --- contacts on the workpiece ---------------------------------------------------------------
 
@@ -192,13 +198,10 @@ def _write_workpiece_contacts(run: Run, file: Path) -> None:
     closure = Closure(limit=SHARED_LIMIT if shared else LIMIT)
     samples = WorkpieceSamples(run.prints("workpiece_force"))
     own = WORKPIECE_CONTACTS + ((ATTRACTION,) if attracts(run.case) else ())
-    bodies = Bodies(run.case)
     with table_writer(file, _with_classes(own, "workpiece_contacts", run.case)) as table:
         for frames in run.workpiece_frames():
             force, place = samples.at(frames.step)
-            contacts, at = frames.workpiece, frames.workpiece_at
-            if bodies:
-                contacts, at = bodies.wall(contacts, at)
+            contacts, at = _of_bodies(run.case, frames)
             rows = workpiece_contact_rows(frames.step[at], contacts, place[at], run.case)
             used = closure.add(frames, force, counted_mask(frames.step, run.case))
             table.write({**rows, "in_statistics": rows["in_statistics"] & used[at]})
@@ -208,6 +211,23 @@ def _write_workpiece_contacts(run: Run, file: Path) -> None:
                 f"{run.folder}: the check of force closure failed: {problem};"
                 " workpiece_contacts.parquet was not written; closure.json contains the values"
             )
+
+
+def _write_touches(run: Run, file: Path) -> None:
+    samples = WorkpieceSamples(run.prints("workpiece_force"))
+    own = WORKPIECE_CONTACTS + ((ATTRACTION,) if attracts(run.case) else ())
+    with table_writer(file, _with_classes(own, "workpiece_contacts", run.case)) as table:
+        for frames in run.workpiece_frames(TOUCHES):
+            contacts, at = _of_bodies(run.case, frames)
+            steps = frames.step[at]
+            place = samples.places_between(steps)
+            table.write(workpiece_contact_rows(steps, contacts, place, run.case))
+
+
+def _of_bodies(case: CaseOfRun, frames: WorkpieceFrames) -> tuple[WallContacts, Ints]:
+    """Contacts of particles with the workpiece and their frames: of bodies, if they are clumps."""
+    contacts, at, bodies = frames.workpiece, frames.workpiece_at, Bodies(case)
+    return bodies.wall(contacts, at) if bodies else (contacts, at)
 
 
 def workpiece_contact_rows(
@@ -372,7 +392,6 @@ def _write_packing(run: Run, file: Path) -> None:
 
 _THERMO = Table("thermo.parquet", ("thermo",), _write_thermo)
 _PARTICLES = Table("particles.parquet", ("particles",), _write_particles)
-_ON_WORKPIECE = ("workpiece_particles", "workpiece_contacts")
 
 _TABLES: Mapping[str, tuple[Table, ...]] = {
     "drop_test": (_THERMO, Table("impacts.parquet", ("impacts",), _write_impacts)),
@@ -383,10 +402,11 @@ _TABLES: Mapping[str, tuple[Table, ...]] = {
         _PARTICLES,
         Table(
             "workpiece_contacts.parquet",
-            ("workpiece_force", *_ON_WORKPIECE),
+            ("workpiece_force", *ON_WORKPIECE),
             _write_workpiece_contacts,
         ),
-        Table("contacts.parquet", ("contacts", "particles", *_ON_WORKPIECE), _write_contacts),
+        Table("touches.parquet", ("workpiece_force", *TOUCHES), _write_touches),
+        Table("contacts.parquet", ("contacts", "particles", *ON_WORKPIECE), _write_contacts),
     ),
 }
 """What is made of a run of each scene, in this order."""

@@ -101,7 +101,7 @@ def test_a_calibration_does_not_rename_any_run(case: Case, measured_case: Case) 
 
 
 def test_a_study_without_a_record_is_told_so(case: Case, measured_case: Case) -> None:
-    with pytest.raises(InputError, match="has no measured drop test"):
+    with pytest.raises(InputError, match="has no measured drop test and no measured angle"):
         settings(case)
     with pytest.raises(InputError, match="the record of the drop test does not exist"):
         record_file(measured_case)
@@ -173,7 +173,7 @@ def test_a_known_restitution_is_recovered(measured_case: Case, project: Project)
     values = (result.fit.restitution, result.fit_full.restitution)
     checked = confirmed(read_drops(run(list(confirmation(case.study, *values))[::2], "confirm")))
     assert checked.effective == pytest.approx(result.measured.value, abs=4 * checked.std)
-    write_calibration_report(folder / "trial-0.csv", folder)
+    write_calibration_report(folder, folder / "trial-0.csv")
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert f"<b>{result.put.value:.4g}</b>" in page
     assert page.count("data:image/") == 1

@@ -18,7 +18,8 @@ from dragdeck.physics import contact_mechanics as mechanics
 from dragdeck.physics.rounding import timestep
 from dragdeck.records.calibration import IMPACTS, DropOfList, DropsFile, Purpose
 from dragdeck.scenes.drop_test import DropFidelity, drop_scene
-from dragdeck.study.model import Calibration, Study
+from dragdeck.study.calibration import Calibration
+from dragdeck.study.model import Study
 
 _RESTITUTIONS = tuple(round(0.05 * k, 2) for k in range(8, 21))
 """Deck values of the sweep: 0.40, 0.45, ... 1.00."""
@@ -73,7 +74,7 @@ def settings(case: Case) -> Calibration:
     """
     if case.study.calibration is None:
         raise InputError(
-            "the study has no measured drop test",
+            "the study has no measured drop test and no measured angle",
             file=case.file,
             field="calibration",
             remedy="add calibration: {record: FILE.csv}, see docs/start/restitution.md",
@@ -90,7 +91,7 @@ def record_file(case: Case) -> Path:
         The study names none, or there is no such file in its folder.
     """
     folder = case.file.parent
-    file = folder / settings(case).record
+    file = folder / (settings(case).record or "")
     if not file.is_file() or not file.resolve().is_relative_to(folder.resolve()):
         raise InputError(
             "the record of the drop test does not exist",
@@ -222,7 +223,7 @@ def _listed(case: Case, rows: Sequence[DropOfList]) -> DropsFile:
         title=study.title,
         pair=f"{particle}-{plate}",
         fidelity=case.fidelity_name,
-        record=section.record,
+        record=section.record or "",
         height_m=height,
         height_std_m=section.height_std_m,
         peaks=section.peaks,

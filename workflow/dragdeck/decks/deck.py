@@ -12,6 +12,7 @@ from dragdeck.physics.domain_split import ENGINE_CHOOSES
 from dragdeck.physics.rounding import round_to
 from dragdeck.records.run import CaseFile
 from dragdeck.study.contact_law import (
+    Contact,
     Pair,
     contact_model,
     contact_settings,
@@ -91,14 +92,14 @@ class Materials:
         return Properties(moduli, tables)
 
 
-def contact_law(pairs: Sequence[Sequence[Pair]]) -> ContactLaw:
+def contact_law(pairs: Sequence[Sequence[Pair]], contact: Contact) -> ContactLaw:
     """The contact law of a square table of pairs: a row and a column for each type."""
     every = [pair for row in pairs for pair in row]
     tables = [
         PairTable(name, row.engine, [getattr(pair, name) for pair in every], row.modulus_power)
         for name, row in present(every).items()
     ]
-    return ContactLaw(tables, contact_model(every), contact_settings(every))
+    return ContactLaw(tables, contact_model(every, contact), contact_settings(every))
 
 
 NOT_OF_LIQUID = (

@@ -5,7 +5,7 @@ definitions, so that no reader has to guess a column.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, Self
 
@@ -125,6 +125,8 @@ class Output:
         Expected rows per frame and particle of the run; a frame has at least one row.
     purpose : str
         For the comment in the input script: content, and the result made from it.
+    waits : bool
+        Whether it is not written before `first_step`, although its dump is defined.
     """
 
     name: str
@@ -136,6 +138,7 @@ class Output:
     binary: bool = False
     rows_per_particle: float = 0.0
     purpose: str = ""
+    waits: bool = False
 
     @property
     def pattern(self) -> str:
@@ -267,6 +270,20 @@ def workpiece_contacts(period: int, first: int, last: int, several: bool) -> Out
     )
     purpose = "contacts with mesh elements, evaluated again, for workpiece_contacts.parquet"
     return Output("workpiece_contacts", "local", columns, period, first, last, purpose=purpose)
+
+
+TOUCHES = ("touch_particles", "touch_contacts")
+"""Outputs as those of the workpiece, at every step, so that each contact is seen to begin."""
+
+
+def first_touch(first: int, last: int, several: bool) -> tuple[Output, ...]:
+    """Contacts on the workpiece, and their particles, at every step of a part of the drag."""
+    found = (workpiece_particles(1, first, last), workpiece_contacts(1, first, last, several))
+    why = "the same at every step of a part of the drag, for touches.parquet"
+    return tuple(
+        replace(one, name=name, purpose=why, waits=True, rows_per_particle=0.05)
+        for name, one in zip(TOUCHES, found, strict=True)
+    )
 
 
 def contacts(period: int, first: int, last: int) -> Output:

@@ -154,6 +154,17 @@ def bowl(radius_m: float, height_m: float, facet_size_m: float) -> Trimesh:
     return weld(floor + _turned(side))
 
 
+def tube(radius_m: float, length_m: float, facet_size_m: float) -> Trimesh:
+    """Make the side of an upright cylinder, from z = 0 on, its polygon outside of the circle.
+
+    Parameters and errors are those of `bowl`; facets are up to four times as long as wide.
+    """
+    _require_facet_size(facet_size_m, radius_m, length_m)
+    sides = polygon_sides(radius_m, facet_size_m)
+    corner_radius_m = radius_m / math.cos(math.pi / sides)
+    return _turned(_side(sides, corner_radius_m, length_m, 4 * facet_size_m))
+
+
 def _require_facet_size(facet_size_m: float, radius_m: float, length_m: float) -> None:
     if facet_size_m > radius_m:
         raise InputError(

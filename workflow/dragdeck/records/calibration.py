@@ -1,10 +1,12 @@
-"""The drops of a calibration, ``drops.json``, and its fits, the core of ``result.json``."""
+"""The runs of a calibration, ``drops.json`` and ``runs.json``, and the fits in ``result.json``."""
 
+from collections.abc import Mapping
 from typing import Literal
 
 from pydantic import PositiveFloat
 
 from dragdeck.documents import Document, Part
+from dragdeck.study.calibration import Rig
 
 IMPACTS = 3
 """Impacts compared at the most (Uhlmann et al. 2015, section 4)."""
@@ -131,3 +133,55 @@ class FitFile(Document):
 
     fit: Fit
     fit_full: Fit
+
+
+class AnglesFile(Document):
+    """The measured angles of a study, and the runs that they are compared with: ``runs.json``.
+
+    Attributes
+    ----------
+    pair : str
+        The particles' material with itself.
+    friction, rolling_friction : (float, float)
+        Ranges in which the coefficients are looked for.
+    measured : mapping
+        Measured angle and its standard uncertainty, degrees, by ``repose`` and ``drum``.
+    runs : tuple of str
+        Folders beside the list; a run that failed is absent.
+    """
+
+    remedy = "make it with: snakemake calibrate"
+
+    study: str
+    title: str
+    pair: str
+    friction: tuple[float, float]
+    rolling_friction: tuple[float, float]
+    measured: Mapping[Rig, tuple[float, float]]
+    runs: tuple[str, ...]
+
+
+class AngleRun(Part):
+    """What a heap or drum is simulated with: ``inputs`` of its ``case.json``.
+
+    Attributes
+    ----------
+    rig : str
+        ``repose`` or ``drum``.
+    friction, rolling_friction : float
+        Between particles.
+    glued : int
+        Particles of the glued layer, which have the first ids.
+    drum_radius_m : float
+        0 for a heap.
+    counted_from : int
+        First step at which a drum's angle is read.
+    """
+
+    rig: Rig
+    friction: float
+    rolling_friction: float
+    seed: int
+    glued: int = 0
+    drum_radius_m: float = 0.0
+    counted_from: int = 0

@@ -16,6 +16,7 @@ from dragdeck.records.run import CaseFile, CountOfRun, RanksOfRun, SettlingCrite
 from dragdeck.study.drive import PathEntry, SuperposedEntry
 from dragdeck.study.media import Ints, class_numbers
 from dragdeck.study.reference import Reference
+from dragdeck.study.removal import Removal
 
 
 class FidelityOfRun(RanksOfRun):
@@ -254,6 +255,8 @@ class CaseOfRun(CaseFile):
         Tolerance from which the settings were derived.
     restitution : float or None
         Coefficient of restitution in the input script of a drop test.
+    removal : Removal or None
+        Law and coefficient of removal of a process.
     """
 
     gravity_m_s2: float
@@ -280,6 +283,7 @@ class CaseOfRun(CaseFile):
     statistics: StatisticsOfRun | None = omitted(None)
     asked: AdvisedSettings | None = omitted(None)
     restitution: float | None = omitted(None)
+    removal: Removal | None = omitted(None)
 
     def class_of(self, particle_id: Ints) -> Ints:
         """Number of the class of (N,) particles in `classes`; 0 if there are none."""

@@ -73,6 +73,7 @@ from dragdeck.scenes.workpiece import (
 )
 from dragdeck.study.base import Json
 from dragdeck.study.contact_law import coefficient_words
+from dragdeck.study.drive import Drive
 from dragdeck.study.model import Study
 from dragdeck.study.workpiece import CylinderShape, MeshShape, Shape
 
@@ -113,6 +114,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         check_headroom(one, way.start_m[2] - reference_height(one), top)
     types, parts = study.type_names(), rank_split(whole)
     materials = material_table(study, types, fidelity.youngs_modulus_scale, whole)
+    touches = study.outputs.first_touch_fraction if steps.end == drag.end else 0.0
     deck = ProcessDeck(
         title=study.title,
         study=whole.study_name,
@@ -129,7 +131,13 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         rayleigh_time_s=bed_rayleigh_time(study),
         neighbours=max(ENGINE_NEIGHBOURS, _bowl_neighbours(study), *counts),
         outputs=_outputs(
-            periods, drag.start, steps, [one.name for one in moved], facets, study.media.clumped
+            periods,
+            drag,
+            steps,
+            [one.name for one in moved],
+            facets,
+            touches,
+            study.media.clumped,
         ),
         thermo_steps=periods.network,
         checkpoint_steps=_checkpoint_steps(study, steps.end - steps.entry),
@@ -194,14 +202,16 @@ def _source(case: Case) -> str:
 
 def _outputs(
     periods: Periods,
-    drag_start: int,
+    drag: Drive,
     steps: Covered,
     workpieces: Sequence[str],
     facets: bool,
+    touches: float,
     clumped: bool,
 ) -> tuple[Output, ...]:
     several = facets or len(workpieces) > 1
-    begin = max(drag_start, steps.ramp_end)
+    begin = max(drag.start, steps.ramp_end)
+    last_part = max(steps.counted, steps.end - math.ceil(touches * drag.steps))
     first_touching, first = (
         math.ceil(begin / period) * period for period in (periods.contacts, periods.network)
     )
@@ -216,6 +226,7 @@ def _outputs(
         outputs.workpiece_contacts(periods.contacts, first_touching, touching, several),
         outputs.particles(periods.network, first, network, facets, clumped),
         outputs.contacts(periods.network, first, network),
+        *(outputs.first_touch(last_part, steps.end, several) if touches else ()),
     )
 
 
@@ -248,6 +259,7 @@ def _process_case(
         media=media_of_run(study, buoyancy_density(study)),
         assumed=_of_liquid(case, surface_m),
         asked=case.advised,
+        removal=study.removal,
         unsafe_timestep=study.accepted.unsafe_timestep,
         case=case.name,
         upstream={scene.name: scene.run_id(case) for scene in (FILLING, DROP_TEST)},

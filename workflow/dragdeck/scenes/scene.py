@@ -132,6 +132,8 @@ class SceneType:
         include = {"title", "assumptions", "reference"}
         if case.study.accepted.unsafe_timestep:
             include.add("accepted")
+        if case.study.removal and self.loading:
+            include.add("removal")
         remarks = case.study.model_dump(mode="json", include=include)
         asked = case.advised.model_dump(mode="json") if case.advised and self.needs_bed else None
         return digest({"study": remarks, "content": dict(self.content(case)), "asked": asked})
@@ -368,7 +370,7 @@ def material_table(
         other = names[-1] if one_particle and high == 0 else names[high]
         return study.pair(first, other).softened(scale)
 
-    law = contact_law([[pair(i, j) for j in size] for i in size])
+    law = contact_law([[pair(i, j) for j in size] for i in size], study.contact)
     return Materials(
         names=names,
         youngs_moduli_pa=moduli,

@@ -20,7 +20,7 @@ from dragdeck.study.recorded import Places, recorded_file, with_recording
 from dragdeck.study.workpiece import CylinderShape, Shape
 from dragdeck.study.yaml import located, shown
 
-_NO_SWEEP = ("accepted", "assumptions", "reference", "scaling", "sweep", "title")
+_NO_SWEEP = ("accepted", "assumptions", "reference", "removal", "scaling", "sweep", "title")
 """Blocks that no run depends on: cases that differ in them would be the same."""
 
 _LEAST_LEVELS = 3
@@ -41,9 +41,11 @@ def contradictions(study: Study, whole: bool) -> Iterator[InputError]:
         _pairs,
         _media,
         _compound,
+        _angles,
         _shape,
         _motion,
         _assumptions,
+        _removal,
         *([_sweep] if whole else []),
     ):
         for field, problem, limit in check(study):
@@ -77,6 +79,12 @@ def _pairs(study: Study) -> _Found:
                 f"differs from {key}, which is the same pair",
                 "one entry per pair",
             )
+        model, field = study.contact.rolling_model, f"pairs.{key}.rolling_damping"
+        if model == "epsd" and pair.rolling_friction and not pair.rolling_damping:
+            problem = "is missing, which the rolling model epsd requires"
+            yield field, problem, "a damping ratio above 0, such as 0.3"
+        if model != "epsd" and pair.rolling_damping:
+            yield field, f"the rolling model {model} has no damping", "contact.rolling_model epsd"
     for one, other in product(study.media.materials, study.type_names()):
         key, back = f"{one}-{other}", f"{other}-{one}"
         if key in every and not {key, back} & set(study.pairs):
@@ -113,6 +121,15 @@ def _compound(study: Study) -> _Found:
         if compound.density_kg_m3 >= lightest:
             problem = f"particles of {name} float, so that there is no bed at the floor"
             yield "compound.density_kg_m3", problem, f"below {lightest:g} kg/m3"
+
+
+def _angles(study: Study) -> _Found:
+    angles, media = study.calibration and study.calibration.angles, study.media
+    if angles and media.classes:
+        yield "calibration.angles", "the media have several classes", "media of one class"
+    elif angles:
+        found = angles.problems(media.typical_radius_m, study.gravity_m_s2)
+        yield from ((f"calibration.angles.{field}", what, limit) for field, what, limit in found)
 
 
 def _shape(study: Study) -> _Found:
@@ -183,6 +200,19 @@ def _assumptions(study: Study) -> _Found:
         if entry.field not in known:
             limit = f"{near(entry.field, known)}the dotted name of a field, such as media.count"
             yield f"assumptions.{number}.field", f"no such field {entry.field!r}", limit
+
+
+def _removal(study: Study) -> _Found:
+    removal = study.removal
+    if removal is None:
+        return
+    if any(law.impact for law in removal.laws) and not study.outputs.first_touch_fraction:
+        problem = f"the law {removal.law} reads impacts, but no run writes them"
+        yield "removal.law", problem, "outputs.first_touch_fraction: 0.05, or the law archard"
+    several = study.workpieces is not None or {*study.sweep} - {"seed"}
+    if removal.calibrate and several:
+        problem = "a weighed trial is of one process, but the study has several cases"
+        yield "removal.calibrate", problem, "one workpiece, and a sweep over seed at most"
 
 
 def _sweep(study: Study) -> _Found:

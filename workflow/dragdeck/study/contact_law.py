@@ -27,6 +27,8 @@ Attraction = Callable[[Floats | float, Floats, Floats, bool], Floats]
 """Attractive force of (N,) contacts, N, from the coefficient, reduced radii and overlaps, m, and
 whether the other body is a wall."""
 
+RollingModel = Literal["epsd2", "cdt", "epsd"]
+
 _BASE_MODEL = "hertz tangential history"
 """Hertz-Mindlin with the history of the tangential spring (LIGGGHTS: ``pair gran``)."""
 
@@ -42,7 +44,8 @@ class Coefficient:
     words : str
         What it is called in a sentence.
     model : str
-        Keywords that the contact model needs for it; none where it always counts.
+        Keywords that the contact model needs for it; none where it always counts. Fields of
+        `Contact` may stand in it.
     settings : str
         Options of the contact model that go with it.
     compared : {"each", "lowest"}
@@ -100,8 +103,14 @@ class Pair(Model):
         Number,
         Field(ge=0, le=10, description="coefficient of rolling friction: largest rolling torque / "
               "(normal force x effective radius)"),
-        Coefficient("coefficientRollingFriction", "rolling friction", "rolling_friction epsd2",
-                    "torsionTorque on"),
+        Coefficient("coefficientRollingFriction", "rolling friction",
+                    "rolling_friction {rolling_model}", "torsionTorque on"),
+    ] = 0.0  # fmt: skip
+    rolling_damping: Annotated[
+        Number,
+        Field(ge=0, le=10, description="damping ratio of the rolling spring, of the model epsd "
+              "only", exclude_if=lambda value: value == 0),
+        Coefficient("coefficientRollingViscousDamping", "damping of rolling"),
     ] = 0.0  # fmt: skip
     cohesion_j_m3: Annotated[
         Number,
@@ -142,6 +151,11 @@ class Contact(Model):
         default=True,
         description="suppress tensile normal forces (LIGGGHTS: limitForce); for dry particles",
     )
+    rolling_model: RollingModel = Field(
+        default="epsd2",
+        description="model of rolling friction (LIGGGHTS: rolling_friction)",
+        exclude_if=lambda value: value == "epsd2",
+    )
 
 
 @cache
@@ -160,9 +174,10 @@ def present(pairs: Iterable[Pair]) -> Mapping[str, Coefficient]:
     return {name: row for name, row in coefficients().items() if name not in absent}
 
 
-def contact_model(pairs: Iterable[Pair]) -> str:
+def contact_model(pairs: Iterable[Pair], contact: Contact) -> str:
     """LIGGGHTS's contact model with what these pairs need."""
-    return " ".join([_BASE_MODEL, *(row.model for row in present(pairs).values() if row.model)])
+    models = (row.model.format(**dict(contact)) for row in present(pairs).values() if row.model)
+    return " ".join([_BASE_MODEL, *models])
 
 
 def contact_settings(pairs: Iterable[Pair]) -> list[str]:

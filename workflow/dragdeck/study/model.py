@@ -20,6 +20,7 @@ from dragdeck.study.base import (
     Positive,
     Whole,
 )
+from dragdeck.study.calibration import Calibration
 from dragdeck.study.contact_law import Contact, Pair
 from dragdeck.study.media import Media, class_counts
 from dragdeck.study.paths.circle import CirclePath
@@ -29,6 +30,7 @@ from dragdeck.study.paths.path import turned
 from dragdeck.study.paths.rest import RestPath
 from dragdeck.study.paths.waypoints import WaypointsPath
 from dragdeck.study.reference import Reference
+from dragdeck.study.removal import Removal
 from dragdeck.study.superposed.motion import SuperposedMotion
 from dragdeck.study.superposed.oscillation import Oscillation
 from dragdeck.study.superposed.spin import Spin, SpinStage
@@ -247,22 +249,6 @@ class DropTest(Model):
     )
 
 
-class Calibration(Model):
-    """A measured drop test, to find the restitution of particle on workpiece material."""
-
-    record: Line = Field(
-        pattern=r"^[^{}]*$", description="CSV file of force against time; relative to the study"
-    )
-    height_std_m: Positive = Field(
-        default=1e-4, description="standard uncertainty of drop_test.height_m in the test, m"
-    )
-    peaks: Literal["auto", "yes", "no"] = Field(
-        default="auto",
-        description="whether to fit the ratios of the peak forces too; auto: if the "
-        "sensor is fast enough",
-    )
-
-
 class Filling(Model):
     """When a packing counts as settled."""
 
@@ -291,6 +277,12 @@ class Outputs(Model):
     )
     n_checkpoints: Annotated[Whole, Field(ge=0, le=1000)] = Field(
         default=50, description="number of checkpoints of a run, from which it can be resumed"
+    )
+    first_touch_fraction: Annotated[Number, Field(ge=0, le=1)] = Field(
+        default=0,
+        description="part of the drag, at its end, in which the contacts on the workpiece are "
+        "written at every step, for the velocity at first touch; 0: none",
+        exclude_if=lambda value: value == 0,
     )
 
     @model_validator(mode="after")
@@ -558,6 +550,7 @@ class Study(Model):
     accepted: Accepted = Accepted()
     assumptions: list[Assumption] = Field(default_factory=list)
     reference: Reference | None = None
+    removal: Removal | None = Field(default=None, exclude_if=lambda value: value is None)
 
     def of_each_workpiece(self) -> Sequence["Study"]:
         """The study of each workpiece alone, its path and its place of immersion turned.

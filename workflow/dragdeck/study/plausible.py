@@ -45,6 +45,10 @@ class _Range:
 
 _ANGLE = _Range(-1e5, -36e3, 36e3, 1e5, {})
 _RANGES = {
+    "calibration.angles.*friction.*": _Range(0, 0, 2, 10, {}),
+    "calibration.angles.*_deg": _Range(0, 0.05, 60, 90, {"rad": 180 / math.pi}),
+    "calibration.angles.*_m": _Range(1e-4, 2e-3, 1, 5, _LENGTH),
+    "calibration.angles.*": _Range(1e-3, 0.1, 2e4, 2e4, {}),
     "media.count": _Range(1, 1, 1e6, 4e6, {}),
     "media*.radius_mean_m": _Range(1e-5, 1e-4, 0.02, 0.1, _LENGTH),
     "media*.radius_std_m": _Range(0, 0, 0.006, 0.03, _LENGTH),
@@ -94,6 +98,7 @@ _RANGES = {
     "materials.*.poissons_ratio": _Range(-0.9, 0, 0.49, 0.499, {}),
     "materials.*.density_kg_m3": _Range(50, 300, 2.3e4, 3e4, {"g/cm3": 1e3}),
     "pairs.*.restitution": _Range(0.05, 0.05, 1, 1, {}),
+    "pairs.*.rolling_damping": _Range(0, 0, 1, 10, {"%": 0.01}),
     "pairs.*friction": _Range(0, 0, 2, 10, {}),
     "pairs.*.cohesion_j_m3": _Range(0, 0, 1e9, 1e12, {"kJ/m3": 1e3, "MJ/m3": 1e6}),
     "gravity_m_s2": _Range(0.01, 1, 30, 500, {"cm/s2": 0.01, "mm/s2": 1e-3}),
@@ -119,6 +124,13 @@ _RANGES = {
     "reference.signal.*_s*": _Range(-1e10, -1e3, 1e5, 1e10, {"ms": 1e-3}),
     "reference.signal.margin": _Range(1e-4, 1e-3, 0.5, 1, {"%": 0.01}),
     "reference.signal.sign": _Range(-1, -1, 1, 1, {}),
+    "removal.*_m2_n": _Range(1e-22, 1e-19, 1e-9, 1e-6, {"mm3/(N m)": 1e-9}),
+    "removal.calibrate*_kg": _Range(1e-12, 1e-9, 0.1, 10, {"g": 1e-3, "mg": 1e-6}),
+    "removal.calibrate*time_s": _Range(0.01, 1, 1e6, 1e8, {"min": 60}),
+    "removal.impact_ratio": _Range(1e-9, 1e-6, 1e9, 1e12, {}),
+    "removal.hardness_pa": _Range(1e6, 1e8, 1e11, 1e12, _MODULUS),
+    "removal.target_depth_m": _Range(1e-10, 1e-9, 1e-3, 0.1, _LENGTH),
+    "outputs.first_touch_fraction": _Range(0, 0, 1, 1, {"%": 0.01}),
     "reference.*_n": _Range(-1e5, -1e3, 1e3, 1e5, {"mN": 1e-3}),
 }
 """By dotted field, every number of a study; the first that fits counts. Assumptions: they span

@@ -1,0 +1,234 @@
+"""Friction and rolling friction of the media from measured angles.
+
+Each measurement is simulated at some pairs of coefficients. A polynomial through the angles says
+what the angle is at any pair, and how well that is known. On a grid over both coefficients, the
+measured angles then give their joint probability.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from dragchain.arrays import Floats
+from dragchain.calibration.angles import read_angle
+from dragchain.errors import TableError
+from dragchain.statistics.estimate import CONFIDENCE, Estimate
+from dragdeck.documents import Part
+from dragdeck.files import write_text
+from dragdeck.records.calibration import AnglesFile
+from dragdeck.study.calibration import Rig
+
+GRID = 121
+"""Values of each coefficient at which the probability is computed."""
+
+_DEGREE, _SPARE = 3, 4
+"""Of the polynomial; least degrees of freedom that are left."""
+
+
+@dataclass(frozen=True)
+class AngleModel:
+    """A cubic polynomial through simulated angles, in the square roots of both coefficients.
+
+    The roots are those of the distances from the lower ends, in units of the ranges: there, angles
+    that saturate are nearly straight.
+
+    Attributes
+    ----------
+    ranges : (2, 2) array
+        Lower and upper end of friction and rolling friction.
+    factors, covariance : (10,) and (10, 10) array
+    scatter_deg : float
+        Standard deviation of the angles about the polynomial: that of a run, and lack of fit.
+    """
+
+    ranges: Floats
+    factors: Floats
+    covariance: Floats
+    scatter_deg: float
+
+    @classmethod
+    def through(cls, pairs: Floats, angle_deg: Floats, ranges: Floats) -> "AngleModel":
+        """Least squares through (N,) angles at (N, 2) pairs of coefficients.
+
+        Raises
+        ------
+        TableError
+            There are too few.
+        """
+        terms = _terms(pairs, ranges)
+        spare = len(terms) - terms.shape[1]
+        if spare < _SPARE:
+            least = terms.shape[1] + _SPARE
+            raise TableError(f"{len(terms)} runs of a measured angle succeeded, not {least}")
+        inverse = np.asarray(np.linalg.inv(terms.T @ terms), dtype=np.float64)
+        factors = inverse @ terms.T @ angle_deg
+        variance = float(((angle_deg - terms @ factors) ** 2).sum() / spare)
+        return cls(ranges, factors, variance * inverse, variance**0.5)
+
+    def at(self, pairs: Floats) -> tuple[Floats, Floats]:
+        """Mean angle at (M, 2) pairs of coefficients and its standard uncertainty, degrees."""
+        terms = _terms(pairs, self.ranges)
+        variance = ((terms @ self.covariance) * terms).sum(axis=1)
+        return terms @ self.factors, np.sqrt(variance)
+
+
+def _terms(pairs: Floats, ranges: Floats) -> Floats:
+    low, high = ranges.T
+    u, v = np.sqrt((pairs - low) / (high - low)).T
+    powers = [(i, j) for i in range(_DEGREE + 1) for j in range(_DEGREE + 1 - i)]
+    return np.stack([u**i * v**j for i, j in powers], axis=-1)
+
+
+class Coefficients(Part):
+    """What measurements say of both coefficients.
+
+    Attributes
+    ----------
+    friction, rolling_friction : Estimate
+        Mean and 95 % credible interval.
+    correlation : float
+    narrowed : (float, float)
+        Length of each interval over that of the range alone: near 1, the measurement says nothing.
+    """
+
+    friction: Estimate
+    rolling_friction: Estimate
+    correlation: float
+    narrowed: tuple[float, float]
+
+
+class FrictionFile(AnglesFile):
+    """The content of ``angles.json``; docs/evidence/calibration.md explains it.
+
+    Attributes
+    ----------
+    best : (float, float)
+        The most likely friction and rolling friction.
+    misfit : mapping
+        Measured minus simulated angle there, in standard uncertainties.
+    scatter_deg : mapping
+        Scatter of the simulated angles of a measurement, degrees.
+    found : mapping
+        By ``repose``, ``drum`` and, of two measurements, ``both``.
+    """
+
+    best: tuple[float, float]
+    misfit: Mapping[Rig, float]
+    scatter_deg: Mapping[Rig, float]
+    found: Mapping[str, Coefficients]
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """The joint probability of both coefficients, equally likely in their ranges beforehand.
+
+    Attributes
+    ----------
+    axes : (2, GRID) array
+        Friction and rolling friction.
+    misfit : mapping of str to (GRID, GRID) array
+        Measured minus simulated angle, in standard uncertainties.
+    weights : mapping of str to (GRID, GRID) array
+        Probability of each pair by ``repose``, ``drum`` and ``both``, or what there is of them; the
+        last one has all measurements.
+    """
+
+    axes: Floats
+    misfit: Mapping[Rig, Floats]
+    weights: Mapping[str, Floats]
+
+    @classmethod
+    def of(
+        cls, models: Mapping[Rig, AngleModel], measured: Mapping[Rig, tuple[float, float]]
+    ) -> "Posterior":
+        """From measured angles and their standard uncertainties, degrees."""
+        ranges = next(iter(models.values())).ranges
+        axes = np.stack([np.linspace(low, high, GRID) for low, high in ranges])
+        pairs = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+        misfit, log = dict[Rig, Floats](), dict[str, Floats]()
+        for name, model in models.items():
+            (angle, own), (mean, std) = measured[name], model.at(pairs)
+            width = np.hypot(std, own).reshape(GRID, GRID)
+            misfit[name] = (angle - mean.reshape(GRID, GRID)) / width
+            log[name] = -(misfit[name] ** 2) / 2 - np.log(width)
+        if len(log) > 1:
+            log["both"] = np.sum(list(log.values()), axis=0)
+        found = {name: np.exp(one - one.max()) for name, one in log.items()}
+        return cls(axes, misfit, {name: one / one.sum() for name, one in found.items()})
+
+    def coefficients(self, name: str) -> Coefficients:
+        """Means, equal-tailed intervals and correlation."""
+        weights, tail = self.weights[name], (1 - CONFIDENCE) / 2
+        marginal = np.stack([weights.sum(axis=1), weights.sum(axis=0)])
+        mean = (self.axes * marginal).sum(axis=1)
+        below = np.cumsum(marginal, axis=1) - marginal / 2
+        pairs = zip(below, self.axes, strict=True)
+        ends = np.array([np.interp([tail, 1 - tail], part, axis) for part, axis in pairs])
+        away = self.axes - mean[:, None]
+        spread = np.sqrt((away**2 * marginal).sum(axis=1))
+        length = CONFIDENCE * np.ptp(self.axes, axis=1)
+        first, second = (Estimate(*one) for one in np.column_stack([mean, ends]).tolist())
+        return Coefficients(
+            friction=first,
+            rolling_friction=second,
+            correlation=float(away[0] @ weights @ away[1] / spread.prod()),
+            narrowed=tuple((np.ptp(ends, axis=1) / length).tolist()),
+        )
+
+
+def angle_models(known: AnglesFile, runs: pd.DataFrame) -> dict[Rig, AngleModel]:
+    """The angle of each measurement as a function of the coefficients, from ``angles.csv``."""
+    ranges, found = np.array([known.friction, known.rolling_friction]), {}
+    for name in known.measured:
+        own = runs[runs["rig"] == name]
+        pairs = own[["friction", "rolling_friction"]].to_numpy(np.float64)
+        found[name] = AngleModel.through(pairs, own["angle_deg"].to_numpy(np.float64), ranges)
+    return found
+
+
+def find_friction(known: AnglesFile, runs: pd.DataFrame) -> FrictionFile:
+    """What the measured angles of a study say of the coefficients.
+
+    Raises
+    ------
+    TableError
+        Too few runs succeeded.
+    """
+    models = angle_models(known, runs)
+    posterior = Posterior.of(models, known.measured)
+    weights = [*posterior.weights.values()][-1]
+    i, j = np.unravel_index(int(weights.argmax()), weights.shape)
+    return FrictionFile(
+        **dict(known),
+        best=(float(posterior.axes[0, i]), float(posterior.axes[1, j])),
+        misfit={name: float(one[i, j]) for name, one in posterior.misfit.items()},
+        scatter_deg={name: one.scatter_deg for name, one in models.items()},
+        found={name: posterior.coefficients(name) for name in posterior.weights},
+    )
+
+
+def write_friction(runs_file: Path, out_dir: Path) -> str:
+    """Read simulated angles, write ``angles.json`` and ``angles.csv``; what to put into the study.
+
+    Raises
+    ------
+    DragdeckError
+        A run cannot be used, or there are too few.
+    """
+    known = AnglesFile.read(runs_file)
+    runs = pd.DataFrame([read_angle(runs_file.parent / name) for name in known.runs])
+    found = find_friction(known, runs)
+    write_text(out_dir / "angles.csv", runs.to_csv(index=False, lineterminator="\n"))
+    found.write(out_dir / "angles.json")
+    last, (friction, rolling) = [*found.found.values()][-1], found.best
+    ends = [
+        f"{one.ci95_low:.3g} to {one.ci95_high:.3g}"
+        for one in (last.friction, last.rolling_friction)
+    ]
+    return (
+        f"set pairs.{known.pair}.friction: {friction:.3g}, rolling_friction: {rolling:.3g}\n"
+        f"  95 % CI {ends[0]} and {ends[1]}, correlation {last.correlation:.2f}"
+    )

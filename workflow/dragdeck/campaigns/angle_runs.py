@@ -1,0 +1,80 @@
+"""The heaps and drums that a calibration of friction and rolling friction needs."""
+
+from functools import partial
+
+from dragdeck.cases.case import Case
+from dragdeck.decks import RUN_FILE
+from dragdeck.engine.batch import Batch
+from dragdeck.engine.reports import Report
+from dragdeck.errors import InputError
+from dragdeck.records.calibration import AngleRun, AnglesFile
+from dragdeck.scenes.angles import angle_scene
+from dragdeck.study.calibration import Angles
+
+_POINTS, _REPEATED, _OTHER_SEED = 20, 4, 1000
+"""Pairs of coefficients; every so many are simulated again, with another seed."""
+
+_STEPS = (0.7548776662466927, 0.5698402909980532)
+"""Inverses of the plastic number and of its square: the fractional parts of their multiples fill a
+square evenly, however many there are (Roberts 2018, The unreasonable effectiveness of
+quasirandom sequences)."""
+
+
+def angle_runs(angles: Angles) -> dict[str, AngleRun]:
+    """The runs of all measurements by their names.
+
+    The coefficients fill the study's ranges evenly in the square roots of the distances from the
+    lower ends: angles change most where the coefficients are small.
+    """
+    found = {}
+    for number in range(1, _POINTS + 1):
+        friction, rolling = (
+            round(low + (high - low) * ((0.5 + number * step) % 1) ** 2, 6)
+            for (low, high), step in zip(
+                (angles.friction, angles.rolling_friction), _STEPS, strict=True
+            )
+        )
+        for seed in (number, number + _OTHER_SEED)[: 1 + (number % _REPEATED == 0)]:
+            for rig in angles.rigs:
+                run = AngleRun(rig=rig, friction=friction, rolling_friction=rolling, seed=seed)
+                found[f"{rig}-{seed:04d}"] = run
+    return found
+
+
+def run_angles(case: Case, batch: Batch, report: Report, cores: int = 1) -> None:
+    """Simulate all measurements, each run in a folder of its own, and list them in ``runs.json``.
+
+    Parameters
+    ----------
+    case : Case
+    batch : Batch
+        Its folder gets a folder for each run, and the list.
+    report : callable
+        Gets a line for each run.
+    cores : int
+        Runs at the same time.
+
+    Raises
+    ------
+    InputError
+        The study has no measured angle, or one that cannot be simulated.
+    EngineError
+        No LIGGGHTS, or it was interrupted.
+    """
+    calibration, material = case.study.calibration, case.study.media.main_material
+    if calibration is None or calibration.angles is None:
+        raise InputError("no measured angle", file=case.file, field="calibration.angles")
+    angles = calibration.angles
+    runs = angle_runs(angles)
+    for one in {one.rig: one for one in runs.values()}.values():
+        angle_scene(case, one)  # what cannot be simulated is refused before all runs
+    batch.each({name: partial(angle_scene, case, one) for name, one in runs.items()}, report, cores)
+    AnglesFile(
+        study=case.study_name,
+        title=case.study.title,
+        pair=f"{material}-{material}",
+        friction=angles.friction,
+        rolling_friction=angles.rolling_friction,
+        measured={name: (rig.angle_deg, rig.angle_std_deg) for name, rig in angles.rigs.items()},
+        runs=tuple(name for name in runs if (batch.folder / name / RUN_FILE).is_file()),
+    ).write(batch.folder / "runs.json")

@@ -1,0 +1,118 @@
+"""Measurements from which coefficients of the contact law are found: drop test, angles of heaps."""
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from dragdeck.study.base import Line, Model, Number, Positive, Whole
+
+NARROWEST = 5
+"""Least diameter of a cylinder or drum, over that of a particle: narrower ones jam."""
+
+FASTEST = 0.1
+"""Largest Froude number of a drum, centrifugal acceleration over gravity: an assumption; the
+surface of a faster one is not plane."""
+
+Rig = Literal["repose", "drum"]
+Measured = Annotated[Number, Field(gt=0, lt=90)]
+
+
+class Repose(Model):
+    """A cylinder of the bowl's material, lifted slowly off a plate with a glued layer of media."""
+
+    angle_deg: Measured = Field(description="angle of the heap to the horizontal, degrees")
+    angle_std_deg: Positive = Field(description="its standard uncertainty, degrees")
+    cylinder_radius_m: Positive = Field(description="inner radius of the cylinder, m")
+    count: Annotated[Whole, Field(ge=300, le=20_000)] = Field(description="number of particles")
+
+
+class Drum(Model):
+    """A drum with a glued layer of media and end plates of the bowl's material.
+
+    It turns about its horizontal axis.
+    """
+
+    angle_deg: Measured = Field(description="angle of the moving surface to the horizontal")
+    angle_std_deg: Positive = Field(description="its standard uncertainty, degrees")
+    radius_m: Positive = Field(description="inner radius of the drum, under the glued layer, m")
+    width_m: Positive = Field(description="distance between its end plates, m")
+    fill_fraction: Annotated[Number, Field(ge=0.1, le=0.4)] = Field(
+        description="volume of the bed over that of the drum, inside the glued layer"
+    )
+    rpm: Positive = Field(description="rotational speed of the drum, 1/min")
+
+    @property
+    def rad_s(self) -> float:
+        """Angular speed, rad/s."""
+        return self.rpm * math.pi / 30
+
+
+class Angles(Model):
+    """Measured angles, from which friction and rolling friction of the media are found."""
+
+    friction: tuple[Positive, Positive] = Field(
+        default=(0.05, 1.0), description="range of the friction coefficient: equally likely in it"
+    )
+    rolling_friction: tuple[Positive, Positive] = Field(
+        default=(0.005, 0.4), description="range of the coefficient of rolling friction, likewise"
+    )
+    repose: Repose | None = None
+    drum: Drum | None = None
+
+    @property
+    def rigs(self) -> Mapping[Rig, Repose | Drum]:
+        """The measurements that there are."""
+        every: Mapping[Rig, Repose | Drum | None] = {"repose": self.repose, "drum": self.drum}
+        return {name: rig for name, rig in every.items() if rig is not None}
+
+    def problems(self, radius_m: float, gravity_m_s2: float) -> Iterator[tuple[str, str, str]]:
+        """What cannot work with particles of this radius: field, problem and limit."""
+        sizes = {"repose.cylinder_radius_m": (self.repose and self.repose.cylinder_radius_m, 0)}
+        if self.drum:
+            sizes["drum.radius_m"] = self.drum.radius_m, 2
+            sizes["drum.width_m"] = self.drum.width_m, 0
+            most = math.sqrt(FASTEST * gravity_m_s2 / self.drum.radius_m) * 30 / math.pi
+            if self.drum.rpm > most:
+                limit = f"at most {most:.3g}, a Froude number of {FASTEST:g}"
+                yield "drum.rpm", "the drum is too fast for a plane surface", limit
+        for field, (size, more) in sizes.items():
+            least = (NARROWEST + more) * radius_m
+            if size and size < least:
+                problem = f"less room than {NARROWEST} particle diameters, in which media jam"
+                yield field, problem, f"at least {least:.4g} m"
+
+    @model_validator(mode="after")
+    def _whole(self) -> Self:
+        if not self.rigs:
+            raise ValueError("give repose, drum or both")
+        for low, high in (self.friction, self.rolling_friction):
+            if low >= high:
+                raise ValueError(f"a range must increase, but goes from {low:g} to {high:g}")
+        return self
+
+
+class Calibration(Model):
+    """Measurements that `./run calibrate` fits coefficients to: a drop test, angles, or both."""
+
+    record: Line | None = Field(
+        default=None,
+        pattern=r"^[^{}]*$",
+        description="CSV file of force against time in a drop test; relative to the study",
+    )
+    height_std_m: Positive = Field(
+        default=1e-4, description="standard uncertainty of drop_test.height_m in the test, m"
+    )
+    peaks: Literal["auto", "yes", "no"] = Field(
+        default="auto",
+        description="whether to fit the ratios of the peak forces too; auto: if the "
+        "sensor is fast enough",
+    )
+    angles: Angles | None = Field(default=None, exclude_if=lambda value: value is None)
+
+    @model_validator(mode="after")
+    def _something(self) -> Self:
+        if self.record is None and self.angles is None:
+            raise ValueError("give record, angles or both")
+        return self
