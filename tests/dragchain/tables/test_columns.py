@@ -24,8 +24,9 @@ TABLES = (
 SOME_RUNS_ONLY = {
     *(*BODY, *BODY_IMPULSE, *ORIENTATION, ATTRACTION, "fastest_particle_m_s"),
     *(name for columns in CLASSES.values() for name in columns),
+    *("peak_pressure_pa", "touch_normal_m_s", "touches_per_m2_s"),
 }
-"""Columns of spinning workpieces, clumps, attraction and classes, and one not written here."""
+"""Columns of spinning workpieces, clumps, attraction, classes and touches, and one not written."""
 
 
 @pytest.fixture(scope="module")
@@ -80,7 +81,8 @@ def test_what_is_no_number_has_no_unit(name: str, type_: pa.DataType) -> None:
 
 def test_a_meaning_depends_on_the_table() -> None:
     found = descriptions("azimuth_rad")
-    assert set(found) == {"workpiece_contacts", "chains", "contact_events"}
+    tables = {"workpiece_contacts", "chains", "contact_events", "touches", "touch_events"}
+    assert set(found) == tables
     assert len(set(found.values())) == 3
     assert "input_" in descriptions("input_media_count")["summary"]
     assert "lower end" in descriptions("extrapolated_drag_mean_ci95_low_n")["summary"]
