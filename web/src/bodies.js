@@ -87,7 +87,8 @@ export class Bodies {
 export class Media {
   constructor(frames) {
     this.frames = frames;
-    this.spheres = new Bodies(frames.most.particles);
+    const { clumps = [] } = frames.head;
+    this.spheres = new Bodies(frames.most.particles * Math.max(1, ...clumps.map((one) => one.spheres.length)));
   }
 
   /** Show a frame; `look` is the state of the controls. */
@@ -103,7 +104,10 @@ export class Media {
       if (size <= 0 || !look.kept[k]) continue;
       const centre = vector(frame.centre, k),
         tint = measure ? colourOf(measure[k] / look.top) : onPath.has(k) ? path : plain;
-      this.spheres.add(k, centre, centre, size * frame.radius[k], tint);
+      for (const [place, radius] of this.frames.spheres(frame, k)) {
+        const at = centre.map((one, axis) => one + size * place[axis]);
+        this.spheres.add(k, at, at, size * radius, tint);
+      }
     }
     this.spheres.show();
   }

@@ -1,6 +1,8 @@
 // The data of the page: columns of numbers, as dragchain/network_page/scene.py writes them, and the frames
 // of the run: particles and contacts of one moment, in mm, N and mm/s.
 
+import { Quaternion, Vector3 } from "three";
+
 const BYTES = { u8: 1, u16: 2, u32: 4, f24: 3 };
 const ARRAYS = { u8: Uint8Array, u16: Uint16Array, u32: Uint32Array, f24: Float32Array };
 
@@ -63,8 +65,19 @@ export class Frames {
     frame.point = this.places("point", "points", number);
     for (const [rows, names] of Object.entries(PARTS))
       for (const name of names) frame[name] = this.columns[name].subarray(...this.range(rows, number));
+    const [from, to] = this.range("particles", number);
+    frame.turn = this.columns.turn?.subarray(4 * from, 4 * to);
     frame.id.forEach((id, k) => this.first.has(id) || this.first.set(id, vector(frame.centre, k)));
     return frame;
+  }
+
+  /** Places, from its centre, and radii of the spheres of a particle, mm: of a clump, those turned as it is. */
+  spheres({ id, radius, turn }, k) {
+    const clump = (this.head.clumps ?? []).findLast((one) => one.first <= id[k]);
+    if (!clump) return [[[0, 0, 0], radius[k]]];
+    const [w, x, y, z] = turn.subarray(4 * k, 4 * k + 4);
+    const turned = new Quaternion(x, y, z, w);
+    return clump.spheres.map(([a, b, c, r]) => [new Vector3(a, b, c).applyQuaternion(turned).toArray(), r]);
   }
 
   range(rows, number) {

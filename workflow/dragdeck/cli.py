@@ -74,6 +74,12 @@ COMMANDS = (
             "List the cases of a study with the run ids of their drop test, filling and process. "
             "It reads studies/STUDY and writes nothing.",
             "commands:cases", (STUDY, FIDELITY, PLAN)),
+    Command("shapes", "compare clumps of spheres with their bodies",
+            "List, for each shape of the media, how volume, inertia and surface of a clump of "
+            "spheres differ from the body, and what it costs, by number of spheres; * marks the "
+            "number in the study. It reads studies/STUDY and writes nothing.",
+            "commands:shapes", (STUDY, FIDELITY),
+            "dragdeck shapes cylinders"),
     Command("advise", "find settings for a tolerance",
             "Find the cheapest settings that keep the error of a quantity within a tolerance, and "
             "show the error and cost of each setting. It reads the measured trade-off and the "

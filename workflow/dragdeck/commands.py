@@ -18,6 +18,7 @@ from dragdeck.advice.advise import advised_settings
 from dragdeck.advice.forecast import advice_file, advice_tables, advised_case, question
 from dragdeck.campaigns.angle_runs import run_angles
 from dragdeck.campaigns.restitution_drops import confirmation, run_drops, sweep
+from dragdeck.cases.bed import clump_of
 from dragdeck.cases.case import Case
 from dragdeck.cases.ranks import check_ranks, cores_here
 from dragdeck.decks.render import (
@@ -289,6 +290,44 @@ def cases(study: str, fidelity: str | None, plan: str | None) -> None:
     for case in every:
         table.add_row(case.name, *(kind.run_id(case) for kind in SCENES.values()))
     show([table])
+
+
+_NUMBERS_OF_SPHERES = (2, 3, 4, 6, 8, 12, 16, 24, 32)
+"""For which `shapes` lists errors, beside those of the study."""
+
+
+def shapes(study: str, fidelity: str | None) -> None:
+    """Show how far clumps of more and fewer spheres are from the bodies of a study's media."""
+    project = find_project(Path.cwd())
+    media, tables = project.cases(study, fidelity)[0].study.media, []
+    heads = ("spheres", "volume", "inertia", "surface, rms", "left out", "stands out")
+    for name, part in media.parts.items():
+        if part.shape is None:
+            continue
+        of_class = f"class {name}: " if name else ""
+        table = Table(
+            *heads, "smallest sphere", "cost",
+            title=f"{of_class}{part.shape.kind}. Volume and inertia of the union relative to the "
+            "body; lengths in radii of the sphere of equal volume; cost relative to spheres",
+        )  # fmt: skip
+        for count in sorted({*_NUMBERS_OF_SPHERES, part.shape.spheres}):
+            try:
+                one = clump_of(part.shape.model_copy(update={"spheres": count}))
+            except InputError as error:
+                table.add_row(str(count), str(error.problem))
+                continue
+            lengths = one.surface_rms, one.left_out, one.stands_out, one.radii.min()
+            table.add_row(
+                f"{count}{' *' if count == part.shape.spheres else ''}",
+                f"{100 * one.volume_error:+.1f} %",
+                f"{100 * one.inertia_error:.1f} %",
+                *(f"{length:.2f}" for length in lengths),
+                f"{count / one.timestep_radius:.1f}",
+            )
+        tables.append(table)
+    if not tables:
+        raise DragdeckError(f"{study}: all particles are spheres (media.shape is absent)")
+    show(tables)
 
 
 def advise(

@@ -16,7 +16,7 @@ from dragchain.arrays import Floats, Ints
 from dragchain.errors import ExportError, TableError
 from dragchain.network.frame import KINDS, PARTICLE, WORKPIECE, NetworkFrame, frame_of
 from dragchain.tables.by_step import RisingSteps, read_steps
-from dragchain.tables.columns import CONTACTS, KINEMATICS
+from dragchain.tables.columns import CONTACTS, KINEMATICS, ORIENTATION
 from dragchain.tables.run_folder import Run, workpiece_places
 from dragdeck.records.case import CaseOfRun
 from dragdeck.study.drive import Rotation
@@ -228,7 +228,8 @@ class FrameSeries:
             If a table is missing or the tables contradict each other.
         """
         run, steps = self.run, self.steps
-        particles = RisingSteps(run.table("particles.parquet"), _PARTICLES, steps)
+        moving = _PARTICLES + (ORIENTATION if run.case.bodies else ())
+        particles = RisingSteps(run.table("particles.parquet"), moving, steps)
         contacts = chains = None
         if self.has_contacts:
             contacts = RisingSteps(run.table("contacts.parquet"), CONTACTS, steps)

@@ -1,5 +1,6 @@
 """The picture of a workpiece: where particles press and slide on it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,7 +18,7 @@ from dragchain.figures.panels import depth_bars, head, new_panels
 from dragchain.figures.rendering import Camera, Image, check_rendering, new_plotter, photograph
 from dragchain.figures.style import GREY, WIDTH_IN, force_map
 from dragchain.loading.document import Loading, Profile
-from dragchain.loading.samples import Sampled, as_polydata
+from dragchain.loading.samples import Sampled, as_polydata, patches
 from dragchain.loading.summary import DEPTH_BINS
 from dragchain.run.kinematics import motion_of, needed, spins
 from dragchain.run.workpiece import Surface
@@ -75,11 +76,39 @@ def workpiece_figure(
         _unrolled(panels[2], bins, scale, case)
     _profile(panels[-1], loading.profiles["depth"])
     panels[0].set(ylabel="depth (mm)", ylim=_depths(case)[::-1])
-    colours = ScalarMappable(scale, force_map())
-    style: dict[str, Any] = {"location": "bottom", "extend": "max", "shrink": 0.6, "aspect": 40}
-    figure.colorbar(colours, ax=panels, label=_LABEL, **style)
+    _bar(figure, panels, scale, _LABEL)
     head(figure, _title(loading, case))
     return figure
+
+
+def surface_figure(
+    case: CaseOfRun, surface: Surface, values: Floats, label: str, title: str
+) -> Figure:
+    """The workpiece from its four sides by a value of each facet, (M,).
+
+    Raises
+    ------
+    RenderError
+        If pictures cannot be rendered here.
+    """
+    check_rendering()
+    mesh = as_polydata(surface)
+    mesh.cell_data[_QUANTITY] = values
+    scale = Normalize(0.0, _largest(pd.DataFrame({_QUANTITY: values, "area_m2": surface.areas})))
+    figure, panels = new_panels(_height_in(case, 1 / len(_VIEWS)), len(_VIEWS), sharey=True)
+    for axes, name in zip(panels, _VIEWS, strict=True):
+        _view(axes, mesh, name, scale, case)
+    panels[0].set(ylabel="depth (mm)", ylim=_depths(case)[::-1])
+    _bar(figure, panels, scale, label)
+    head(figure, title)
+    return figure
+
+
+def _bar(figure: Figure, panels: Sequence[Axes], scale: Normalize, label: str) -> None:
+    """Draw the colour scale below the panels."""
+    colours = ScalarMappable(scale, force_map())
+    style: dict[str, Any] = {"location": "bottom", "extend": "max", "shrink": 0.6, "aspect": 40}
+    figure.colorbar(colours, ax=panels, label=label, **style)
 
 
 def _height_in(case: CaseOfRun, fraction: float) -> float:
@@ -143,13 +172,9 @@ def _render(mesh: Any, eye: tuple[float, float], scale: Normalize, case: CaseOfR
 def averaged_load(surface: Surface, facets: pd.DataFrame, case: CaseOfRun) -> Floats:
     """Load of each facet, (N,) in Pa: the mean over the area of those that lie beside it.
 
-    Facets are beside each other in a cube of a particle's radius, if they face the same way.
-    Single ones are hit by chance: a map of them shows the mesh instead of the load.
+    They are those of a patch of the size of a particle's radius.
     """
-    cells = np.floor(surface.corners.mean(axis=1) / case.media.radius_mean_m)
-    faced = np.round(surface.normals)
-    _, group = np.unique(np.column_stack([cells, faced]), axis=0, return_inverse=True)
-    group = group.ravel()
+    group = patches(surface, case.media.radius_mean_m)
     area = facets["area_m2"].to_numpy(np.float64)
     load = np.bincount(group, facets[_QUANTITY].to_numpy(np.float64) * area)
     mean: Floats = load[group] / np.bincount(group, area)[group]

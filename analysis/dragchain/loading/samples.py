@@ -25,24 +25,28 @@ from dragchain.run.kinematics import (
 )
 from dragchain.run.workpiece import Surface, off_facet
 from dragchain.statistics.correlated import slow_waves
-from dragchain.tables.by_step import read_groups
+from dragchain.tables.by_step import read_groups, read_table
 from dragchain.tables.columns import ATTRACTION, FORCES, REFERENCE, WORKPIECE_CONTACTS
 from dragchain.tables.columns import POINT as PLACE
 from dragchain.tables.columns import SLIP as RELATIVE
-from dragdeck.decks.outputs import load_outputs
+from dragdeck.decks.outputs import TOUCHES, load_outputs
 from dragdeck.records.case import CaseOfRun
 
 WORKPIECE = ("drag_impulse_n_s", "lateral_impulse_n_s", "vertical_impulse_n_s")
 BODY = ("body_x_impulse_n_s", "body_y_impulse_n_s", "body_z_impulse_n_s")
 """Impulse on a workpiece that spins, in its own frame."""
 
+TOUCHED = "touches"
+"""Table of contacts at so short intervals that each is seen to begin."""
+
+_ALONG = ["drag_n", "lateral_n", "vertical_n"]
 _CONTACT = [name for name in WORKPIECE_CONTACTS if name not in ("phase", "overlap_m")]
 _FORCE, _PLACE, _VELOCITY, _REFERENCE = map(list, (FORCES, PLACE, RELATIVE, REFERENCE))
 
 _KEPT = [
     *("frame", "time_s", "particle_id", "facet_id", "normal_force_n", "azimuth_rad", "depth_m"),
     *(*POINT, *SLIP, *WORKPIECE, *AMOUNTS),
-    *("mobilisation", "mobilised", "normal_work_j", "workpiece_work_j"),
+    *("mobilisation", "mobilised", "normal_work_j", "workpiece_work_j", "normal_velocity_m_s"),
 ]
 """What is held of every contact."""
 
@@ -86,13 +90,19 @@ class Sampled:
 # --- reading ---------------------------------------------------------------------------------
 
 
-def sample(run_dir: Path, case: CaseOfRun) -> Sampled:
-    """Read the counted contacts of a run, a row group at a time; see `Sampled`."""
+def sample(run_dir: Path, case: CaseOfRun, table: str = "workpiece_contacts") -> Sampled:
+    """Read the counted contacts of a run, a row group at a time; see `Sampled`.
+
+    The table may be ``touches`` instead, whose steps lie between those of the force.
+    """
     tables = run_dir / "tables"
-    steps, interval_s = _counted_steps(run_dir, case)
-    workpiece = _workpiece_at(tables / "workpiece_force.parquet", steps)
+    steps, interval_s = _counted_steps(run_dir, case, table)
+    force = tables / "workpiece_force.parquet"
+    workpiece = (
+        _workpiece_between(force, steps) if table == TOUCHED else _workpiece_at(force, steps)
+    )
     parts = []
-    for contacts in _read_contacts(tables / "workpiece_contacts.parquet", run_dir, case):
+    for contacts in _read_contacts(tables / f"{table}.parquet", run_dir, case):
         contacts["frame"] = np.searchsorted(steps, contacts["step"])
         at = workpiece.reindex(contacts["step"])
         parts.append(_with_amounts(contacts, at, case, interval_s))
@@ -101,14 +111,14 @@ def sample(run_dir: Path, case: CaseOfRun) -> Sampled:
             f"{run_dir}: no particle touches the workpiece in the part of "
             "the drag that enters the statistics"
         )
-    impulse = workpiece[["drag_n", "lateral_n", "vertical_n"]].to_numpy().sum(axis=0) * interval_s
+    impulse = workpiece[_ALONG].to_numpy().sum(axis=0) * interval_s
     path = axis_speed(case) * interval_s * len(steps)
     return Sampled(pd.concat(parts, ignore_index=True), len(steps), interval_s, path, impulse)
 
 
 def _workpiece_at(file: Path, steps: Ints) -> pd.DataFrame:
     """Place, heading and force of the workpiece at rising steps, by step."""
-    names = ["step", "direction_rad", *_REFERENCE, "drag_n", "lateral_n", "vertical_n"]
+    names = ["step", "direction_rad", *_REFERENCE, *_ALONG]
     parts = (rows[np.isin(rows["step"], steps)] for rows in read_groups(file, names))
     workpiece = pd.concat(parts, ignore_index=True).set_index("step").reindex(steps)
     if workpiece.isna().any(axis=None):
@@ -117,6 +127,14 @@ def _workpiece_at(file: Path, steps: Ints) -> pd.DataFrame:
             " make both again with `dragchain tables`"
         )
     return workpiece
+
+
+def _workpiece_between(file: Path, steps: Ints) -> pd.DataFrame:
+    """The same between the samples around each step."""
+    table = read_table(file, ["step", "direction_rad", *_REFERENCE, *_ALONG])
+    table["direction_rad"] = np.unwrap(table["direction_rad"])
+    at = table.pop("step")
+    return pd.DataFrame({name: np.interp(steps, at, table[name]) for name in table}, index=steps)
 
 
 def _read_contacts(file: Path, run_dir: Path, case: CaseOfRun) -> Iterator[pd.DataFrame]:
@@ -139,13 +157,13 @@ def _loaded(contacts: pd.DataFrame) -> pd.Series:
     return contacts["in_statistics"] & (contacts[_FORCE] != 0.0).any(axis=1)
 
 
-def _counted_steps(run_dir: Path, case: CaseOfRun) -> tuple[Ints, float]:
-    """The counted steps of ``workpiece_contacts`` and the time between two, s."""
-    output = load_outputs(run_dir)["workpiece_contacts"]
-    last = needed(output.last_step, "last_step of workpiece_contacts")
+def _counted_steps(run_dir: Path, case: CaseOfRun, table: str) -> tuple[Ints, float]:
+    """The counted steps of a table of contacts on the workpiece and the time between two, s."""
+    output = load_outputs(run_dir)[TOUCHES[1] if table == TOUCHED else table]
+    last = needed(output.last_step, f"last_step of {output.name}")
     steps = np.arange(output.first_step, last + 1, output.period_steps, dtype=np.int64)
     counted = counted_mask(steps, case)
-    file = run_dir / "tables" / "workpiece_contacts.parquet"
+    file = run_dir / "tables" / f"{table}.parquet"
     for rows in read_groups(file, ["step", "in_statistics"]):
         counted &= ~np.isin(steps, rows.loc[~rows["in_statistics"], "step"].unique())
     return steps[counted], output.period_steps * case.timestep_s
@@ -262,6 +280,16 @@ def facet_table(sampled: Sampled, surface: Surface, events: pd.DataFrame) -> pd.
             "friction_work_pa": sums["friction_work_j"] / (area * sampled.path_m),
         }
     )
+
+
+def patches(surface: Surface, size_m: float) -> Ints:
+    """The patch of each facet, (N,): those that lie in a cube of this size and face the same way.
+
+    Single facets are hit by chance: a map of them shows the mesh instead of the load.
+    """
+    cells, faced = np.floor(surface.centres / size_m), np.round(surface.normals)
+    _, group = np.unique(np.column_stack([cells, faced]), axis=0, return_inverse=True)
+    return np.asarray(group.ravel(), dtype=np.int64)
 
 
 def standard_errors(sampled: Sampled, name: str, count: int) -> Floats:

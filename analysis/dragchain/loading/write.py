@@ -13,6 +13,8 @@ from dragchain.loading.document import Loading
 from dragchain.loading.figure import workpiece_figure
 from dragchain.loading.samples import DRAWN, Sampled, as_polydata, check_facets, facet_table, sample
 from dragchain.loading.summary import summarise_loading
+from dragchain.loading.wear import FILE as WEAR
+from dragchain.loading.wear import Wear, compute_wear, touch_maps
 from dragchain.run.workpiece import Surface, read_surface
 from dragchain.tables.parquet import write_parquet
 from dragdeck.files import write_vtp
@@ -34,6 +36,8 @@ class WorkpieceLoading:
         Content of ``facets.parquet`` and ``contact_events.parquet``.
     summary : Loading
         Content of ``loading.json``.
+    wear, touch_events : Wear and DataFrame, or None
+        Content of ``wear.json`` and ``touch_events.parquet``, where the run has them.
     """
 
     case: CaseOfRun
@@ -42,6 +46,8 @@ class WorkpieceLoading:
     facets: pd.DataFrame
     events: pd.DataFrame
     summary: Loading
+    wear: Wear | None = None
+    touch_events: pd.DataFrame | None = None
 
 
 def write_loading(run_dir: Path) -> list[Path]:
@@ -56,7 +62,8 @@ def write_loading(run_dir: Path) -> list[Path]:
     Returns
     -------
     list of Path
-        Four files in ``tables/``, and ``figures/workpiece.png``.
+        Four files in ``tables/``, and ``figures/workpiece.png``. Of a run with a law of removal or
+        first touches also ``wear.json``, with first touches ``touch_events.parquet``.
 
     Raises
     ------
@@ -73,6 +80,10 @@ def write_loading(run_dir: Path) -> list[Path]:
     write_parquet(found.facets, facets)
     write_parquet(found.events, events)
     found.summary.write(summary)
+    if found.wear is not None:
+        found.wear.write(run_dir / WEAR)
+    if found.touch_events is not None:
+        write_parquet(found.touch_events, tables / "touch_events.parquet")
     mesh = as_polydata(found.surface)
     for name in found.facets:
         mesh.cell_data[name] = found.facets[name].to_numpy()
@@ -100,5 +111,9 @@ def compute_loading(run_dir: Path) -> WorkpieceLoading:
     events["type"] = event_types(events, case, sampled.interval_s)
     facets = facet_table(sampled, surface, events)
     summary = summarise_loading(sampled, facets, events, event, case, off_m)
+    wear, touched = compute_wear(run_dir, case, sampled, surface, summary)
+    if wear is not None and wear.touches is not None and touched is not None:
+        facets = facets.assign(**touch_maps(touched, surface, wear.touches.time_s))
     drawn = replace(sampled, rows=sampled.rows[DRAWN].copy())
-    return WorkpieceLoading(case, surface, drawn, facets, events.drop(columns="frame"), summary)
+    events = events.drop(columns="frame")
+    return WorkpieceLoading(case, surface, drawn, facets, events, summary, wear, touched)

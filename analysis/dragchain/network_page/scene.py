@@ -25,9 +25,9 @@ from dragchain.network.frame import KINDS, PARTICLE, NetworkFrame
 from dragchain.run.kinematics import drag_phase, needed, process_time
 from dragchain.run.workpiece import read_surface
 from dragchain.tables.by_step import read_table
-from dragchain.tables.columns import CENTRE, POINT, VELOCITY
+from dragchain.tables.columns import CENTRE, ORIENTATION, POINT, VELOCITY
 from dragchain.tables.run_folder import Run
-from dragdeck.records.case import CaseOfRun
+from dragdeck.records.case import BodiesOfRun, CaseOfRun
 
 # --- columns as bytes ----------------------------------------------------------------------------
 
@@ -257,12 +257,19 @@ def page_scene(run: Run) -> PageScene:
             "most": MOST_PARTICLES,
             "reach": 1e3 * shown.reach_m(),
         },
+        **({"clumps": [_clump(one) for one in case.bodies]} if case.bodies else {}),
         "workpieces": [_workpiece(columns, run, shown, series.steps)],
         "curve": _curve(columns, run),
         "peaks": _peaks(peaks, times_s, case),
         "colours": _colours(),
     }
     return PageScene(head | {"columns": columns.entries}, columns)
+
+
+def _clump(bodies: BodiesOfRun) -> dict[str, JsonValue]:
+    """First id of clumps of one size, and x, y, z and radius of their spheres, mm."""
+    spheres = np.column_stack([bodies.offsets_m, bodies.radii_m])
+    return {"first": bodies.first_id, "spheres": (1e3 * spheres).tolist()}
 
 
 def _colours() -> list[str]:
@@ -286,6 +293,8 @@ def _frames(columns: PackedColumns, shown: Shown, case: CaseOfRun) -> dict[str, 
     columns.add("point", "u16", ((point - low) / step).round().T)
     columns.add("id", "u32", particles["particle_id"].to_numpy())
     columns.add("radius", "f24", 1e3 * particles["radius_m"].to_numpy())
+    if case.bodies:
+        columns.add("turn", "f24", particles[list(ORIENTATION)].to_numpy().ravel())
     columns.add("speed", "f24", 1e3 * _speeds(particles, case))
     columns.add("a", "u16", contacts["a"].to_numpy())
     columns.add("b", "u16", contacts["b"].to_numpy())

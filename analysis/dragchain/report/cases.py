@@ -15,6 +15,8 @@ import numpy as np
 from pydantic import JsonValue
 
 from dragchain.loading.document import Loading
+from dragchain.loading.wear import FILE as WEAR
+from dragchain.loading.wear import Wear
 from dragchain.report.findings import (
     FILE,
     DropFindings,
@@ -105,9 +107,12 @@ def _speed(case: CaseOfRun) -> Iterator[str]:
 def _media(case: CaseOfRun) -> Iterator[str]:
     media, material = case.media, _text(case.inputs.get("media.material"))
     if case.classes:
-        yield f"{number(media.count)} spheres in {len(case.classes)} classes"
+        what = "particles" if case.bodies else "spheres"
+        yield f"{number(media.count)} {what} in {len(case.classes)} classes"
         return
-    yield " ".join(filter(None, (number(media.count), material, "spheres")))
+    shape = _text(case.inputs.get("media.shape.kind"))
+    what = f"particles ({shape.replace('_', ' ')})" if shape else "spheres"
+    yield " ".join(filter(None, (number(media.count), material, what)))
     spread = (
         f" \N{PLUS-MINUS SIGN} {_mm(2 * media.radius_std_m)} (standard deviation)"
         if media.radius_std_m
@@ -191,7 +196,8 @@ class StudyRuns:
     """A process run with the filling and the drop test it belongs to, None where it names none.
 
     `loading`: load, sliding and friction work on the workpiece; `extrapolated`: its quantities at
-    the physical Young's modulus. Both are None where they were not computed.
+    the physical Young's modulus; `wear`: what laws of removal read. Each is None where it was not
+    computed.
     """
 
     process: ReportedRun[ProcessFindings]
@@ -199,6 +205,7 @@ class StudyRuns:
     drop_test: ReportedRun[DropFindings] | None
     loading: Loading | None = None
     extrapolated: Extrapolated | None = None
+    wear: Wear | None = None
 
     @cached_property
     def values(self) -> Values:
@@ -238,7 +245,8 @@ def read_study_runs(run_dir: Path) -> StudyRuns:
     with suppress(RejectedRunError, DocumentError):
         if "drop_test" in upstream:
             drop_test = read_reported(upstream["drop_test"], DropFindings)
-    return StudyRuns(process, filling, drop_test, *read_optional(run_dir))
+    wear = Wear.read(run_dir / WEAR) if (run_dir / WEAR).is_file() else None
+    return StudyRuns(process, filling, drop_test, *read_optional(run_dir), wear)
 
 
 def read_reported(run_dir: Path, findings: type[F]) -> ReportedRun[F]:

@@ -6,6 +6,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
 from dragchain.errors import MissingRunsError, TableError
@@ -27,9 +28,11 @@ from dragchain.report.page import (
     render_page,
     write_bundle,
 )
+from dragchain.report.removal import UM_PER_H, RemovalOfCase, removal_of, touch_rows
 from dragchain.report.spreadsheet import summary_workbook
 from dragchain.report.summary import summary
 from dragchain.run.case import upstream_folders
+from dragchain.run.workpiece import read_surface
 from dragchain.statistics.correlated import RELIABLE_TIMES
 from dragchain.tables.network_contacts import Corrections
 from dragdeck.errors import DragdeckError
@@ -223,16 +226,18 @@ def write_study_report(
         studies = [section.study for section in sections]
         table = summary(studies)
         cases = cases_of(studies)
-        picture = file_uri(preview) if preview else None
+        removed = [(one, *found) for one in cases if (found := _removed(one))]
         signals = [one for case in cases if (one := compare_signal(case, signal))]
-        page = _render(sections, cases, table, missing, picture, signals)
+        picture = file_uri(preview) if preview else None
+        page = _render(sections, cases, table, missing, picture, removed, signals)
         for section, name in zip(sections, _network_pages(sections), strict=True):
             if section.network is not None:
                 write_bytes(out_dir / name, section.network.read_bytes())
         assumed = {one.study.process.case.run: one.assumptions for one in sections}
+        maps = {f"{one.key}-removal": found.facets for one, found, _ in removed}
         write_bundle(
             out_dir,
-            tables={"summary": table} | _tables(signals),
+            tables={"summary": table, **maps} | _tables(signals),
             files={"summary.xlsx": summary_workbook(table, assumed, cases)},
             pages={"report": page},
         )
@@ -314,6 +319,7 @@ def _render(
     table: pd.DataFrame,
     missing: Sequence[MissingRun],
     preview: str | None,
+    removed: Sequence[tuple[ReportedCase, RemovalOfCase, str]],
     signals: Sequence[SignalComparison],
 ) -> str:
     """The page: HTML that needs no other file and no network."""
@@ -338,7 +344,27 @@ def _render(
         shown=_SHOWN,
         reliable_times=RELIABLE_TIMES,
         asked=[(one, answer) for one in cases for answer in answers(one)],
+        removed=removed,
+        touched=[(one, rows) for one in cases if (rows := touch_rows(one))],
     )
+
+
+def _removed(one: ReportedCase) -> tuple[RemovalOfCase, str] | None:
+    """The removal of a case and its map as a picture, None if its study has no law."""
+    found = removal_of(one)
+    if found is None:
+        return None
+    from dragchain.figures.style import drawing, png
+    from dragchain.loading.figure import surface_figure
+
+    run = one.first.process
+    label = "depth of removal (µm/h), mean over areas of a particle's radius"
+    title = f"{one.name}: depth of removal by {found.removal.law}"
+    with drawing():
+        surface = read_surface(run.folder, run.case)
+        depth = found.facets["depth_m_s"].to_numpy(np.float64)
+        figure = surface_figure(run.case, surface, UM_PER_H * depth, label, title)
+        return found, data_uri(png(figure))
 
 
 def _network_pages(sections: Sequence[RunSection]) -> list[str]:

@@ -57,7 +57,8 @@ def friction_with(case: CaseOfRun, body: str) -> FrictionLimit:
         return table(lambda one, other: one.attractive.get(other, {}).get(name, 0.0))
 
     friction = table(lambda one, other: one.contact_moduli[other].friction)
-    first_ids = tuple(one.first_id for one in case.classes)
+    spheres = {one.first_id: one.first_sphere for one in case.bodies}
+    first_ids = tuple(spheres.get(one.first_id, one.first_id) for one in case.classes)
     return FrictionLimit(friction, {name: of(name) for name in names}, wall, first_ids)
 
 

@@ -109,6 +109,10 @@ class EstimateColumns:
         """The columns of estimates."""
         return cls(*(tuple(getattr(one, own.name) for one in estimates) for own in fields(cls)))
 
+    def at(self, place: int) -> Estimate:
+        """One of them."""
+        return Estimate(self.value[place], self.ci95_low[place], self.ci95_high[place])
+
 
 def flattened(row: Mapping[str, object]) -> dict[str, object]:
     """A row of a table: an estimate as ``<name>``, ``<name>_ci95_low`` and ``<name>_ci95_high``."""

@@ -11,7 +11,7 @@ from dragdeck.records.case import CaseOfRun
 from dragdeck.records.packing import Packing
 
 
-def describe_bed(particles: Frame, case: CaseOfRun) -> Packing:
+def describe_bed(particles: Frame, case: CaseOfRun, spheres: Frame | None = None) -> Packing:
     """Describe a settled bed.
 
     Parameters
@@ -20,6 +20,8 @@ def describe_bed(particles: Frame, case: CaseOfRun) -> Packing:
         The last frame of ``particles``, N particles.
     case : CaseOfRun
         The case of the fill.
+    spheres : Frame, optional
+        What stands for the particles, if they are clumps.
 
     Raises
     ------
@@ -32,7 +34,13 @@ def describe_bed(particles: Frame, case: CaseOfRun) -> Packing:
         )
     radius = particles.vectors("radius_m")[:, 0]
     bowl_radius = needed(case.bowl, "bowl").radius_m
-    height = probed_height(particles.vectors("x_m", "y_m", "z_m"), radius, bowl_radius)
+    surface = spheres or particles
+    height = probed_height(
+        surface.vectors("x_m", "y_m", "z_m"),
+        surface.vectors("radius_m")[:, 0],
+        bowl_radius,
+        float(radius.mean()),
+    )
     volume = 4.0 / 3.0 * np.pi * radius**3
     density: Floats | float = case.media.density_kg_m3
     if case.classes:
@@ -43,7 +51,7 @@ def describe_bed(particles: Frame, case: CaseOfRun) -> Packing:
     scale = weight * case.gravity_m_s2 * 2.0 * radius.mean()
     return Packing(
         bed_height_m=height,
-        top_m=float((particles.columns["z_m"] + radius).max()),
+        top_m=float((surface.columns["z_m"] + surface.columns["radius_m"]).max()),
         solid_fraction=float(volume.sum() / (np.pi * bowl_radius**2 * height)),
         n_particles=particles.rows,
         radius_mean_m=float(radius.mean()),
@@ -75,7 +83,9 @@ def segregation(particles: pd.DataFrame) -> dict[str, float]:
     return {str(name): float(height / every - 1) for name, height in heights.items()}
 
 
-def probed_height(centre_m: Floats, radius_m: Floats, bowl_radius_m: float) -> float:
+def probed_height(
+    centre_m: Floats, radius_m: Floats, bowl_radius_m: float, mean_m: float | None = None
+) -> float:
     """Mean height at which a thin vertical probe meets the bed.
 
     The probe comes down at the points of a square grid, one mean particle diameter
@@ -92,6 +102,8 @@ def probed_height(centre_m: Floats, radius_m: Floats, bowl_radius_m: float) -> f
         Radii, m.
     bowl_radius_m : float
         Inner radius R of the bowl, m.
+    mean_m : float, optional
+        Half of d; by default the mean of the radii.
 
     Returns
     -------
@@ -105,7 +117,7 @@ def probed_height(centre_m: Floats, radius_m: Floats, bowl_radius_m: float) -> f
     """
     if not radius_m.size:
         return 0.0
-    pitch = 2.0 * float(radius_m.mean())
+    pitch = 2.0 * (float(radius_m.mean()) if mean_m is None else mean_m)
     reach = bowl_radius_m - 0.5 * pitch
     if reach < 0.0:
         raise TableError(

@@ -27,6 +27,9 @@ SIDE_FORCES = vector("side_force", "n")
 CENTRE = ("x_m", "y_m", "z_m")
 VELOCITY = ("vx_m_s", "vy_m_s", "vz_m_s")
 SPIN = ("wx_rad_s", "wy_rad_s", "wz_rad_s")
+ORIENTATION = ("orientation_w", "orientation_x", "orientation_y", "orientation_z")
+"""Columns of ``particles`` beside its own where particles are clumps."""
+
 KINEMATICS = ("particle_id", *CENTRE, *VELOCITY, *SPIN, "radius_m")
 
 WORKPIECE_FORCE = (
@@ -66,7 +69,8 @@ IMPACTS = (
 
 _UNITS: Mapping[str, str] = {
     "n_m_per_m": "N m/m", "n_s_per_m": "N s/m", "m_per_m": "m/m", "n_per_m": "N/m",
-    "j_per_m": "J/m", "per_m": "1/m", "per_s": "1/s", "kg_m3": "kg/m3", "m_s2": "m/s2",
+    "j_per_m": "J/m", "per_m2_s": "1/(m2 s)", "per_m": "1/m", "per_s": "1/s",
+    "kg_m3": "kg/m3", "m_s2": "m/s2",
     "m_s": "m/s", "rad_s": "rad/s", "n_m": "N m", "n_s": "N s", "m2": "m2", "n": "N", "m": "m",
     "s": "s", "j": "J", "pa": "Pa", "rad": "rad", "deg": "degree", "hz": "Hz", "rpm": "1/min",
     "percent": "%",

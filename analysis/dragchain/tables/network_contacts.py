@@ -38,6 +38,8 @@ class ContactRows:
         rest; overlap.
     removed_n : (N,) ndarray
         What was cut off the tangential force as written; see `within_friction`.
+    normal : (N, 3) ndarray
+        Unit vector from the contact into body a.
     """
 
     kind: NDArray[np.int8]
@@ -49,6 +51,7 @@ class ContactRows:
     tangential_force_n: Floats
     overlap_m: Floats
     removed_n: Floats
+    normal: Floats
 
 
 @dataclass(frozen=True)
@@ -225,6 +228,7 @@ def _rows(
         tangential_force_n=tangential_force(force_n, normal),
         overlap_m=overlap_m,
         removed_n=np.zeros(len(a_id)),
+        normal=normal,
     )
 
 

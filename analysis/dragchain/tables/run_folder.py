@@ -21,6 +21,9 @@ from dragdeck.physics.coulomb import FrictionLimit
 from dragdeck.records.case import CaseOfRun, load_case
 from dragdeck.study.drive import Rotation
 
+ON_WORKPIECE = ("workpiece_particles", "workpiece_contacts")
+"""The outputs that are joined, unless others of their columns are asked for."""
+
 _BATCH_ROWS = 8192
 """Contacts on the workpiece that are joined at once, but for those of the last frame."""
 
@@ -94,21 +97,19 @@ class Run:
         """Blocks of rows of a ``fix print`` output."""
         return iter_prints(self.raw, self.outputs[name])
 
-    def workpiece_pairs(self) -> Iterator[WorkpiecePair]:
+    def workpiece_pairs(self, names: tuple[str, str] = ON_WORKPIECE) -> Iterator[WorkpiecePair]:
         """What `workpiece_frames` joins, for those who need some steps only."""
         friction = friction_with(self.case, "workpiece"), friction_with(self.case, "bowl")
         workpiece = needed(self.case.workpiece, "workpiece")
         meshes = Meshes(max(workpiece.number, 1) - 1, workpiece.count)
-        pairs = zip_longest(self.frames("workpiece_particles"), self.frames("workpiece_contacts"))
+        pairs = zip_longest(*map(self.frames, names))
         for particles, contacts in pairs:
             if particles is None or contacts is None:
-                raise TableError(
-                    "one of workpiece_particles and workpiece_contacts ends before the other"
-                )
+                raise TableError(f"one of {names[0]} and {names[1]} ends before the other")
             yield WorkpiecePair(particles, contacts, friction, meshes)
 
-    def workpiece_frames(self) -> Iterator[WorkpieceFrames]:
-        """Contacts on the workpiece, a batch of steps at a time.
+    def workpiece_frames(self, names: tuple[str, str] = ON_WORKPIECE) -> Iterator[WorkpieceFrames]:
+        """Contacts on the workpiece in a pair of outputs, a batch of steps at a time.
 
         Raises
         ------
@@ -118,7 +119,7 @@ class Run:
             If one of them cannot be read.
         """
         batch, rows = [], 0
-        for pair in self.workpiece_pairs():
+        for pair in self.workpiece_pairs(names):
             batch.append(pair)
             rows += pair.contacts.rows
             if rows >= _BATCH_ROWS:

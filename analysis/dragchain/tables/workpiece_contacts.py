@@ -78,8 +78,8 @@ class WallContacts:
         """The number of contacts N."""
         return len(self.particle_id)
 
-    def select(self, mask: NDArray[np.bool_]) -> "WallContacts":
-        """Keep the contacts of a mask of shape (N,)."""
+    def select(self, mask: NDArray[np.bool_] | Ints) -> "WallContacts":
+        """Keep the contacts of a mask of shape (N,), or of rows."""
         return WallContacts(*(getattr(self, name)[mask] for name in self.__dataclass_fields__))
 
     def normal_force_n(self) -> Floats:

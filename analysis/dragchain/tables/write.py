@@ -23,6 +23,7 @@ from dragchain.run.kinematics import (
     workpiece_velocity,
 )
 from dragchain.tables.bed import describe_bed
+from dragchain.tables.bodies import Bodies
 from dragchain.tables.closure import LIMIT, SHARED_LIMIT, Closure
 from dragchain.tables.columns import (
     ATTRACTION,
@@ -32,6 +33,7 @@ from dragchain.tables.columns import (
     FORCES,
     IMPACTS,
     KINEMATICS,
+    ORIENTATION,
     POINT,
     REFERENCE,
     SLIP,
@@ -47,8 +49,9 @@ from dragchain.tables.network_contacts import (
     count_corrections,
 )
 from dragchain.tables.parquet import Rows, category, table_writer
-from dragchain.tables.run_folder import Run
-from dragchain.tables.workpiece_contacts import WallContacts
+from dragchain.tables.run_folder import ON_WORKPIECE, Run
+from dragchain.tables.workpiece_contacts import WallContacts, WorkpieceFrames
+from dragdeck.decks.outputs import TOUCHES
 from dragdeck.dumps.frame import Columns
 from dragdeck.errors import RejectedRunError
 from dragdeck.records.case import CaseOfRun
@@ -181,6 +184,11 @@ class WorkpieceSamples:
         force, place = np.split(self._values[rows], 2, axis=1)
         return np.where((steps < self._steps[0])[:, None], np.nan, force), place
 
+    def places_between(self, steps: Ints) -> Floats:
+        """Places at N steps, (N, 3), on the straight line between the samples around each."""
+        columns = (np.interp(steps, self._steps, column) for column in self._values[:, 3:].T)
+        return np.stack(list(columns), axis=1)
+
 
 # --- contacts on the workpiece ---------------------------------------------------------------
 
@@ -192,8 +200,9 @@ def _write_workpiece_contacts(run: Run, file: Path) -> None:
     own = WORKPIECE_CONTACTS + ((ATTRACTION,) if attracts(run.case) else ())
     with table_writer(file, _with_classes(own, "workpiece_contacts", run.case)) as table:
         for frames in run.workpiece_frames():
-            (force, place), at = samples.at(frames.step), frames.workpiece_at
-            rows = workpiece_contact_rows(frames.step[at], frames.workpiece, place[at], run.case)
+            force, place = samples.at(frames.step)
+            contacts, at = _of_bodies(run.case, frames)
+            rows = workpiece_contact_rows(frames.step[at], contacts, place[at], run.case)
             used = closure.add(frames, force, counted_mask(frames.step, run.case))
             table.write({**rows, "in_statistics": rows["in_statistics"] & used[at]})
         closure.record().write(run.table("closure.json"))
@@ -202,6 +211,23 @@ def _write_workpiece_contacts(run: Run, file: Path) -> None:
                 f"{run.folder}: the check of force closure failed: {problem};"
                 " workpiece_contacts.parquet was not written; closure.json contains the values"
             )
+
+
+def _write_touches(run: Run, file: Path) -> None:
+    samples = WorkpieceSamples(run.prints("workpiece_force"))
+    own = WORKPIECE_CONTACTS + ((ATTRACTION,) if attracts(run.case) else ())
+    with table_writer(file, _with_classes(own, "workpiece_contacts", run.case)) as table:
+        for frames in run.workpiece_frames(TOUCHES):
+            contacts, at = _of_bodies(run.case, frames)
+            steps = frames.step[at]
+            place = samples.places_between(steps)
+            table.write(workpiece_contact_rows(steps, contacts, place, run.case))
+
+
+def _of_bodies(case: CaseOfRun, frames: WorkpieceFrames) -> tuple[WallContacts, Ints]:
+    """Contacts of particles with the workpiece and their frames: of bodies, if they are clumps."""
+    contacts, at, bodies = frames.workpiece, frames.workpiece_at, Bodies(case)
+    return bodies.wall(contacts, at) if bodies else (contacts, at)
 
 
 def workpiece_contact_rows(
@@ -259,12 +285,15 @@ def _named(names: tuple[str, ...], vectors: Floats) -> dict[str, Floats]:
 
 
 def _write_particles(run: Run, file: Path) -> None:
-    own = ("step", "time_s", *KINEMATICS)
+    bodies = Bodies(run.case)
+    moving = KINEMATICS + (ORIENTATION if bodies else ())
+    own = ("step", "time_s", *moving)
     with table_writer(file, _with_classes(own, "particles", run.case)) as table:
         for frame in run.frames("particles"):
+            frame = bodies.frame(frame) if bodies else frame
             steps = np.full(frame.rows, frame.step)
             order = np.argsort(frame.columns["particle_id"])
-            rows = {name: frame.columns[name][order] for name in KINEMATICS}
+            rows = {name: frame.columns[name][order] for name in moving}
             classes = _classes("particles", run.case, rows["particle_id"].astype(np.int64))
             time = {"step": steps, "time_s": steps * run.case.timestep_s}
             table.write({**time, **rows, **classes})
@@ -274,6 +303,7 @@ def _write_contacts(run: Run, file: Path) -> None:
     bowl_radius = run.case.bowl.radius_m
     particles, pairs = run.frames("particles"), run.workpiece_pairs()
     friction, corrected = friction_with(run.case, "particle"), np.zeros(8)
+    bodies = Bodies(run.case)
     with table_writer(file, _with_classes(CONTACTS, "contacts", run.case)) as table:
         for frame in run.frames("contacts"):
             workpiece = _frame_at(pairs, frame.step, "workpiece_contacts").join()
@@ -281,6 +311,7 @@ def _write_contacts(run: Run, file: Path) -> None:
             touching = workpiece.workpiece, workpiece.bowl
             rows = contact_rows(beside, frame, *touching, bowl_radius, friction)
             corrected += count_corrections(rows, workpiece.merged)
+            rows = bodies.network(rows) if bodies else rows
             table.write(_contact_columns(frame.step, rows, run.case))
     of_main = run.case.contact_moduli["particle"].friction
     Corrections.of(of_main, corrected).write(run.table("corrections.json"))
@@ -354,12 +385,13 @@ def _write_packing(run: Run, file: Path) -> None:
     last = deque(run.frames("particles"), maxlen=1)
     if not last:
         raise TableError(f"{run.folder}: particles contains no frames")
-    describe_bed(last[0], run.case).write(file)
+    bodies, spheres = Bodies(run.case), last[0]
+    of_bodies = bodies.frame(spheres) if bodies else spheres
+    describe_bed(of_bodies, run.case, spheres).write(file)
 
 
 _THERMO = Table("thermo.parquet", ("thermo",), _write_thermo)
 _PARTICLES = Table("particles.parquet", ("particles",), _write_particles)
-_ON_WORKPIECE = ("workpiece_particles", "workpiece_contacts")
 
 _TABLES: Mapping[str, tuple[Table, ...]] = {
     "drop_test": (_THERMO, Table("impacts.parquet", ("impacts",), _write_impacts)),
@@ -370,10 +402,11 @@ _TABLES: Mapping[str, tuple[Table, ...]] = {
         _PARTICLES,
         Table(
             "workpiece_contacts.parquet",
-            ("workpiece_force", *_ON_WORKPIECE),
+            ("workpiece_force", *ON_WORKPIECE),
             _write_workpiece_contacts,
         ),
-        Table("contacts.parquet", ("contacts", "particles", *_ON_WORKPIECE), _write_contacts),
+        Table("touches.parquet", ("workpiece_force", *TOUCHES), _write_touches),
+        Table("contacts.parquet", ("contacts", "particles", *ON_WORKPIECE), _write_contacts),
     ),
 }
 """What is made of a run of each scene, in this order."""

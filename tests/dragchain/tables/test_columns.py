@@ -7,17 +7,25 @@ from finished_runs import write_finished_run
 
 from dragchain.loading.samples import BODY as BODY_IMPULSE
 from dragchain.tables import parquet
-from dragchain.tables.columns import ATTRACTION, BODY, CLASSES, columns_of, descriptions, unit_of
+from dragchain.tables.columns import (
+    ATTRACTION,
+    BODY,
+    CLASSES,
+    ORIENTATION,
+    columns_of,
+    descriptions,
+    unit_of,
+)
 
 TABLES = (
     *("workpiece_force", "workpiece_contacts", "particles", "contacts", "network", "chains"),
     *("clusters", "facets", "contact_events", "thermo"),
 )
 SOME_RUNS_ONLY = {
-    *(*BODY, *BODY_IMPULSE, ATTRACTION, "fastest_particle_m_s"),
+    *(*BODY, *BODY_IMPULSE, *ORIENTATION, ATTRACTION, "fastest_particle_m_s"),
     *(name for columns in CLASSES.values() for name in columns),
 }
-"""Columns of spinning workpieces, attraction and classes, and one the small run does not write."""
+"""Columns of spinning workpieces, clumps, attraction and classes, and one not written here."""
 
 
 @pytest.fixture(scope="module")

@@ -21,7 +21,8 @@ from dragdeck.project import Project
 from dragdeck.records.packing import Packing
 from dragdeck.scenes.filling import FILLING, filling_cautions, filling_scene, first_particles
 from dragdeck.scenes.process import process_scene
-from dragdeck.study.media import SOLID_FRACTION_ESTIMATE, Grains
+from dragdeck.study.media import Grains
+from dragdeck.study.shapes import SOLID_FRACTION_ESTIMATE
 from dragdeck.sweep.cases import load_cases
 
 Small = dict[str, Any]

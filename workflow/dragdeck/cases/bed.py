@@ -1,12 +1,13 @@
 """The media of a study as numbers: radii, Rayleigh time, time steps, neighbour skin."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
-from dragdeck.errors import Caution
+from dragdeck.errors import Caution, InputError
+from dragdeck.mesh.clump import SPHERE, Clump, fit_clump
 from dragdeck.physics.contact_mechanics import (
     ENGINE_SOFTEST_PA,
     bed_height,
@@ -18,8 +19,9 @@ from dragdeck.physics.contact_mechanics import (
     stiffness_number,
 )
 from dragdeck.physics.rounding import round_to, rounded, timestep
-from dragdeck.study.media import SOLID_FRACTION_ESTIMATE, Array, Media
+from dragdeck.study.media import Array, Media, few_sizes
 from dragdeck.study.model import Study
+from dragdeck.study.shapes import SOLID_FRACTION_ESTIMATE, AnyShape
 from dragdeck.study.workpiece import Material
 
 JUST_BEYOND = 1 + 1e-6
@@ -36,12 +38,15 @@ class BedClass:
         Empty if the media have no classes.
     material : str
     radii_m : (N,) array
-        In ascending order; not to be changed.
+        In ascending order; not to be changed. Of clumps, those of the spheres of equal volume.
+    clump : Clump
+        Spheres that stand for a particle; one if it is a sphere.
     """
 
     name: str
     material: str
     radii_m: Array
+    clump: Clump = SPHERE
 
 
 def bed_classes(study: Study) -> tuple[BedClass, ...]:
@@ -52,10 +57,82 @@ def bed_classes(study: Study) -> tuple[BedClass, ...]:
 @lru_cache(maxsize=2)
 def media_classes(media: Media, counts: tuple[int, ...]) -> tuple[BedClass, ...]:
     """`bed_classes` of the media and the number of particles of each class alone."""
-    parts = zip(media.parts.items(), counts, strict=True)
-    return tuple(
-        BedClass(name, str(part.material), part.radii(count)) for (name, part), count in parts
-    )
+    found = []
+    for (name, part), count in zip(media.parts.items(), counts, strict=True):
+        radii = few_sizes(part.radii(count)) if media.clumped else part.radii(count)
+        found.append(BedClass(name, str(part.material), radii, clump_of(part.shape)))
+    return tuple(found)
+
+
+@lru_cache(maxsize=32)
+def clump_of(shape: AnyShape | None) -> Clump:
+    """The spheres that stand for a shape.
+
+    Raises
+    ------
+    InputError
+        The shape is flat, or so many spheres cannot stand for it.
+    """
+    if shape is None:
+        return SPHERE
+    try:
+        return fit_clump(shape.corners(), shape.spheres)
+    except InputError as error:
+        error.field = error.field or "media.shape"
+        raise
+
+
+_CORE = 0.01
+"""Radius of the second sphere of a particle that is one, over that of the first: LIGGGHTS accepts
+no clump of one sphere, and nothing reaches this one."""
+
+
+@dataclass(frozen=True)
+class BodySize:
+    """Clumps of one class and size.
+
+    Attributes
+    ----------
+    type : int
+        Of their material in LIGGGHTS.
+    radius_m : float
+        Of the sphere of equal volume.
+    density_kg_m3, mass_kg, inertia_kg_m2
+        The last is the three principal moments.
+    count, first_id, first_sphere : int
+        Number of the particles, id of the first one, and of its first sphere.
+    spheres_m : K sequences of float
+        Places of the spheres, in the principal frame about the centre of mass, and radii.
+    """
+
+    type: int
+    radius_m: float
+    density_kg_m3: float
+    mass_kg: float
+    inertia_kg_m2: Sequence[float]
+    count: int
+    first_id: int
+    first_sphere: int
+    spheres_m: Sequence[Sequence[float]]
+
+
+def body_sizes(study: Study) -> list[BodySize]:
+    """The particles of a study by class and size, if they are clumps; otherwise none."""
+    found: list[BodySize] = []
+    body = sphere = 1
+    for one in bed_classes(study) if study.media.clumped else ():
+        material, kind = study.materials[one.material], 1 + study.type_names().index(one.material)
+        spheres = np.column_stack([one.clump.offsets, one.clump.radii])
+        if len(spheres) == 1:
+            spheres = np.vstack([spheres, _CORE * spheres])
+        for size, count in zip(*map(np.ndarray.tolist, np.unique(one.radii_m, return_counts=True)),
+                               strict=True):  # fmt: skip
+            mass = particle_mass(material, size)
+            inertia = (mass * size**2 * one.clump.inertia).tolist()
+            of_size = kind, size, material.density_kg_m3, mass, inertia, count
+            found.append(BodySize(*of_size, body, sphere, (size * spheres).tolist()))
+            body, sphere = body + count, sphere + count * len(spheres)
+    return found
 
 
 def bed_radii(study: Study) -> Array:
@@ -64,15 +141,29 @@ def bed_radii(study: Study) -> Array:
 
 
 def smallest_radius(study: Study) -> float:
-    """Radius of the smallest particle of the bed, m."""
-    return float(bed_radii(study).min())
+    """Radius of the smallest sphere of the bed, m."""
+    return min(float(one.radii_m[0] * one.clump.radii.min()) for one in bed_classes(study))
+
+
+def farthest_point(study: Study) -> float:
+    """Distance of the farthest point of a particle of the bed from its centre, m."""
+    return max(float(one.radii_m[-1]) * one.clump.reach for one in bed_classes(study))
+
+
+def typical_reach(study: Study) -> float:
+    """That of a mean particle of the first class, m."""
+    return study.media.typical_radius_m * bed_classes(study)[0].clump.reach
 
 
 def bed_rayleigh_time(study: Study) -> float:
     """Shortest Rayleigh time of the particles at the fidelity's modulus, s."""
     scale = study.chosen_fidelity().youngs_modulus_scale
     return min(
-        rayleigh_time(study.materials[one.material], float(one.radii_m[0]), scale)
+        rayleigh_time(
+            study.materials[one.material],
+            float(one.radii_m[0]) * one.clump.timestep_radius,
+            scale,
+        )
         for one in bed_classes(study)
     )
 

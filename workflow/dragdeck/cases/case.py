@@ -105,7 +105,7 @@ class Case:
         """
         asked = self.study.chosen_fidelity().ranks
         if asked == "auto":
-            return auto_ranks(self.study.particle_count, self.beside, cores_here())
+            return auto_ranks(self.study.sphere_count, self.beside, cores_here())
         return ranks_within(asked)
 
     @property

@@ -143,6 +143,8 @@ class Deck:
         Rayleigh time of the smallest particle; 0 if the time step is not a fraction of it.
     neighbours : int
         Room for neighbours of a particle, facets included.
+    clumped : bool
+        Whether particles are clumps of spheres.
     """
 
     title: str
@@ -164,6 +166,7 @@ class Deck:
     case: str = ""
     rayleigh_time_s: float = 0.0
     neighbours: int = ENGINE_NEIGHBOURS
+    clumped: bool = False
     version: str = __version__
     templates: str = ""
 
@@ -281,7 +284,7 @@ def data_file(title: str, types: int, box: Box, bodies: Sequence[Body]) -> str:
         f"{low!r} {high!r} {axis}lo {axis}hi" for axis, (low, high) in zip("xyz", box, strict=True)
     ]
     lines = [title, "", f"{len(bodies)} atoms", f"{types} atom types", "", *bounds]
-    lines += ["", "Atoms", ""]
+    lines += ["", "Atoms", ""] if bodies else []
     lines += [
         f"{number} {body.type} {2 * body.radius_m!r} {body.density_kg_m3!r} "
         + _numbers(body.position_m)

@@ -5,7 +5,7 @@ definitions, so that no reader has to guess a column.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, Self
 
@@ -125,6 +125,8 @@ class Output:
         Expected rows per frame and particle of the run; a frame has at least one row.
     purpose : str
         For the comment in the input script: content, and the result made from it.
+    waits : bool
+        Whether it is not written before `first_step`, although its dump is defined.
     """
 
     name: str
@@ -136,6 +138,7 @@ class Output:
     binary: bool = False
     rows_per_particle: float = 0.0
     purpose: str = ""
+    waits: bool = False
 
     @property
     def pattern(self) -> str:
@@ -189,6 +192,7 @@ _VELOCITY = tuple(Column(f"v{axis}_m_s", f"v{axis}") for axis in "xyz")
 _SPIN = tuple(Column(f"w{axis}_rad_s", f"omega{axis}") for axis in "xyz")
 _ID = Column("particle_id", "id", whole=True)
 _RADIUS = Column("radius_m", "radius")
+_BODY = Column("body_id", "id_multisphere", whole=True)
 _STEP = Column("step", "step", whole=True)
 _TIME = Column("time_s", "step*dt")
 
@@ -213,9 +217,9 @@ def thermo(period: int, last: int | None, entry: int = 0) -> Output:
     return Output("thermo", "print", columns, period, entry + period, last, purpose=purpose)
 
 
-def settled_particles() -> Output:
-    """Every particle of the settled bed, one frame."""
-    columns = (_ID, *_POSITION, *_VELOCITY, *_SPIN, _RADIUS)
+def settled_particles(clumped: bool = False) -> Output:
+    """Every particle of the settled bed, or every sphere of clumps, one frame."""
+    columns = (_ID, *_POSITION, *_VELOCITY, *_SPIN, _RADIUS, *([_BODY] if clumped else []))
     purpose = "settled packing, one frame, for packing.json"
     return Output("particles", "custom", columns, 1, 0, None, True, 1.0, purpose)
 
@@ -268,6 +272,20 @@ def workpiece_contacts(period: int, first: int, last: int, several: bool) -> Out
     return Output("workpiece_contacts", "local", columns, period, first, last, purpose=purpose)
 
 
+TOUCHES = ("touch_particles", "touch_contacts")
+"""Outputs as those of the workpiece, at every step, so that each contact is seen to begin."""
+
+
+def first_touch(first: int, last: int, several: bool) -> tuple[Output, ...]:
+    """Contacts on the workpiece, and their particles, at every step of a part of the drag."""
+    found = (workpiece_particles(1, first, last), workpiece_contacts(1, first, last, several))
+    why = "the same at every step of a part of the drag, for touches.parquet"
+    return tuple(
+        replace(one, name=name, purpose=why, waits=True, rows_per_particle=0.05)
+        for name, one in zip(TOUCHES, found, strict=True)
+    )
+
+
 def contacts(period: int, first: int, last: int) -> Output:
     """Contacts between particles."""
     columns = (
@@ -288,13 +306,16 @@ def contacts(period: int, first: int, last: int) -> Output:
     )
 
 
-def particles(period: int, first: int, last: int, bowl_facets: bool) -> Output:
-    """Every particle, with the forces of an exact bowl on it as applied."""
+def particles(
+    period: int, first: int, last: int, bowl_facets: bool, clumped: bool = False
+) -> Output:
+    """Every particle or sphere of a clump, with the forces of an exact bowl on it as applied."""
     bowl = (
         *_vector("floor_force", "n", "f_force_floor"),
         *_vector("side_force", "n", "f_force_side"),
     )
     columns = (_ID, *_POSITION, *_VELOCITY, *_SPIN, _RADIUS, *(() if bowl_facets else bowl))
+    columns += (_BODY,) if clumped else ()
     purpose = "all particles, for particles.parquet and force chains"
     return Output("particles", "custom", columns, period, first, last, True, 1.0, purpose)
 

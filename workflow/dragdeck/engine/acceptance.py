@@ -12,6 +12,7 @@ from dragdeck.engine import log
 from dragdeck.engine.checkpoints import is_whole
 from dragdeck.engine.completeness import coverage, part_files, some_frames
 from dragdeck.physics.contact_mechanics import Floats, stability_number
+from dragdeck.physics.rigid import RigidBodies, pose
 from dragdeck.records.case import CaseOfRun
 from dragdeck.records.run import (
     AcceptanceCheck,
@@ -59,15 +60,15 @@ def check_run(
         _no_errors(screens[-1]),
         _neighbour_builds("".join(screens)),
     ]
-    checks += [_packing(folder / mark, inputs.media.count, ranks) for mark in inputs.marks]
+    checks += [_packing(folder / mark, inputs.media.n_spheres, ranks) for mark in inputs.marks]
     if inputs.settled is not None:
         checks.append(_at_rest(screens[-1]))
-        checks.append(_packing(folder / PACKING_FILE, inputs.media.count, ranks))
+        checks.append(_packing(folder / PACKING_FILE, inputs.media.n_spheres, ranks))
         if "particles" in outputs:
             checks += _in_bowl(folder, outputs["particles"], parts, inputs.settled.highest_m)
     if "thermo" in outputs:
         samples = _samples(folder, outputs["thermo"], parts)
-        checks += _thermo(samples, inputs.media.count)
+        checks += _thermo(samples, inputs.media.n_spheres)
         if inputs.steady is not None:
             checks.append(_steady(samples, inputs.steady))
     checks += [_complete(folder, name, output, parts) for name, output in outputs.items()]
@@ -230,7 +231,26 @@ def _stability_number(case: CaseOfRun, rows: Floats) -> float:
     bodies = [*(one.name for one in case.classes), "bowl"] if case.classes else ["particle", "bowl"]
     constants = [[one.contact_moduli[body] for body in bodies] for one in case.classes or (case,)]
     of_case = case.density_of(ids), case.bowl.radius_m, constants, case.timestep_s
+    if case.bodies:
+        rows = rows[np.argsort(ids)]
+        classes = case.class_of(case.body_of(np.sort(ids)))
+        return stability_number(rows[:, :3], rows[:, 3], *of_case, classes, _rigid(case, rows))
     return stability_number(rows[:, :3], rows[:, 3], *of_case, case.class_of(ids))
+
+
+def _rigid(case: CaseOfRun, rows: Floats) -> RigidBodies:
+    """The bodies of a frame of spheres in the order of their ids."""
+    centres, masses, roots = [], [], []
+    for one in case.bodies:
+        many, first = len(one.radii_m), one.first_sphere - 1
+        own = rows[first : first + one.count * many, :3].reshape(one.count, many, 3)
+        centre, turned = pose(np.array(one.offsets_m), own)
+        axes = turned.as_matrix()
+        centres.append(centre)
+        masses.append(np.full(one.count, one.mass_kg))
+        roots.append(axes / np.sqrt(one.inertia_kg_m2) @ axes.transpose(0, 2, 1))
+    body = case.body_of(rows[:, 4].astype(np.int64)) - 1
+    return RigidBodies(body, *map(np.concatenate, (centres, masses, roots)))
 
 
 def ranks_check(split: Decomposition | None, ranks: int) -> AcceptanceCheck:

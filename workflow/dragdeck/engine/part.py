@@ -100,7 +100,7 @@ class PartOfRun:
         """Note that a part begins, before it does."""
         outputs, record = self.columns.outputs, self.record
         parts = record.parts if record else []
-        count, ranks = self.inputs.media.count, self.inputs.fidelity.ranks
+        count, ranks = self.inputs.media.n_spheres, self.inputs.fidelity.ranks
         check_space(self.folder, outputs, count)
         gap = first_gap(self.folder, outputs, parts) if parts else -1
         newest = newest_checkpoint(self.folder, count, ranks, gap, self.report)
@@ -129,7 +129,7 @@ class PartOfRun:
             columns=thermo.columns if thermo else [],
             first=part.from_step,
             last=self.inputs.phases[-1].end_step if self.inputs.phases else None,
-            particles=self.inputs.media.count,
+            particles=self.inputs.media.n_spheres,
             ranks=self._record.ranks,
             limits=self.inputs.limits,
             patience_s=patience_s,
@@ -188,7 +188,7 @@ class PartOfRun:
         full = free_bytes(self.folder) < SPARE_BYTES
         if full or any("Cannot open" in error for error in errors):
             said = "; ".join(errors) or "no message of LIGGGHTS"
-            left = space_left(self.folder, self.columns.outputs, self.inputs.media.count)
+            left = space_left(self.folder, self.columns.outputs, self.inputs.media.n_spheres)
             return f"the disk is full, or a file cannot be written ({said}); {left}"
         if errors or log.never_settled(screen):
             return None
@@ -230,7 +230,7 @@ class PartOfRun:
     def _stopped(self, why: str, first: str = "") -> EngineError:
         """Note that the run was stopped; the error says how to go on."""
         self._update(state="stopped")
-        count, ranks = self.inputs.media.count, self._record.ranks
+        count, ranks = self.inputs.media.n_spheres, self._record.ranks
         parts = self._record.parts
         gap = first_gap(self.folder, self.columns.outputs, parts)
         newest = newest_checkpoint(self.folder, count, ranks, gap, self.report)

@@ -68,7 +68,7 @@ def run(
     """
     inputs = CaseFile.read(folder / CASE_FILE)
     columns = ColumnsFile.read(folder / COLUMNS_FILE)
-    full_disk = full_disk_named(folder, columns.outputs, inputs.media.count)
+    full_disk = full_disk_named(folder, columns.outputs, inputs.media.n_spheres)
     with full_disk, only_runner(folder, report):
         _check_files(folder, inputs)
         take_forced_restarts(folder)

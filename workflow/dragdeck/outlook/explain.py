@@ -43,7 +43,7 @@ def expected_cost(kind: SceneType, scene: StudyScene, speeds: Sequence[tuple[int
         count if there are any, the others as if a step took a time per particle.
     """
     single = kind.single_particle
-    count = 1 if single else scene.case.media.count
+    count = 1 if single else scene.case.media.n_spheres
     measured = [(1 if single else particles, rate) for particles, rate in speeds]
     measured = [(particles, rate) for particles, rate in measured if particles == count] or measured
     if measured:
@@ -60,7 +60,7 @@ def measured_speeds(results: Path) -> list[tuple[int, float]]:
         with suppress(OSError, ValueError, LookupError, TypeError):  # damaged: tells nothing
             speed = json.loads(file.read_text(encoding="utf-8"))["steps_per_s"]
             media = json.loads(file.with_name("case.json").read_text(encoding="utf-8"))["media"]
-            found += [(int(media["count"]), float(speed))] if speed else []
+            found += [(int(media.get("spheres", media["count"])), float(speed))] if speed else []
     return found
 
 

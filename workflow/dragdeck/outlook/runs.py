@@ -130,7 +130,7 @@ def expected_runs(
             scene = build(group) if build else kind.build(first, None)
         except InputError:
             continue
-        count = 1 if kind.single_particle else scene.case.media.count
+        count = 1 if kind.single_particle else scene.case.media.n_spheres
         outputs = {output.name: output.as_part() for output in scene.deck.outputs}
         size, cost = expected_bytes(outputs, count), expected_cost(kind, scene, speeds)
         ranks = 1 if kind.single_particle else first.ranks

@@ -7,12 +7,14 @@ in SI units.
 import math
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dragdeck.study.media import SOLID_FRACTION_ESTIMATE
+from dragdeck.physics.rigid import Levers, RigidBodies
+from dragdeck.study.shapes import SOLID_FRACTION_ESTIMATE
 from dragdeck.study.workpiece import Material
 
 Size = TypeVar("Size", float, NDArray[np.float64])
@@ -235,6 +237,7 @@ def stability_number(
     constants: Sequence[Sequence[ContactConstants]],
     timestep_s: float,
     classes: Ints | None = None,
+    rigid: RigidBodies | None = None,
 ) -> float:
     """Stability number of a time step: above 1 the contacts gain energy from step to step.
 
@@ -261,6 +264,8 @@ def stability_number(
     timestep_s : float
     classes : (N,) ndarray of int, optional
         Number of each particle's class; of one class if not given.
+    rigid : RigidBodies, optional
+        The bodies, if particles are spheres of clumps.
 
     Returns
     -------
@@ -272,12 +277,19 @@ def stability_number(
     Otsubo, O'Sullivan and Shire (2017), Computers and Geotechnics 86, 67-79.
     """
     bodies, normal, overlap = touching(centre_m, radius_m, bowl_radius_m)
+    if rigid is not None:
+        owner = np.append(rigid.of_sphere, len(rigid.mass_kg))
+        apart = owner[bodies[0]] != owner[bodies[1]]
+        bodies, normal, overlap = bodies[:, apart], normal[apart], overlap[apart]
     if not overlap.size:
         return 0.0
     # the bowl is the last body: it has no curvature and never moves
     curvature = np.append(1 / radius_m, 0.0)
     inverse_mass = np.append(3 / (4 * math.pi * density_kg_m3) * np.ones_like(radius_m), 0.0)
     inverse_mass *= curvature**3
+    if rigid is not None:
+        of_bodies = np.append(1 / rigid.mass_kg, 0.0)
+        inverse_mass = of_bodies[owner]
     own = np.zeros(len(radius_m), dtype=np.int64) if classes is None else classes
     laws = np.array(
         [[(*astuple(one), damping_ratio(one.restitution)) for one in row] for row in constants]
@@ -288,11 +300,22 @@ def stability_number(
     stiffness = np.stack([2 * modulus, 8 * shear * (friction > 0)]) * contact_radius
     damping = 2 * math.sqrt(5 / 6) * ratio * np.sqrt(stiffness / inverse_mass[bodies].sum(axis=0))
     weights = timestep_s**2 * stiffness + 2 * timestep_s * damping
+    if rigid is not None:
+        point = centre_m[bodies[0]] + (radius_m[bodies[0]] - overlap / 2)[:, None] * normal
+        arms = point - np.vstack([rigid.centre_m, np.zeros(3)])[owner[bodies]]
+        levers = Levers(arms, np.concatenate([rigid.roots, np.zeros((1, 3, 3))]))
+        largest = largest_eigenvalue(owner[bodies], normal, weights, of_bodies, _TOLERANCE, levers)
+        return math.sqrt(largest) / 2
     return math.sqrt(largest_eigenvalue(bodies, normal, weights, inverse_mass, _TOLERANCE)) / 2
 
 
 def largest_eigenvalue(
-    bodies: Ints, normal: Floats, weights: Floats, inverse_mass: Floats, tolerance: float = 0.0
+    bodies: Ints,
+    normal: Floats,
+    weights: Floats,
+    inverse_mass: Floats,
+    tolerance: float = 0.0,
+    levers: Levers | None = None,
 ) -> float:
     """Largest eigenvalue of ``M^-1/2 W M^-1/2`` of a contact network by Lanczos iteration.
 
@@ -311,6 +334,8 @@ def largest_eigenvalue(
         Of the bodies; 0 for one that never moves.
     tolerance : float
         Relative error; 0: the machine's.
+    levers : Levers, optional
+        Of bodies that are no spheres.
     """
     from scipy.sparse.linalg import LinearOperator, eigsh
 
@@ -329,7 +354,21 @@ def largest_eigenvalue(
         np.add.at(found, b, np.hstack([force, torque]))
         return np.asarray((found * scale).ravel())
 
-    operator = LinearOperator((scale.size, scale.size), matvec=act, dtype=np.float64)
+    def act_by_levers(levers: Levers, shape: Floats) -> Floats:
+        moved, turned = np.hsplit(shape.reshape(scale.shape), 2)
+        moved = moved * scale[:, :3]
+        turned, (arm_a, arm_b) = np.einsum("nij,nj->ni", levers.roots, turned), levers.arms_m
+        apart = moved[b] + np.cross(turned[b], arm_b) - moved[a] - np.cross(turned[a], arm_a)
+        along = (apart * normal).sum(axis=1, keepdims=True) * normal
+        force = ahead * along + across * (apart - along)
+        found = np.zeros_like(scale)
+        np.add.at(found, a, np.hstack([-force, -np.cross(arm_a, force)]))
+        np.add.at(found, b, np.hstack([force, np.cross(arm_b, force)]))
+        torque = np.einsum("nij,nj->ni", levers.roots, found[:, 3:])
+        return np.hstack([found[:, :3] * scale[:, :3], torque]).ravel()
+
+    acts = act if levers is None else partial(act_by_levers, levers)
+    operator = LinearOperator((scale.size, scale.size), matvec=acts, dtype=np.float64)
     start = np.random.default_rng(1).normal(size=scale.size)  # the same result every time
     return float(eigsh(operator, k=1, v0=start, tol=tolerance, return_eigenvectors=False)[0])
 

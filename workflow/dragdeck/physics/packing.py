@@ -103,6 +103,49 @@ def pour(classes_m: Sequence[Array], bowl_radius_m: float, seed: int) -> Particl
     )
 
 
+_INSERTED_FRACTION = 0.2
+"""Fraction of a space that the spheres around clumps fill when these are inserted at random places:
+half of where random sequential addition of spheres ends, 0.38."""
+
+
+def room_to_insert(reaches_m: Array, bowl_radius_m: float) -> float:
+    """Height of the space in a bowl in which clumps can be inserted at random, m.
+
+    Parameters
+    ----------
+    reaches_m : (N,) array
+        Distance of the farthest point of each from its centre.
+    bowl_radius_m : float
+
+    Raises
+    ------
+    InputError
+        The largest clump does not fit into the bowl.
+    """
+    largest = float(reaches_m.max())
+    if largest >= bowl_radius_m:
+        raise InputError(
+            "the largest particle does not fit into the bowl",
+            field="media.radius_mean_m",
+            value=f"farthest point {largest:.6g} m from the centre of mass",
+            limit=f"less than {bowl_radius_m:g} m, the radius of the bowl",
+            remedy="use smaller or more compact particles, or a wider bowl",
+        )
+    volume = float((4 / 3 * reaches_m**3).sum())
+    return 2 * largest + volume / (_INSERTED_FRACTION * (bowl_radius_m - largest) ** 2)
+
+
+def primes(seed: int, count: int) -> list[int]:
+    """Different primes above 10000, as LIGGGHTS wants its seeds."""
+    found: list[int] = []
+    candidate = int(np.random.default_rng(seed).integers(10_000, 10_000_000))
+    while len(found) < count:
+        candidate += 1
+        if all(candidate % divisor for divisor in range(2, math.isqrt(candidate) + 1)):
+            found.append(candidate)
+    return found
+
+
 def _sites(count: int, bowl_radius_m: float, largest_m: float) -> Array:
     """The lowest `count` points of a square lattice in the bowl, (count, 3)."""
     step = 2 * _SPACING * largest_m

@@ -16,6 +16,7 @@ from dragdeck.records.run import CaseFile, CountOfRun, RanksOfRun, SettlingCrite
 from dragdeck.study.drive import PathEntry, SuperposedEntry
 from dragdeck.study.media import Ints, class_numbers
 from dragdeck.study.reference import Reference
+from dragdeck.study.removal import Removal
 
 
 class FidelityOfRun(RanksOfRun):
@@ -97,6 +98,35 @@ class ClassOfRun(Part):
     density_kg_m3: PositiveFloat
     contact_moduli: Mapping[str, ContactConstants]
     attractive: Mapping[str, Mapping[str, float]] = omitted({})
+
+
+class BodiesOfRun(Part):
+    """Particles of one class and size that are clumps of spheres.
+
+    Attributes
+    ----------
+    first_id, count : int
+        They have the ids from `first_id` on.
+    first_sphere : int
+        Id in LIGGGHTS of the first sphere of the first one; spheres are counted particle by
+        particle.
+    radius_m, mass_kg : float
+        Radius of the sphere of equal volume, and mass.
+    inertia_kg_m2 : tuple of float
+        Principal moments of inertia.
+    offsets_m, radii_m : tuple
+        Places of the spheres of a particle in its principal frame about the centre of mass, and
+        their radii, m.
+    """
+
+    first_id: int
+    count: int
+    first_sphere: int
+    radius_m: PositiveFloat
+    mass_kg: PositiveFloat
+    inertia_kg_m2: tuple[PositiveFloat, PositiveFloat, PositiveFloat]
+    offsets_m: tuple[tuple[float, float, float], ...]
+    radii_m: tuple[PositiveFloat, ...]
 
 
 class BowlOfRun(Part):
@@ -193,6 +223,8 @@ class CaseOfRun(CaseFile):
         contact law has none.
     classes : tuple of ClassOfRun
         Classes of the media, if there are several.
+    bodies : tuple of BodiesOfRun
+        Particles by class and size, if they are clumps of spheres.
     unsafe_timestep : str or None
         Why a step of the process beyond the stable one is accepted.
     fidelity : FidelityOfRun
@@ -223,6 +255,8 @@ class CaseOfRun(CaseFile):
         Tolerance from which the settings were derived.
     restitution : float or None
         Coefficient of restitution in the input script of a drop test.
+    removal : Removal or None
+        Law and coefficient of removal of a process.
     """
 
     gravity_m_s2: float
@@ -233,6 +267,7 @@ class CaseOfRun(CaseFile):
     contact_moduli: Mapping[str, ContactConstants]
     attractive: Mapping[str, Mapping[str, float]] = omitted({})
     classes: tuple[ClassOfRun, ...] = omitted(())
+    bodies: tuple[BodiesOfRun, ...] = omitted(())
     assumptions: tuple[AssumptionOfRun, ...]
     reference: Reference | None
     unsafe_timestep: str | None = None
@@ -248,10 +283,19 @@ class CaseOfRun(CaseFile):
     statistics: StatisticsOfRun | None = omitted(None)
     asked: AdvisedSettings | None = omitted(None)
     restitution: float | None = omitted(None)
+    removal: Removal | None = omitted(None)
 
     def class_of(self, particle_id: Ints) -> Ints:
         """Number of the class of (N,) particles in `classes`; 0 if there are none."""
         return class_numbers(particle_id, [one.first_id for one in self.classes])
+
+    def body_of(self, sphere_id: Ints) -> Ints:
+        """Ids of the bodies of (N,) spheres of clumps; ids below 1, of walls, stay."""
+        first = np.array([one.first_sphere for one in self.bodies])
+        size = np.maximum(np.searchsorted(first, sphere_id, side="right") - 1, 0)
+        many = np.array([len(one.radii_m) for one in self.bodies])[size]
+        first_id = np.array([one.first_id for one in self.bodies])[size]
+        return np.where(sphere_id > 0, first_id + (sphere_id - first[size]) // many, sphere_id)
 
     def density_of(self, particle_id: Ints) -> Floats:
         """Density of (N,) particles, kg/m3."""

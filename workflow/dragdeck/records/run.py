@@ -19,9 +19,15 @@ class RanksOfRun(Part):
 
 
 class CountOfRun(Part):
-    """Particles of a run."""
+    """Particles of a run, and the spheres of which they consist if they are clumps."""
 
     count: int
+    spheres: int = omitted(0)
+
+    @property
+    def n_spheres(self) -> int:
+        """Number of LIGGGHTS's particles."""
+        return self.spheres or self.count
 
 
 class Phase(Part):

@@ -31,8 +31,9 @@ from dragdeck.records.calibration import AngleRun
 from dragdeck.records.case import CaseOfRun
 from dragdeck.scenes.scene import case_of_study, material_table
 from dragdeck.study.calibration import Drum, Repose
-from dragdeck.study.media import SOLID_FRACTION_ESTIMATE, Array
+from dragdeck.study.media import Array
 from dragdeck.study.model import Fidelity, Study
+from dragdeck.study.shapes import SOLID_FRACTION_ESTIMATE
 
 STIFFNESS = 1e4
 """Young's modulus over density, gravity, and radius of the cylinder or drum: soft, but the angles

@@ -1,20 +1,25 @@
 """The fill: the particles fall into the bowl and come to rest."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
 from dragdeck.cases.bed import (
     JUST_BEYOND,
+    BodySize,
     bed_classes,
+    bed_density,
     bed_radii,
     bed_rayleigh_time,
     bed_timestep,
     bed_volume,
+    body_sizes,
     buoyancy_density,
+    farthest_point,
     media_classes,
     outrun,
     particle_material,
@@ -41,7 +46,7 @@ from dragdeck.physics.contact_mechanics import (
 )
 from dragdeck.physics.coulomb import FrictionLimit
 from dragdeck.physics.domain_split import FilledBowl, Split, rank_warnings, split
-from dragdeck.physics.packing import Bed, Particles, pour
+from dragdeck.physics.packing import Bed, Particles, pour, primes, room_to_insert
 from dragdeck.physics.rounding import rounded
 from dragdeck.physics.run_limits import RunLimits, run_limits
 from dragdeck.records.case import FillingCase
@@ -56,8 +61,9 @@ from dragdeck.scenes.scene import (
     media_of_run,
 )
 from dragdeck.study.base import Json
-from dragdeck.study.media import SOLID_FRACTION_ESTIMATE, Media
+from dragdeck.study.media import MOST_SIZES, Media
 from dragdeck.study.model import Study
+from dragdeck.study.shapes import SOLID_FRACTION_ESTIMATE
 
 _CHECK_INTERVAL_S = 0.02
 """Time between two looks at the kinetic energy, about the fall over one particle."""
@@ -72,7 +78,7 @@ _SETTLING_ESTIMATE_S = 0.5
 
 @dataclass(frozen=True, kw_only=True)
 class FillingDeck(Deck):
-    """What the fill template sees."""
+    """What the fill template sees; for clumps with primes as seeds, and the top of the space, m."""
 
     bowl_type: int
     bowl_radius_m: float
@@ -81,6 +87,9 @@ class FillingDeck(Deck):
     check_steps: int
     most_checks: int
     max_time_s: float
+    insertions: Sequence[BodySize] = ()
+    seeds: Sequence[int] = ()
+    space_top_m: float = 0.0
 
 
 def filling_scene(case: Case) -> Scene[FillingCase]:
@@ -98,7 +107,7 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
     rayleigh = bed_rayleigh_time(study)
     dt = bed_timestep(study, "filling_timestep_fraction")
     check_steps = max(1, math.ceil(_CHECK_INTERVAL_S / dt))
-    particles, top = first_particles(study), box_top(study)
+    top, start = box_top(study), _start(study)
     longest = study.filling.max_time_s
     types = _filling_types(study)
     deck = FillingDeck(
@@ -114,7 +123,7 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
         skin_m=skin(study),
         timestep_s=dt,
         rayleigh_time_s=rayleigh,
-        outputs=(outputs.thermo(check_steps, None), outputs.settled_particles()),
+        outputs=(outputs.thermo(check_steps, None), outputs.settled_particles(study.media.clumped)),
         thermo_steps=check_steps,
         checkpoint_steps=5 * check_steps,
         processors=rank_split(case).line,
@@ -125,6 +134,10 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
         check_steps=check_steps,
         most_checks=math.ceil(longest / (check_steps * dt)),
         max_time_s=longest,
+        clumped=study.media.clumped,
+        insertions=body_sizes(study),
+        seeds=primes(study.seed, 3 * MOST_SIZES * len(study.media.parts)),
+        space_top_m=start.top_m,
     )
     return Scene(
         deck=deck,
@@ -139,12 +152,12 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
             settled=SettlingCriterion(
                 energy_ratio=study.filling.energy_ratio, highest_m=study.bowl.height_m
             ),
-            limits=bed_limits(study, top, particles.fastest_m_s),
+            limits=bed_limits(study, top, start.fastest_m_s),
         ),
         steps=round(expected_time(study) / dt),
-        files={"particles.data": lambda: _particles_data(particles, study, top, len(types))},
+        files={"particles.data": lambda: _particles_data(study, top, len(types))},
         models={
-            "every particle individually": "exact number, mean and standard deviation of radii",
+            **_models(study),
             "settling by a criterion": f"kinetic energy below {study.filling.energy_ratio:g} m "
             f"g d per particle",
             "a separate time step": "falling particles collide faster than a packing at rest",
@@ -169,6 +182,33 @@ def _filling_types(study: Study) -> list[str]:
     bowl = study.bowl.material
     used = list(dict.fromkeys((*study.media.materials, bowl)))
     return used + [bowl] * (len(study.type_names()) - len(used))
+
+
+def _models(study: Study) -> dict[str, str]:
+    """How particles stand in a deck."""
+    if not study.media.clumped:
+        return {"every particle individually": "exact number, mean and standard deviation of radii"}
+    spheres = study.sphere_count / study.particle_count
+    return {
+        f"particles as clumps of {spheres:.3g} spheres": "mass and inertia of the body; a step "
+        "takes as long as with so many times the particles"
+    }
+
+
+class _Start(NamedTuple):
+    """Highest point of the particles before they fall, m, and their largest speed, m/s."""
+
+    top_m: float
+    fastest_m_s: float
+
+
+def _start(study: Study) -> _Start:
+    """How particles start: spheres thrown from their places, clumps at rest where they fit."""
+    if not study.media.clumped:
+        particles = first_particles(study)
+        return _Start(particles.top_m, particles.fastest_m_s)
+    reaches = [one.radii_m * one.clump.reach for one in bed_classes(study)]
+    return _Start(room_to_insert(np.concatenate(reaches), study.bowl.radius_m), 0.0)
 
 
 def first_particles(study: Study) -> Particles:
@@ -234,7 +274,7 @@ def box_top(study: Study) -> float:
     """
     diameter = 2 * study.media.typical_radius_m
     above_bed = 2 * expected_surface(study) + 8 * diameter
-    falling = first_particles(study).top_m
+    falling = _start(study).top_m
     return math.ceil(100 * max(falling, above_bed, 2 * study.bowl.height_m) + 5) / 100
 
 
@@ -242,13 +282,13 @@ def rank_split(case: Case) -> Split:
     """How the box of a case is split among its ranks."""
     study = case.study
     filled = FilledBowl(
-        particles=study.particle_count,
+        particles=study.sphere_count,
         radius_m=study.bowl.radius_m,
         height_m=expected_surface(study),
         half_width_m=_half_width(study),
         bottom_m=-study.media.typical_radius_m,
         top_m=box_top(study),
-        reach_m=2 * float(bed_radii(study).max()) + skin(study),
+        reach_m=(4 if study.media.clumped else 2) * farthest_point(study) + skin(study),
     )
     return split(case.ranks, filled)
 
@@ -270,8 +310,8 @@ def filling_cautions(case: Case) -> Iterator[Caution]:
     yield from _overlap_caution(study)
     yield from _cohesion_caution(study)
     yield from _class_cautions(study)
-    particles = first_particles(study)
-    speed = math.hypot(particles.fastest_m_s, _arrival_speed(study, particles))
+    start = _start(study)
+    speed = math.hypot(start.fastest_m_s, _arrival_speed(study, start.top_m))
     yield from outrun(study, "filling_timestep_fraction", "particles fall", speed)
 
 
@@ -314,13 +354,17 @@ _DEAR = 10.0
 def _class_cautions(study: Study) -> Iterator[Caution]:
     """A warning for each class whose small particles make a run many times dearer."""
     classes = bed_classes(study) if study.media.classes else ()
-    times = [rayleigh_time(study.materials[one.material], one.radii_m[0]) for one in classes]
-    total = study.particle_count
+    times = [
+        rayleigh_time(study.materials[one.material], one.radii_m[0] * one.clump.timestep_radius)
+        for one in classes
+    ]
+    spheres = [len(one.radii_m) * len(one.clump.radii) for one in classes]
+    total = sum(spheres)
     for at, one in enumerate(classes):
         others = [time for number, time in enumerate(times) if number != at]
-        if not others or total == len(one.radii_m):
+        if not others or total == spheres[at]:
             continue
-        dearer = total / (total - len(one.radii_m)) * min(others) / min(times)
+        dearer = total / (total - spheres[at]) * min(others) / min(times)
         if dearer >= _DEAR:
             share = (one.radii_m**3).sum() / (bed_radii(study) ** 3).sum()
             yield Caution(
@@ -334,7 +378,9 @@ def _class_cautions(study: Study) -> Iterator[Caution]:
 def bed_limits(study: Study, top_m: float, speed_m_s: float) -> RunLimits:
     """Limits of a run with the whole bed in a box of that height."""
     mass = particle_mass(particle_material(study), study.media.typical_radius_m)
-    return run_limits(study.particle_count, mass, study.gravity_m_s2, top_m, speed_m_s)
+    if study.media.clumped:
+        mass = bed_density(study) * bed_volume(study) / study.sphere_count
+    return run_limits(study.sphere_count, mass, study.gravity_m_s2, top_m, speed_m_s)
 
 
 def _energy_unit(study: Study) -> float:
@@ -345,12 +391,12 @@ def _energy_unit(study: Study) -> float:
 
 def expected_time(study: Study) -> float:
     """Time in which the particles of a study come to rest, s. An estimate."""
-    return _arrival_speed(study, first_particles(study)) / study.gravity_m_s2 + _SETTLING_ESTIMATE_S
+    return _arrival_speed(study, _start(study).top_m) / study.gravity_m_s2 + _SETTLING_ESTIMATE_S
 
 
-def _arrival_speed(study: Study, particles: Particles) -> float:
+def _arrival_speed(study: Study, top_m: float) -> float:
     """Speed of the highest particle on the bed if it falls from rest, m/s."""
-    return fall_speed(max(particles.top_m - expected_surface(study), 0.0), study.gravity_m_s2)
+    return fall_speed(max(top_m - expected_surface(study), 0.0), study.gravity_m_s2)
 
 
 def _half_width(study: Study) -> float:
@@ -358,10 +404,12 @@ def _half_width(study: Study) -> float:
     return study.bowl.radius_m + 2 * study.media.typical_radius_m
 
 
-def _particles_data(particles: Particles, study: Study, top_m: float, types: int) -> str:
+def _particles_data(study: Study, top_m: float, types: int) -> str:
     side = _half_width(study)
     box = ((-side, side), (-side, side), (-study.media.typical_radius_m, top_m))
-    names = [one.material for one in bed_classes(study)]
+    if study.media.clumped:
+        return data_file("the empty box", types, box, [])
+    particles, names = first_particles(study), [one.material for one in bed_classes(study)]
     kinds = [1 + study.type_names().index(name) for name in names]
     densities = [study.materials[name].density_kg_m3 for name in names]
     columns = (
@@ -403,9 +451,9 @@ def filling_content(case: Case) -> Json:
 
 def _impact_speed(case: Case) -> float:
     """Speed of the highest particle that is thrown down and falls to the floor, m/s."""
-    particles = first_particles(case.study)
-    fall = fall_speed(particles.top_m, case.study.gravity_m_s2)
-    return math.hypot(particles.fastest_m_s, fall)
+    start = _start(case.study)
+    fall = fall_speed(start.top_m, case.study.gravity_m_s2)
+    return math.hypot(start.fastest_m_s, fall)
 
 
 def partners_in_bed(case: Case) -> list[tuple[str, str, float]]:

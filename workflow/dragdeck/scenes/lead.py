@@ -244,7 +244,7 @@ def _window_study(study: Study) -> Study:
             "windows": None,
         }
     )
-    outputs = study.outputs.model_copy(update=rates)
+    outputs = study.outputs.model_copy(update={**rates, "first_touch_fraction": 0.0})
     return study.model_copy(update={"fidelity": fidelity, "outputs": outputs})
 
 

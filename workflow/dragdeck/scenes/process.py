@@ -5,7 +5,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from functools import partial
 
-from dragdeck.cases.bed import bed_radii, bed_rayleigh_time, bed_timestep, buoyancy_density, skin
+from dragdeck.cases.bed import (
+    bed_rayleigh_time,
+    bed_timestep,
+    buoyancy_density,
+    farthest_point,
+    skin,
+)
 from dragdeck.cases.case import Case, Stretch, materials_content, mesh_file, of_each_workpiece
 from dragdeck.decks import PACKING_FILE, WORKPIECE_MESH, outputs
 from dragdeck.decks.deck import NOT_OF_LIQUID, LeftOut, Scene
@@ -67,6 +73,7 @@ from dragdeck.scenes.workpiece import (
 )
 from dragdeck.study.base import Json
 from dragdeck.study.contact_law import coefficient_words
+from dragdeck.study.drive import Drive
 from dragdeck.study.model import Study
 from dragdeck.study.workpiece import CylinderShape, MeshShape, Shape
 
@@ -107,6 +114,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         check_headroom(one, way.start_m[2] - reference_height(one), top)
     types, parts = study.type_names(), rank_split(whole)
     materials = material_table(study, types, fidelity.youngs_modulus_scale, whole)
+    touches = study.outputs.first_touch_fraction if steps.end == drag.end else 0.0
     deck = ProcessDeck(
         title=study.title,
         study=whole.study_name,
@@ -122,7 +130,15 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         timestep_s=dt,
         rayleigh_time_s=bed_rayleigh_time(study),
         neighbours=max(ENGINE_NEIGHBOURS, _bowl_neighbours(study), *counts),
-        outputs=_outputs(periods, drag.start, steps, [one.name for one in moved], facets),
+        outputs=_outputs(
+            periods,
+            drag,
+            steps,
+            [one.name for one in moved],
+            facets,
+            touches,
+            study.media.clumped,
+        ),
         thermo_steps=periods.network,
         checkpoint_steps=_checkpoint_steps(study, steps.end - steps.entry),
         processors=parts.line,
@@ -130,6 +146,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         bowl_radius_m=study.bowl.radius_m,
         bowl_facets=facets,
         bowl_rad_s=courses[0].driven.bowl_rad_s,
+        clumped=study.media.clumped,
         workpiece_type=types.index(study.workpiece.material) + 1,
         workpieces=moved,
         stops=list(stops(whole, drag, steps, materials)),
@@ -184,10 +201,17 @@ def _source(case: Case) -> str:
 
 
 def _outputs(
-    periods: Periods, drag_start: int, steps: Covered, workpieces: Sequence[str], facets: bool
+    periods: Periods,
+    drag: Drive,
+    steps: Covered,
+    workpieces: Sequence[str],
+    facets: bool,
+    touches: float,
+    clumped: bool,
 ) -> tuple[Output, ...]:
     several = facets or len(workpieces) > 1
-    begin = max(drag_start, steps.ramp_end)
+    begin = max(drag.start, steps.ramp_end)
+    last_part = max(steps.counted, steps.end - math.ceil(touches * drag.steps))
     first_touching, first = (
         math.ceil(begin / period) * period for period in (periods.contacts, periods.network)
     )
@@ -200,8 +224,9 @@ def _outputs(
         *(outputs.workpiece_force(periods.force, force, name, steps.entry) for name in workpieces),
         outputs.workpiece_particles(periods.contacts, first_touching, touching),
         outputs.workpiece_contacts(periods.contacts, first_touching, touching, several),
-        outputs.particles(periods.network, first, network, facets),
+        outputs.particles(periods.network, first, network, facets, clumped),
         outputs.contacts(periods.network, first, network),
+        *(outputs.first_touch(last_part, steps.end, several) if touches else ()),
     )
 
 
@@ -234,6 +259,7 @@ def _process_case(
         media=media_of_run(study, buoyancy_density(study)),
         assumed=_of_liquid(case, surface_m),
         asked=case.advised,
+        removal=study.removal,
         unsafe_timestep=study.accepted.unsafe_timestep,
         case=case.name,
         upstream={scene.name: scene.run_id(case) for scene in (FILLING, DROP_TEST)},
@@ -312,7 +338,7 @@ def _bowl_neighbours(study: Study) -> int:
     size = study.bowl_facet_size_m
     if size is None:
         return 0
-    reach_m = float(bed_radii(study).max()) + skin(study) + 2 * size
+    reach_m = farthest_point(study) + skin(study) + 2 * size
     return math.ceil(3 * math.pi * reach_m**2 / (0.4 * size**2))
 
 

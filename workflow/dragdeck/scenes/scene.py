@@ -8,7 +8,7 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 
 from dragdeck import __version__
-from dragdeck.cases.bed import bed_classes, bed_density, skin
+from dragdeck.cases.bed import bed_classes, bed_density, body_sizes, skin
 from dragdeck.cases.case import Case, digest, slug
 from dragdeck.decks.deck import (
     NOT_OF_LIQUID,
@@ -29,6 +29,7 @@ from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import round_to
 from dragdeck.records.case import (
     AssumptionOfRun,
+    BodiesOfRun,
     BowlOfRun,
     CaseOfRun,
     ClassOfRun,
@@ -131,6 +132,8 @@ class SceneType:
         include = {"title", "assumptions", "reference"}
         if case.study.accepted.unsafe_timestep:
             include.add("accepted")
+        if case.study.removal and self.loading:
+            include.add("removal")
         remarks = case.study.model_dump(mode="json", include=include)
         asked = case.advised.model_dump(mode="json") if case.advised and self.needs_bed else None
         return digest({"study": remarks, "content": dict(self.content(case)), "asked": asked})
@@ -195,6 +198,7 @@ def case_of_study(
         "contact_moduli": _contact_moduli(study, main, fidelity.youngs_modulus_scale),
         "attractive": _attractive(study, main, fidelity.youngs_modulus_scale),
         "classes": _classes(study, fidelity.youngs_modulus_scale),
+        "bodies": _bodies_of(study),
         "assumptions": [*_assumptions(study), *assumed],
         "reference": study.reference,
         "versions": {"dragdeck": __version__},
@@ -206,6 +210,7 @@ def media_of_run(study: Study, buoyancy_kg_m3: float = 0.0) -> MediaOfRun:
     """The media, whose particles displace that mass of liquid per volume, kg/m3."""
     return MediaOfRun(
         count=study.particle_count,
+        spheres=study.sphere_count if study.media.clumped else 0,
         radius_mean_m=study.media.typical_radius_m,
         radius_std_m=study.media.typical_std_m,
         density_kg_m3=bed_density(study),
@@ -260,6 +265,23 @@ def _classes(study: Study, scale: float) -> tuple[ClassOfRun, ...]:
         )
         first += len(one.radii_m)
     return tuple(found)
+
+
+def _bodies_of(study: Study) -> tuple[BodiesOfRun, ...]:
+    """The particles by class and size, if they are clumps."""
+    return tuple(
+        BodiesOfRun(
+            first_id=one.first_id,
+            count=one.count,
+            first_sphere=one.first_sphere,
+            radius_m=one.radius_m,
+            mass_kg=one.mass_kg,
+            inertia_kg_m2=one.inertia_kg_m2,
+            offsets_m=[sphere[:3] for sphere in one.spheres_m],
+            radii_m=[sphere[3] for sphere in one.spheres_m],
+        )
+        for one in body_sizes(study)
+    )
 
 
 def _bodies(study: Study) -> dict[str, str]:

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from dragdeck.cases.bed import (
     JUST_BEYOND,
-    bed_radii,
     bed_timestep,
+    farthest_point,
     full_stiffness_number,
     impact_time,
     outrun,
@@ -26,6 +26,7 @@ from dragdeck.cases.bed import (
     skin,
     smallest_radius,
     tip_pressure,
+    typical_reach,
     weight_acceleration,
 )
 from dragdeck.cases.case import Case, mesh_file, of_each_workpiece
@@ -151,7 +152,7 @@ def workpiece_warnings(case: Case) -> list[Caution]:
 def _too_fine(case: Case) -> Iterator[Caution]:
     """A warning where a step is spent on facets."""
     shape, facets = case.study.workpiece.shape, workpiece_facets(case)
-    particles_s = case.study.particle_count / PARTICLE_STEPS_PER_S
+    particles_s = case.study.sphere_count / PARTICLE_STEPS_PER_S
     enough = max(_ALWAYS_FACETS, round(_MOST_TIMES * particles_s / FACET_STEP_S))
     if facets <= enough:
         return
@@ -383,7 +384,7 @@ def process_cautions(case: Case) -> Iterator[Caution]:
     """What a user should know of the workpiece and its motion before a process runs."""
     study = case.study
     yield from workpiece_warnings(case)
-    gap = _wall_gap(case) / (2 * study.media.typical_radius_m)
+    gap = _wall_gap(case) / (2 * typical_reach(study))
     if gap < _JAMMING_GAP:
         yield Caution(
             "gap",
@@ -413,7 +414,7 @@ def _beside(case: Case, gap: float) -> Iterator[InputError]:
     study = case.study
     reach = farthest_reach(study.motion)
     radius = study.bowl.radius_m - gap - reach
-    diameter = 2 * study.media.typical_radius_m
+    diameter = 2 * typical_reach(study)
     if gap < diameter:
         yield InputError(
             "the workpiece does not fit between its path and the bowl"
@@ -456,7 +457,7 @@ def _below(case: Case, tip_m: float) -> Iterator[InputError]:
 
 def _largest_particle(case: Case) -> float:
     """Diameter of the largest particle, m: with less between tip and floor, one is crushed."""
-    return 2 * float(bed_radii(case.study).max())
+    return 2 * farthest_point(case.study)
 
 
 def _up_and_down(case: Case, tip_m: float) -> Iterator[InputError]:

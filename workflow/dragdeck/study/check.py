@@ -20,7 +20,7 @@ from dragdeck.study.recorded import Places, recorded_file, with_recording
 from dragdeck.study.workpiece import CylinderShape, Shape
 from dragdeck.study.yaml import located, shown
 
-_NO_SWEEP = ("accepted", "assumptions", "reference", "scaling", "sweep", "title")
+_NO_SWEEP = ("accepted", "assumptions", "reference", "removal", "scaling", "sweep", "title")
 """Blocks that no run depends on: cases that differ in them would be the same."""
 
 _LEAST_LEVELS = 3
@@ -45,6 +45,7 @@ def contradictions(study: Study, whole: bool) -> Iterator[InputError]:
         _shape,
         _motion,
         _assumptions,
+        _removal,
         *([_sweep] if whole else []),
     ):
         for field, problem, limit in check(study):
@@ -109,6 +110,9 @@ def _compound(study: Study) -> _Found:
     compound, rim = study.compound, study.bowl.height_m
     if compound is None:
         return
+    if study.media.clumped:
+        problem = "LIGGGHTS would lift every sphere of a clump by its whole volume"
+        yield "compound", problem, "spherical particles, or no compound"
     if study.liquid_level_m > rim:
         problem = "the liquid stands above the rim of the bowl"
         yield "compound.level_m", problem, f"at most {rim:g} m"
@@ -196,6 +200,19 @@ def _assumptions(study: Study) -> _Found:
         if entry.field not in known:
             limit = f"{near(entry.field, known)}the dotted name of a field, such as media.count"
             yield f"assumptions.{number}.field", f"no such field {entry.field!r}", limit
+
+
+def _removal(study: Study) -> _Found:
+    removal = study.removal
+    if removal is None:
+        return
+    if any(law.impact for law in removal.laws) and not study.outputs.first_touch_fraction:
+        problem = f"the law {removal.law} reads impacts, but no run writes them"
+        yield "removal.law", problem, "outputs.first_touch_fraction: 0.05, or the law archard"
+    several = study.workpieces is not None or {*study.sweep} - {"seed"}
+    if removal.calibrate and several:
+        problem = "a weighed trial is of one process, but the study has several cases"
+        yield "removal.calibrate", problem, "one workpiece, and a sweep over seed at most"
 
 
 def _sweep(study: Study) -> _Found:

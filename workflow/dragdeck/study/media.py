@@ -24,19 +24,19 @@ from dragdeck.study.base import (
     Positive,
     Whole,
 )
+from dragdeck.study.shapes import FEWEST_SPHERES, SOLID_FRACTION_ESTIMATE, AnyShape
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
-
-SOLID_FRACTION_ESTIMATE = 0.59
-"""Solid fraction of a poured bed about twelve particles wide, an estimate used only for
-expectations before the bed exists (measured beds replace it)."""
 
 CUTOFF_STD = 2.5
 """Radii lie within this many standard deviations of the untruncated normal distribution."""
 
 _LARGEST_SPREAD = 0.3
 """Standard deviation over mean of radii: the smallest of a normal distribution stay above zero."""
+
+MOST_SIZES = 5
+"""Sizes of a class among media of which some are no spheres: LIGGGHTS inserts each by itself."""
 
 _LEVELS = 4096
 """Quantiles from which the moments of a distribution are computed."""
@@ -88,6 +88,12 @@ class Grains(Model):
         description="instead of radius_mean_m, a sieve analysis: 2 to 100 rows [diameter, fraction "
         "of the mass that is finer], m and 0 to 1, straight between them; or the name of a CSV "
         "file with the columns diameter_m and mass_passing, relative to the study",
+        exclude_if=_none,
+    )
+    shape: AnyShape | None = Field(
+        default=None,
+        description="shape of the particles, none: spheres; radii are those of spheres of equal "
+        "volume",
         exclude_if=_none,
     )
 
@@ -285,6 +291,17 @@ class Media(Grains):
         return main.radius_std_m if main.sieve is None else float(main.radii(_LEVELS).std())
 
     @property
+    def clumped(self) -> bool:
+        """Whether some particles are no spheres; then all are clumps."""
+        return any(part.shape is not None for part in self.parts.values())
+
+    def spheres_of(self, part: Grains) -> int:
+        """Spheres of which a particle of a class consists in LIGGGHTS."""
+        if part.shape is not None:
+            return part.shape.spheres
+        return FEWEST_SPHERES if self.clumped else 1
+
+    @property
     def materials(self) -> Sequence[str]:
         """Materials of the classes in their order, each once."""
         return list(dict.fromkeys(str(part.material) for part in self.parts.values()))
@@ -320,6 +337,12 @@ def class_counts(
         solid = SOLID_FRACTION_ESTIMATE * bowl_area_m2 * (media.fill_height_m or 0.0)
         scale = (solid if media.mass_kg is None else media.mass_kg) / of_all
     return _whole_numbers({name: scale * number for name, number in by_number.items()})
+
+
+def few_sizes(radii_m: Array) -> Array:
+    """Ascending radii in at most `MOST_SIZES` sizes, each the mean by volume of some of them."""
+    parts = np.array_split(radii_m, min(MOST_SIZES, len(np.unique(radii_m))))
+    return np.concatenate([np.full(len(part), np.cbrt((part**3).mean())) for part in parts])
 
 
 def class_numbers(particle_id: Ints, first_ids: Sequence[int]) -> Ints:

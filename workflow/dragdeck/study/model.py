@@ -30,6 +30,7 @@ from dragdeck.study.paths.path import turned
 from dragdeck.study.paths.rest import RestPath
 from dragdeck.study.paths.waypoints import WaypointsPath
 from dragdeck.study.reference import Reference
+from dragdeck.study.removal import Removal
 from dragdeck.study.superposed.motion import SuperposedMotion
 from dragdeck.study.superposed.oscillation import Oscillation
 from dragdeck.study.superposed.spin import Spin, SpinStage
@@ -276,6 +277,12 @@ class Outputs(Model):
     )
     n_checkpoints: Annotated[Whole, Field(ge=0, le=1000)] = Field(
         default=50, description="number of checkpoints of a run, from which it can be resumed"
+    )
+    first_touch_fraction: Annotated[Number, Field(ge=0, le=1)] = Field(
+        default=0,
+        description="part of the drag, at its end, in which the contacts on the workpiece are "
+        "written at every step, for the velocity at first touch; 0: none",
+        exclude_if=lambda value: value == 0,
     )
 
     @model_validator(mode="after")
@@ -543,6 +550,7 @@ class Study(Model):
     accepted: Accepted = Accepted()
     assumptions: list[Assumption] = Field(default_factory=list)
     reference: Reference | None = None
+    removal: Removal | None = Field(default=None, exclude_if=lambda value: value is None)
 
     def of_each_workpiece(self) -> Sequence["Study"]:
         """The study of each workpiece alone, its path and its place of immersion turned.
@@ -592,6 +600,14 @@ class Study(Model):
     def particle_count(self) -> int:
         """Number of particles."""
         return sum(self.class_counts.values())
+
+    @property
+    def sphere_count(self) -> int:
+        """Number of spheres in LIGGGHTS: more than that of particles if these are clumps."""
+        media = self.media
+        return sum(
+            count * media.spheres_of(media.parts[name]) for name, count in self.class_counts.items()
+        )
 
     def pair(self, first: str, second: str) -> Pair:
         """The contact coefficients of two materials.

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 from pydantic import JsonValue
 
 from dragdeck.errors import InputError
+from dragdeck.mesh.clump import convex_corners
 from dragdeck.study.base import Json
 from dragdeck.study.media import MOST_SIEVES, Sieve
 from dragdeck.study.paths.waypoints import MOST_POINTS, Waypoint
@@ -33,10 +34,10 @@ def with_recording(data: Json, study: Path) -> tuple[Json, Places]:
     if isinstance(motion, dict) and "path" in motion:
         data = {**data, "motion": {**motion, "path": _waypoints(motion.get("path"), study, places)}}
     if isinstance(media, dict):
-        media, classes = _sieved(media, "media", study, places), media.get("classes")
+        media, classes = _with_files(media, "media", study, places), media.get("classes")
         if isinstance(classes, dict):
             fields = {name: f"media.classes.{name}" for name in classes}
-            parts = {k: _sieved(v, fields[k], study, places) for k, v in classes.items()}
+            parts = {k: _with_files(v, fields[k], study, places) for k, v in classes.items()}
             media = {**media, "classes": parts}
         data = {**data, "media": media}
     return data, places
@@ -52,6 +53,16 @@ def _waypoints(path: Any, study: Path, places: dict[str | None, _Place]) -> Any:
     file = recorded_file(name, study, "motion.path.file")
     points = _read(file, Waypoint, MOST_POINTS, "motion.path.points", places)
     return {**path, "file": None, "points": points}
+
+
+def _with_files(grains: Any, field: str, study: Path, places: dict[str | None, _Place]) -> Any:
+    """A class of the media with its sieve analysis and its body, if it names files of them."""
+    grains = _sieved(grains, field, study, places)
+    shape = grains.get("shape") if isinstance(grains, dict) else None
+    if not isinstance(shape, dict) or not isinstance(shape.get("points"), str):
+        return grains
+    file = recorded_file(shape["points"], study, f"{field}.shape.points")
+    return {**grains, "shape": {**shape, "points": convex_corners(file).tolist()}}
 
 
 def _sieved(grains: Any, field: str, study: Path, places: dict[str | None, _Place]) -> Any:

@@ -1,0 +1,286 @@
+"""Removal from a workpiece: what the loads of its packings and the coefficient of a law predict.
+
+The scatter of the load and the uncertainty of the coefficient are kept apart, and joined by the
+approximation of Welch (1947) and Satterthwaite (1946); see ``benchmarks/removal_coverage.py``.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+from scipy.special import chdtri, stdtrit
+
+from dragchain.arrays import Floats
+from dragchain.errors import TableError
+from dragchain.loading.wear import TOUCH_QUANTITIES, Wear
+from dragchain.report.cases import ReportedCase
+from dragchain.run.kinematics import axis_speed
+from dragchain.statistics.correlated import SLOW_WAVES
+from dragchain.statistics.estimate import (
+    CONFIDENCE,
+    NORMAL_QUANTILE,
+    Estimate,
+    mean_of,
+    student_quantile,
+)
+from dragdeck.study.removal import Removal
+
+UM_PER_H = 3600e6
+"""A depth per time in micrometres per hour over that in m/s."""
+
+_ROUNDED_S = 1800.0
+"""Time after which the radius of an edge is reported."""
+
+
+def joined(scatter: ArrayLike, known: ArrayLike, degrees: float) -> Floats:
+    """Half-widths of 95 % intervals, (...,), of which one has such degrees of freedom, as one."""
+    square = np.maximum(np.asarray(scatter) / student_quantile(degrees), 1e-60) ** 2
+    total = square + (np.asarray(known) / NORMAL_QUANTILE) ** 2
+    return np.asarray(stdtrit(degrees * (total / square) ** 2, 0.5 + CONFIDENCE / 2) * total**0.5)
+
+
+class Parted(NamedTuple):
+    """A positive number with the relative half-widths of its two 95 % intervals.
+
+    `degrees`: degrees of freedom of that by the scatter of the load.
+    """
+
+    value: float
+    scatter: float
+    coefficient: float
+    degrees: float = math.inf
+
+    def within(self, half: float) -> Estimate:
+        """With an interval of this relative half-width, not below zero."""
+        return Estimate(self.value, self.value * max(0.0, 1 - half), self.value * (1 + half))
+
+    @property
+    def combined(self) -> Estimate:
+        """With both together."""
+        return self.within(float(joined(self.scatter, self.coefficient, self.degrees)))
+
+    def times(self, factor: float) -> "Parted":
+        """A multiple."""
+        return self._replace(value=factor * self.value)
+
+
+class Fit(NamedTuple):
+    """Mass loss per time from weighed trials, by weighted least squares through the origin.
+
+    Attributes
+    ----------
+    rate_kg_s, half : float
+        Slope, and relative half-width of its interval; wider by Birge's ratio (1932) if the
+        trials scatter significantly more than by their uncertainties.
+    residuals : sequence of float
+        Measured minus fitted mass loss of each trial in its standard uncertainties.
+    """
+
+    rate_kg_s: float
+    half: float
+    residuals: Sequence[float]
+
+
+def fit_trials(removal: Removal) -> Fit | None:
+    """The fit to the trials of a study, None if its coefficient is given."""
+    if removal.calibrate is None:
+        return None
+    trials = [(one.mass_loss_kg, one.time_s, one.sd_kg) for one in removal.calibrate]
+    mass, time, sd = np.array(trials).T
+    information = float(((time / sd) ** 2).sum())
+    rate = float((mass * time / sd**2).sum()) / information
+    residuals = (mass - rate * time) / sd
+    square, degrees = float((residuals**2).sum()), max(len(trials) - 1, 1)
+    birge = math.sqrt(square / degrees) if square > chdtri(degrees, 1 - CONFIDENCE) else 1.0
+    half = NORMAL_QUANTILE * birge / math.sqrt(information) / rate
+    return Fit(rate, half, residuals.tolist())
+
+
+def predict(
+    removal: Removal, action_w: Estimate, density_kg_m3: float, degrees: float = math.inf
+) -> tuple[Parted, Parted]:
+    """The coefficient, m2/N, and the removed volume per time, m3/s.
+
+    The volume that a trial of the same process has lost does not depend on the simulated load; the
+    coefficient does then, and otherwise the volume. `degrees` are those of the interval of the
+    action.
+    """
+    load = action_w.relative_half_width
+    if fit := fit_trials(removal):
+        rate = Parted(fit.rate_kg_s / density_kg_m3, 0.0, fit.half)
+        return Parted(rate.value / action_w.value, load, fit.half, degrees), rate
+    value = removal.coefficient_m2_n or math.nan
+    half = NORMAL_QUANTILE * (removal.sd_m2_n or 0.0) / value
+    return Parted(value, 0.0, half), Parted(value * action_w.value, load, half, degrees)
+
+
+def patch_means(densities: Floats, errors: Floats) -> tuple[Floats, Floats, int]:
+    """Means over P packings of (P, M) values, their standard errors, and degrees of freedom.
+
+    Between packings; of one packing by its own standard errors, (P, M).
+    """
+    packings = len(densities)
+    if packings == 1:
+        return densities[0], errors[0], SLOW_WAVES
+    error = densities.std(axis=0, ddof=1) / math.sqrt(packings)
+    return densities.mean(axis=0), error, packings - 1
+
+
+@dataclass(frozen=True)
+class RemovalOfCase:
+    """The removal of a case.
+
+    Attributes
+    ----------
+    removal : Removal
+    fit : Fit or None
+        To the trials, if there are any.
+    edges : sequence of (str, Estimate, float)
+        Of each band along sharp edges: its distances in mm, depth per hour and, after half an
+        hour, the radius of the edge, both in micrometres.
+    edge_length_m : float
+    facets : DataFrame
+        ``area_m2``, ``immersed``, and of the patch of each facet the depth of removal per time
+        ``depth_m_s``, its standard error by the scatter of the load ``depth_m_s_se``, and the ends
+        of its combined 95 % interval.
+    impact_share : Estimate
+        Part of the removal that comes from impacts.
+    depth_um_h, mass_mg_h, coefficient_m2_n : Parted
+        Mean depth over the immersed surface and mass loss per process time, and the coefficient.
+    variation : (float, float)
+        Coefficient of variation of the depth over the immersed area, and that without the scatter.
+    percentiles_um_h : (float, float)
+        Depths below which 5 % and 95 % of the immersed area stay.
+    """
+
+    removal: Removal
+    fit: Fit | None
+    edges: Sequence[tuple[str, Estimate, float]]
+    edge_length_m: float
+    facets: pd.DataFrame
+    impact_share: Estimate
+    depth_um_h: Parted
+    mass_mg_h: Parted
+    coefficient_m2_n: Parted
+    variation: tuple[float, float]
+    percentiles_um_h: tuple[float, float]
+
+    @property
+    def minutes(self) -> Mapping[str, Estimate]:
+        """Minutes to the target depth, on average and where it takes longest."""
+        target_um, mean = 1e6 * (self.removal.target_depth_m or 0.0), self.depth_um_h
+        slow = mean.times(self.percentiles_um_h[0] / mean.value)
+        found = {"mean depth": mean, "95 % of the immersed area": slow}
+        return {name: _time_to(target_um, one.combined) for name, one in found.items() if target_um}
+
+
+def _time_to(depth_um: float, um_h: Estimate) -> Estimate:
+    """Minutes to a depth; without limit if the depth per time may be zero."""
+    ends = (um_h.value, um_h.ci95_high, um_h.ci95_low)
+    return Estimate(*(60 * depth_um / one if one else math.inf for one in ends))
+
+
+def removal_of(case: ReportedCase) -> RemovalOfCase | None:
+    """The removal of a case whose study has a law, None if it has none.
+
+    Raises
+    ------
+    TableError
+        If a run of it lacks ``wear.json``, or nothing that the law reads has happened.
+    """
+    first, load = case.first.process.case, case.values.of("force_slide")
+    removal, wears = first.removal, [study.wear for study in case.studies if study.wear]
+    if removal is None or load is None:
+        return None
+    folder, factor = case.first.process.folder, 1.0
+    if len(wears) < len(case.studies):
+        raise TableError(f"{folder}: no wear.json: make it with: dragchain loading {folder}")
+    action = _over_packings([one.action_w for one in wears])
+    if not removal.laws[-1].impact:  # of impacts, windows give nothing
+        factor = load.shown.value / load.run.value
+        action = load.shown.over(first.fidelity.speed_factor / axis_speed(first))
+    if not action.value:
+        raise TableError(f"{folder}: the law {removal.law} finds no action: use a longer path or a "
+                         "larger outputs.first_touch_fraction")  # fmt: skip
+    density = first.inputs[f"materials.{first.inputs['workpiece.material']}.density_kg_m3"]
+    assert isinstance(density, float | int)
+    between = len(wears) > 1 and not load.corrected
+    degrees = len(wears) - 1 if between else math.inf
+    coefficient, rate = predict(removal, action, density, degrees)
+    facets = _facets(wears, coefficient.value * factor, rate.coefficient)
+    own = facets[facets["immersed"]]
+    depth, error, area = own[["depth_m_s", "depth_m_s_se", "area_m2"]].to_numpy(np.float64).T
+    mean = float(np.average(depth, weights=area))
+    square, scatter = (float(np.average(x**2, weights=area)) for x in (depth - mean, error))
+    ends = np.quantile(UM_PER_H * depth, (0.05, 0.95), weights=area, method="inverted_cdf")
+    edges = wears[0].edges
+    return RemovalOfCase(
+        removal=removal,
+        fit=fit_trials(removal),
+        edges=() if removal.laws[0].impact else _bands(wears, coefficient.value * factor, rate),
+        edge_length_m=edges.length_m if edges else 0.0,
+        facets=facets,
+        impact_share=_over_packings([one.impact_share for one in wears]),
+        depth_um_h=rate.times(UM_PER_H / float(area.sum())),
+        mass_mg_h=rate.times(UM_PER_H * density),
+        coefficient_m2_n=coefficient,
+        variation=(math.sqrt(square) / mean, math.sqrt(max(0.0, square - scatter)) / mean),
+        percentiles_um_h=(float(ends[0]), float(ends[1])),
+    )
+
+
+def _facets(wears: Sequence[Wear], scale: float, uncertainty: float) -> pd.DataFrame:
+    """The map of the depth of removal per time; see `RemovalOfCase`."""
+    found = [np.array([one.patch_w_m2, one.patch_se_w_m2]) for one in wears]
+    densities, errors = scale * np.swapaxes(found, 0, 1)
+    mean, error, degrees = patch_means(densities, errors)
+    half = joined(student_quantile(degrees) * error, mean * uncertainty, degrees)
+    columns = {
+        "area_m2": wears[0].area_m2,
+        "immersed": wears[0].immersed,
+        "depth_m_s": mean,
+        "depth_m_s_se": error,
+        "depth_ci95_low_m_s": np.maximum(mean - half, 0.0),
+        "depth_ci95_high_m_s": mean + half,
+    }
+    return pd.DataFrame(columns)
+
+
+def _over_packings(values: Sequence[Estimate]) -> Estimate:
+    return values[0] if len(values) == 1 else mean_of([one.value for one in values])
+
+
+def _bands(wears: Sequence[Wear], scale: float, rate: Parted) -> list[tuple[str, Estimate, float]]:
+    """The bands along sharp edges; see `RemovalOfCase`.
+
+    By volume balance, all removal nearer to the edge than the far side of a band rounds it: an edge
+    of the interior angle b with the radius r lacks ``r^2 (1/tan(b/2) - (pi - b)/2)``.
+    """
+    found, several, summed = list[tuple[str, Estimate, float]](), [one.edges for one in wears], 0.0
+    if (edges := several[0]) is None:
+        return found
+    lacks = 1 / math.tan(edges.angle_rad / 2) - (math.pi - edges.angle_rad) / 2
+    for band, (near, far) in enumerate(pairwise(edges.distance_m)):
+        own = _over_packings([one.action_w.at(band) for one in several if one])
+        summed += scale * own.value
+        half = own.relative_half_width if own.value else 0.0
+        depth = Parted(UM_PER_H * scale * own.value / edges.area_m2[band], half, *rate[2:])
+        radius = 1e6 * math.sqrt(summed * _ROUNDED_S / edges.length_m / lacks)
+        found.append((f"{1e3 * near:.2g} to {1e3 * far:.2g}", depth.combined, radius))
+    return found
+
+
+def touch_rows(case: ReportedCase) -> list[tuple[str, Estimate, Estimate]]:
+    """Median and 95th percentile over the first touches, means over packings, in report units."""
+    found = [one.wear.touches.quantities for one in case.studies if one.wear and one.wear.touches]
+    rows = list[tuple[str, Estimate, Estimate]]()
+    for name, (label, factor) in TOUCH_QUANTITIES.items() if found else ():
+        p50, p95 = (mean_of([factor * getattr(one[name], end) for one in found])
+                    for end in ("p50", "p95"))  # fmt: skip
+        rows.append((label, p50, p95))
+    return rows

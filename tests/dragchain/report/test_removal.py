@@ -1,0 +1,141 @@
+"""Removal that loads and a coefficient predict, and its section of the report."""
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from loading_files import PLATE, made_contacts, write_run
+from loading_files import case_json as contact_case
+from report_files import PICTURES, case_json, make_run, page_of, process_findings
+
+from dragchain.errors import TableError
+from dragchain.loading.document import Loading
+from dragchain.loading.write import write_loading
+from dragchain.report.removal import Parted, fit_trials, joined, patch_means, predict
+from dragchain.report.study_report import write_study_report
+from dragchain.statistics.estimate import Estimate, student_quantile
+from dragdeck.study.removal import Removal
+
+GIVEN = {"coefficient_m2_n": 2e-11, "sd_m2_n": 1e-12, "target_depth_m": 1e-6}
+TRIAL = {"mass_loss_kg": 2e-5, "time_s": 3600.0, "sd_kg": 1e-6}
+LOAD = Estimate(4e-3, 3e-3, 5e-3)
+Z = 1.959964
+
+
+def test_a_given_coefficient_and_the_load_share_the_uncertainty_of_the_volume() -> None:
+    coefficient, rate = predict(Removal.model_validate(GIVEN), LOAD, 7800.0)
+    assert rate == Parted(pytest.approx(8e-14), pytest.approx(0.25), pytest.approx(0.05 * Z))
+    assert coefficient == Parted(2e-11, 0.0, pytest.approx(0.05 * Z))
+    half = math.hypot(0.25, 0.05 * Z)
+    assert rate.combined.ci95_high == pytest.approx(8e-14 * (1 + half))
+
+
+def test_a_trial_gives_the_volume_and_with_the_load_the_coefficient() -> None:
+    coefficient, rate = predict(Removal(calibrate=[TRIAL]), LOAD, 7800.0)
+    volume = 2e-5 / 3600 / 7800
+    assert rate == Parted(pytest.approx(volume), 0.0, pytest.approx(0.05 * Z))
+    assert coefficient.value == pytest.approx(volume / 4e-3)
+    assert (coefficient.scatter, coefficient.coefficient) == pytest.approx((0.25, 0.05 * Z))
+
+
+def test_intervals_join_by_welch_and_satterthwaite() -> None:
+    """Equal standard errors, one with 2 degrees of freedom: 8 in all."""
+    halves = student_quantile(2) * 0.1, Z * 0.1
+    assert joined(*halves, 2) == pytest.approx(student_quantile(8) * 0.1 * math.sqrt(2), rel=1e-6)
+    assert joined(halves[0], 0.0, 2) == pytest.approx(halves[0])
+    assert joined(0.0, halves[1], 2) == pytest.approx(halves[1])
+    np.testing.assert_allclose(joined([0.3, 0.0], [0.4, 0.4], math.inf), [0.5, 0.4])
+
+
+@pytest.mark.parametrize(("off", "birge"), [(0.5, 1.0), (6.0, 6.0)])
+def test_several_trials_are_fitted_through_the_origin(off: float, birge: float) -> None:
+    """Of two equal trials that are off by as many standard uncertainties, up and down."""
+    sd = 1e-6
+    trials = [TRIAL | {"mass_loss_kg": 2e-5 + sign * off * sd / math.sqrt(2)} for sign in (1, -1)]
+    fit = fit_trials(Removal(calibrate=trials))
+    assert fit is not None
+    assert fit.rate_kg_s == pytest.approx(2e-5 / 3600)
+    assert fit.residuals == pytest.approx([off / math.sqrt(2), -off / math.sqrt(2)])
+    assert fit.half == pytest.approx(Z * birge * 0.05 / math.sqrt(2))
+
+
+def test_longer_and_better_trials_count_more() -> None:
+    fit = fit_trials(Removal(calibrate=[
+        {"mass_loss_kg": 1e-5, "time_s": 1000, "sd_kg": 1e-6},
+        {"mass_loss_kg": 4e-5, "time_s": 2000, "sd_kg": 2e-6},
+    ]))  # fmt: skip
+    assert fit is not None
+    weights = np.array([1000 / 1e-12, 2000 / 4e-12])
+    expected = weights @ [1e-5, 4e-5] / (weights @ [1000, 2000])
+    assert fit.rate_kg_s == pytest.approx(expected)
+
+
+def test_patches_have_the_scatter_between_packings_or_else_over_time() -> None:
+    values, errors = np.array([[1.0, 5.0], [3.0, 5.0]]), np.array([[0.1, 0.2]] * 2)
+    mean, error, degrees = patch_means(values, errors)
+    np.testing.assert_allclose([mean, error], [[2.0, 5.0], [1.0, 0.0]])
+    assert degrees == 1
+    mean, error, degrees = patch_means(values[:1], errors[:1])
+    np.testing.assert_allclose([mean, error], [[1.0, 5.0], [0.1, 0.2]])
+    assert degrees == 8
+
+
+# --- report --------------------------------------------------------------------------------------
+
+
+def report(tmp_path: Path, removal: dict[str, Any], seeds: int = 1, wear: bool = True) -> Path:
+    """The report on runs whose contacts are those made by hand, 50 % more with each seed."""
+    runs = []
+    for seed in range(seeds):
+        rows = made_contacts()
+        for row in rows:
+            row["normal_force_n"] *= 1 + 0.5 * seed
+            row["tangential_force_n"] *= 1 + 0.5 * seed
+        made = write_run(tmp_path / f"made-{seed}", rows)
+        (made / "case.json").write_text(json.dumps(contact_case() | {"removal": removal}))
+        write_loading(made)
+        inputs = {"workpiece.material": "steel", "materials.steel.density_kg_m3": 7800.0,
+                  "workpiece.shape.kind": "mesh", "seed": seed}  # fmt: skip
+        case = case_json("process", f"run-{seed}", removal=removal, inputs=inputs)
+        run = make_run(tmp_path / "results", case, process_findings(), PICTURES)
+        for file in ("tables/loading.json", *(["tables/wear.json"] if wear else [])):
+            (run / file).write_bytes((made / file).read_bytes())
+        (run / "workpiece.stl").write_text(PLATE)
+        runs.append(run)
+    write_study_report(tmp_path / "out", runs)
+    return tmp_path / "out"
+
+
+def test_the_report_has_depth_mass_and_minutes(tmp_path: Path) -> None:
+    out = report(tmp_path, GIVEN)
+    load = Loading.read(tmp_path / "made-0/tables/loading.json").per_metre["force_slide_n_m"]
+    speed, area = 0.01, 4e-4
+    depth_m_s = 2e-11 * load.value * speed / area
+    facets = pd.read_csv(out / "run-0-removal.csv")
+    seen = facets["depth_m_s"] @ facets["area_m2"] / area
+    assert seen == pytest.approx(2e-11 * load.value * 0.1 / area)  # of a run ten times as fast
+    page = page_of(out)
+    assert page.open == []
+    assert f"{3600e6 * depth_m_s:.3g} " in page.words
+    assert "law ignores" in page.words
+    assert "min (mean depth)" in page.words
+    assert "Young's modulus \N{MULTIPLICATION SIGN} 0.01" in page.words
+    assert "not corrected" in page.words
+
+
+def test_packings_are_one_removal_with_the_scatter_between_them(tmp_path: Path) -> None:
+    out = report(tmp_path, {"calibrate": TRIAL}, seeds=3)
+    assert len(list(out.glob("*-removal.csv"))) == 1
+    facets = pd.read_csv(out / "run-0-removal.csv")
+    loaded = facets[facets["depth_m_s"] > 0]
+    np.testing.assert_allclose(loaded["depth_m_s_se"] / loaded["depth_m_s"], 0.5 / 1.5 / 3**0.5)
+    assert "fitted to 1 weighed trial of this process" in page_of(out).words
+
+
+def test_a_run_without_its_wear_is_named(tmp_path: Path) -> None:
+    with pytest.raises(TableError, match=r"no wear\.json: make it with: dragchain loading"):
+        report(tmp_path, GIVEN, wear=False)

@@ -1,0 +1,189 @@
+"""Removal from the workpiece: the laws of wear, and what their coefficient is from.
+
+`LAWS` is the registry: a new law is an entry. A law gives each contact or impact an action in J;
+times a coefficient in m2/N it is the removed volume. Laws add up: ``archard+oka``.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, field_validator, model_validator
+
+from dragdeck.errors import choices
+from dragdeck.study.base import Model, Positive
+
+_Floats = NDArray[np.float64]
+
+_TELLS = 0.5
+"""With a larger relative uncertainty, the interval of a coefficient reaches zero."""
+
+
+class WeighedTrial(Model):
+    """A trial after which the workpiece was weighed."""
+
+    mass_loss_kg: Positive = Field(description="mass that one workpiece lost in the trial, kg")
+    time_s: Positive = Field(description="duration of the trial, s")
+    sd_kg: Positive = Field(description="standard uncertainty of `mass_loss_kg`, kg")
+
+
+class Removal(Model):
+    """How load becomes removal, for the report; no run depends on it."""
+
+    law: str = Field(
+        default="archard",
+        description="law of removal: `archard`, `finnie`, `oka`, or a sum such as `archard+oka`",
+    )
+    coefficient_m2_n: Positive | None = Field(
+        default=None, description="removed volume per action, m2/N; none: from `calibrate`"
+    )
+    sd_m2_n: Positive | None = Field(
+        default=None, description="standard uncertainty of `coefficient_m2_n`, m2/N"
+    )
+    calibrate: Annotated[list[WeighedTrial], Field(min_length=1, max_length=100)] | None = Field(
+        default=None, description="weighed trial of this process, or a list of those"
+    )
+    impact_ratio: Positive | None = Field(
+        default=None, description="of a sum: coefficient of the impact law over that of sliding"
+    )
+    hardness_pa: Positive | None = Field(
+        default=None, description="Vickers hardness of the workpiece, Pa; of `oka` only"
+    )
+    target_depth_m: Positive | None = Field(
+        default=None, description="depth of removal whose time is reported, m"
+    )
+
+    @field_validator("calibrate", mode="before")
+    @classmethod
+    def _one_or_more(cls, value: Any) -> Any:
+        """One trial is short for a list of it."""
+        return [value] if isinstance(value, Mapping) else value
+
+    @field_validator("law")
+    @classmethod
+    def _of_registry(cls, law: str) -> str:
+        parts = law.split("+")
+        for part in parts:
+            if part not in LAWS:
+                raise ValueError(f"no such law {part!r}: {choices(part, LAWS)}, or a sum of two")
+        if [LAWS[part].impact for part in parts] not in ([False], [True], [False, True]):
+            raise ValueError("a sum has one law of sliding and one of impact: archard+oka")
+        return law
+
+    @model_validator(mode="after")
+    def _whole(self) -> "Removal":
+        trials, own = self.calibrate or [], self.coefficient_m2_n
+        if (own is None) == (not trials):
+            raise ValueError("give either coefficient_m2_n, or calibrate with a weighed trial")
+        if self.sd_m2_n is not None and own is None:
+            raise ValueError("sd_m2_n belongs to coefficient_m2_n: remove it")
+        uncertain = [(own or math.inf, self.sd_m2_n or 0.0, "sd_m2_n")]
+        uncertain += [(one.mass_loss_kg, one.sd_kg, "sd_kg") for one in trials]
+        for value, sd, name in uncertain:
+            if sd >= _TELLS * value:
+                why = f"{name} {sd:g} is half of its value, {value:g}, or more"
+                raise ValueError(f"{why}: the interval of the coefficient would include zero")
+        for name, wanted in (("impact_ratio", "+" in self.law), ("hardness_pa", "oka" in self.law)):
+            if wanted != (getattr(self, name) is not None):
+                verb = "is missing: give it" if wanted else "has no meaning: remove it"
+                raise ValueError(f"{name} {verb} for the law {self.law}")
+        return self
+
+    @property
+    def laws(self) -> Sequence["Law"]:
+        """The laws that are added up."""
+        return [LAWS[part] for part in self.law.split("+")]
+
+
+# --- laws ----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Wearing:
+    """What laws read of N contacts in a sample or of N impacts, (N,) each.
+
+    Attributes
+    ----------
+    force_slide_n_m : array
+        Normal force times sliding distance, N m.
+    mass_kg, radius_m : array
+        Of the particle.
+    normal_m_s, tangential_m_s : array
+        Relative velocity at the contact point at first touch, positive when closing; m/s.
+    """
+
+    force_slide_n_m: _Floats
+    mass_kg: _Floats
+    radius_m: _Floats
+    normal_m_s: _Floats
+    tangential_m_s: _Floats
+
+    @property
+    def double_energy_j(self) -> _Floats:
+        """Mass times the square of the speed, (N,), zero where the surfaces do not close."""
+        square = self.normal_m_s**2 + self.tangential_m_s**2
+        return np.where(self.normal_m_s > 0.0, self.mass_kg * square, 0.0)
+
+    @property
+    def angle_rad(self) -> _Floats:
+        """Angle of impact from the surface, (N,), 0 to pi/2."""
+        return np.arctan2(np.maximum(self.normal_m_s, 0.0), self.tangential_m_s)
+
+
+@dataclass(frozen=True)
+class Law:
+    """A law of removal.
+
+    Attributes
+    ----------
+    title : str
+        With its source.
+    impact : bool
+        Whether it reads impacts at first touch; otherwise contacts in samples.
+    action : callable
+        The action in J of N contacts or impacts, (N,).
+    """
+
+    title: str
+    impact: bool
+    action: Callable[[Wearing, Removal], _Floats]
+
+
+def _finnie(one: Wearing, _: Removal) -> _Floats:
+    """Finnie (1960), with a ratio of normal to tangential force of 2."""
+    angle = one.angle_rad
+    flat = np.sin(2 * angle) - 3 * np.sin(angle) ** 2
+    return one.double_energy_j * np.where(np.tan(angle) <= 1 / 3, flat, np.cos(angle) ** 2 / 3)
+
+
+_OKA_SPEED_M_S, _OKA_DIAMETER_M = 104.0, 326e-6
+
+
+def _oka(one: Wearing, of: Removal) -> _Floats:
+    """Oka et al. (2005), with their constants for sand; hardness in GPa.
+
+    ``m v^2 (v/v')^(k2 - 2) (D/D')^k3 sin(a)^n1 (1 + Hv (1 - sin(a)))^n2``.
+    """
+    hard, sine = (of.hardness_pa or 0.0) / 1e9, np.sin(one.angle_rad)
+    speed = np.hypot(one.normal_m_s, one.tangential_m_s)
+    shape = sine ** (0.71 * hard**0.14) * (1 + hard * (1 - sine)) ** (2.4 * hard**-0.94)
+    fast = (speed / _OKA_SPEED_M_S) ** (2.3 * hard**0.038 - 2)
+    return np.asarray(
+        one.double_energy_j * fast * (2 * one.radius_m / _OKA_DIAMETER_M) ** 0.19 * shape
+    )
+
+
+def _archard(one: Wearing, _: Removal) -> _Floats:
+    """Archard (1953), and Preston (1927) for polishing."""
+    return one.force_slide_n_m
+
+
+LAWS: Mapping[str, Law] = {
+    "archard": Law("normal force times sliding distance (Archard, Preston)", False, _archard),
+    "finnie": Law("erosion by cutting impacts (Finnie 1960)", True, _finnie),
+    "oka": Law("erosion by impacts (Oka et al. 2005)", True, _oka),
+}
+"""The registry of laws."""

@@ -1,0 +1,165 @@
+"""Shapes of particles: a body's proportions and the number of spheres that stand for it.
+
+A shape has no size of its own: `radius_mean_m` and its like are the radius of the sphere of equal
+volume. Bodies are convex, each the convex hull of its corners. A new shape is a class here and its
+name in `AnyShape`.
+"""
+
+import math
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from dragdeck.study.base import Model, Number, Positive, Whole
+
+Corners = NDArray[np.float64]
+
+SOLID_FRACTION_ESTIMATE = 0.59
+"""Solid fraction of a poured bed about twelve particles wide, an estimate used only for
+expectations before the bed exists (measured beds replace it)."""
+
+FEWEST_SPHERES, MOST_SPHERES = 2, 40
+"""Spheres of a clump: LIGGGHTS accepts no single one, and more cost more than a shape is worth."""
+
+_SIDES = 96
+"""Corners of the polygon that stands for a circle: its area is 0.07 % too small."""
+
+MOST_CORNERS = 1000
+"""A body with more corners is described more finely than its spheres can be."""
+
+MOST_ASPECT = 5
+
+_Aspect = Annotated[Number, Field(ge=1 / MOST_ASPECT, le=MOST_ASPECT)]
+
+
+class ParticleShape(Model):
+    """A convex body as a clump of overlapping spheres.
+
+    Mass and inertia are those of the body; spheres stand for its surface only.
+    """
+
+    spheres: Annotated[Whole, Field(ge=FEWEST_SPHERES, le=MOST_SPHERES)] = Field(
+        description=f"number of spheres, 2 to {MOST_SPHERES}; `dragdeck shapes` lists the errors"
+    )
+
+    def corners(self) -> Corners:
+        """Points whose convex hull is the body, (N, 3); their scale is of no importance."""
+        raise NotImplementedError
+
+
+def _ring(height: float, cut: float = 0.0) -> Corners:
+    """A circle of diameter 1 about z, in a plane that is inclined about y by a slope."""
+    angle = math.tau * np.arange(_SIDES) / _SIDES
+    x, y = 0.5 * np.cos(angle), 0.5 * np.sin(angle)
+    return np.column_stack([x, y, height + cut * x])
+
+
+class CylinderParticle(ParticleShape):
+    """A cylinder, its ends straight or cut at an angle."""
+
+    kind: Literal["cylinder"] = Field(description="cylinder: ends straight or cut at an angle")
+    aspect: _Aspect = Field(description="ratio of length to diameter")
+    cut_deg: Annotated[Number, Field(ge=0, le=60)] = Field(
+        default=0.0,
+        description="angle between the two parallel end faces and those of a straight cylinder, "
+        "degrees",
+        exclude_if=lambda value: not value,
+    )
+
+    def corners(self) -> Corners:
+        """The rims of both ends."""
+        cut = math.tan(math.radians(self.cut_deg))
+        return np.vstack([_ring(-self.aspect / 2, cut), _ring(self.aspect / 2, cut)])
+
+
+class ConeParticle(ParticleShape):
+    """A circular cone."""
+
+    kind: Literal["cone"] = Field(description="cone: a circular cone")
+    aspect: _Aspect = Field(description="ratio of height to diameter of the base")
+
+    def corners(self) -> Corners:
+        """The rim of the base and the tip."""
+        return np.vstack([_ring(0.0), [[0.0, 0.0, self.aspect]]])
+
+
+class TetrahedronParticle(ParticleShape):
+    """A regular tetrahedron."""
+
+    kind: Literal["tetrahedron"] = Field(description="tetrahedron: a regular tetrahedron, pyramid")
+
+    def corners(self) -> Corners:
+        """Four corners of a cube."""
+        return np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], dtype=np.float64)
+
+
+class PrismParticle(ParticleShape):
+    """A straight prism on an equilateral triangle."""
+
+    kind: Literal["triangular_prism"] = Field(
+        description="triangular_prism: a straight prism on an equilateral triangle"
+    )
+    aspect: _Aspect = Field(description="ratio of length to the side of the triangle")
+
+    def corners(self) -> Corners:
+        """Three corners of each end."""
+        x, y = [-0.5, 0.5, 0.0], [0.0, 0.0, math.sqrt(0.75)]
+        ends = [np.column_stack([x, y, np.full(3, end)]) for end in (0.0, self.aspect)]
+        return np.vstack(ends)
+
+
+class EllipsoidParticle(ParticleShape):
+    """An ellipsoid."""
+
+    kind: Literal["ellipsoid"] = Field(description="ellipsoid: three half-axes")
+    axes: tuple[Positive, Positive, Positive] = Field(
+        description="proportion of the three half-axes, such as [2, 1, 1]; the largest is at most "
+        "5 times the smallest"
+    )
+
+    @model_validator(mode="after")
+    def _proportion(self) -> Self:
+        ratio = max(self.axes) / min(self.axes)
+        if ratio > MOST_ASPECT:
+            raise ValueError(
+                f"the largest half-axis is {ratio:.3g} times the smallest, more than {MOST_ASPECT}"
+            )
+        return self
+
+    def corners(self) -> Corners:
+        """Points spread evenly over the unit sphere by the golden angle, stretched."""
+        count = MOST_CORNERS
+        z = 1 - (2 * np.arange(count) + 1) / count
+        turn = math.pi * (3 - math.sqrt(5)) * np.arange(count)
+        across = np.sqrt(1 - z**2)
+        return np.column_stack([across * np.cos(turn), across * np.sin(turn), z]) * self.axes
+
+
+class MeshParticle(ParticleShape):
+    """A body of the user's; its size in the file is of no importance."""
+
+    kind: Literal["mesh"] = Field(description="mesh: a convex body from a mesh file")
+    points: Annotated[
+        tuple[tuple[Number, Number, Number], ...], Field(min_length=4, max_length=MOST_CORNERS)
+    ] = Field(
+        description="name of a file beside the study with a closed, convex surface, such as an STL "
+        "file; or a list of its corners"
+    )
+
+    def corners(self) -> Corners:
+        """As given."""
+        return np.array(self.points, dtype=np.float64)
+
+
+AnyShape = Annotated[
+    CylinderParticle
+    | ConeParticle
+    | TetrahedronParticle
+    | PrismParticle
+    | EllipsoidParticle
+    | MeshParticle,
+    Field(discriminator="kind"),
+]
+"""Every shape by its `kind`: the registry."""
