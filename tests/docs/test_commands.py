@@ -120,6 +120,7 @@ def test_an_example_of_a_study_is_valid(project: Path, page: Path, text: str) ->
     folder = project / "studies/example"
     folder.mkdir(exist_ok=True)
     (folder / "path.csv").write_text(WAYPOINTS)
+    shutil.copy(project / "studies/measured_signal/force.csv", folder)
     (folder / "study.yaml").write_text(yaml.safe_dump({**base, "title": "Example", **example}))
     assert Project(project).cases("example")
 
