@@ -194,6 +194,8 @@ class PartOfRun:
             return None
         killed = ending.exit_status < 0 or ending.exit_status >= 128
         how = "was killed" if killed else "ended prematurely without a message"
+        if ending.exit_status == 0:  # a signal between two runs of a script leaves no other trace
+            how = "was stopped on request, or its script ends early"
         return f"LIGGGHTS {how} (exit status {ending.exit_status})"
 
     def _refuse_new_gap(self, checks: list[AcceptanceCheck]) -> None:
