@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -20,7 +21,6 @@ from dragchain.report.cases import (
 )
 from dragchain.report.cost_check import CostRow, answers, cost_rows, prediction_for, read_advice
 from dragchain.report.findings import FIGURES, Findings
-from dragchain.report.measured_signal import SignalComparison, compare_signal
 from dragchain.report.page import (
     NETWORK_PAGE,
     data_uri,
@@ -40,6 +40,9 @@ from dragdeck.files import write_bytes
 from dragdeck.records.advice import OptionEntry
 from dragdeck.records.case import AssumptionOfRun, load_case
 from dragdeck.records.run import RunRecord
+
+if TYPE_CHECKING:
+    from dragchain.report.measured_signal import SignalComparison
 
 # --- runs without a result -----------------------------------------------------------------------
 
@@ -227,7 +230,7 @@ def write_study_report(
         table = summary(studies)
         cases = cases_of(studies)
         removed = [(one, *found) for one in cases if (found := _removed(one))]
-        signals = [one for case in cases if (one := compare_signal(case, signal))]
+        signals = _signals(cases, signal)
         picture = file_uri(preview) if preview else None
         page = _render(sections, cases, table, missing, picture, removed, signals)
         for section, name in zip(sections, _network_pages(sections), strict=True):
@@ -320,7 +323,7 @@ def _render(
     missing: Sequence[MissingRun],
     preview: str | None,
     removed: Sequence[tuple[ReportedCase, RemovalOfCase, str]],
-    signals: Sequence[SignalComparison],
+    signals: Sequence["SignalComparison"],
 ) -> str:
     """The page: HTML that needs no other file and no network."""
     studies = [section.study for section in sections]
@@ -380,7 +383,17 @@ def _engine_runs(studies: Sequence[StudyRuns]) -> list[ReportedRun[Findings]]:
     return [run for run in every.values() if run.case.output_of is None]
 
 
-def _tables(signals: Sequence[SignalComparison]) -> dict[str, pd.DataFrame]:
+def _signals(cases: Sequence[ReportedCase], file: Path | None) -> list["SignalComparison"]:
+    """The comparisons with a measured signal; no other part of the page needs its filters."""
+    references = [one.first.process.case.reference for one in cases]
+    if not any(one and one.signal for one in references):
+        return []
+    from dragchain.report.measured_signal import compare_signal
+
+    return [one for case in cases if (one := compare_signal(case, file))]
+
+
+def _tables(signals: Sequence["SignalComparison"]) -> dict[str, pd.DataFrame]:
     """The comparison with a measured signal, if there is one."""
     found = [one.table() for one in signals if one.differences]
     return {"signal": pd.concat(found, ignore_index=True)} if found else {}
