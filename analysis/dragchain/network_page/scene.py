@@ -268,8 +268,7 @@ def page_scene(run: Run) -> PageScene:
 
 def _clump(bodies: BodiesOfRun) -> dict[str, JsonValue]:
     """First id of clumps of one size, and x, y, z and radius of their spheres, mm."""
-    spheres = np.column_stack([bodies.offsets_m, bodies.radii_m])
-    return {"first": bodies.first_id, "spheres": (1e3 * spheres).tolist()}
+    return {"first": bodies.first_id, "spheres": (1e3 * np.array(bodies.spheres_m)).tolist()}
 
 
 def _colours() -> list[str]:

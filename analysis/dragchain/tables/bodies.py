@@ -40,8 +40,7 @@ class Bodies:
         """
         spheres = spheres.take(np.argsort(spheres.ids("particle_id")))
         ids = spheres.ids("particle_id")
-        last = self.case.bodies[-1]
-        count = last.first_sphere - 1 + last.count * len(last.radii_m)
+        count = self.case.bodies[-1].rows.stop
         wrong = self.case.body_of(ids) != spheres.ids("body_id")
         if not np.array_equal(ids, np.arange(1, count + 1)) or wrong.any():
             raise TableError(
@@ -109,10 +108,8 @@ class Bodies:
 
 def _moving(spheres: Frame, size: BodiesOfRun) -> Columns:
     """Motion of the bodies of one size, from all spheres in the order of their ids."""
-    many, first = len(size.radii_m), size.first_sphere - 1
-    rows = spheres.take(np.arange(first, first + size.count * many))
     places, velocity, spin = (
-        rows.vectors(*names).reshape(size.count, many, 3) for names in (CENTRE, VELOCITY, SPIN)
+        size.by_particle(spheres.vectors(*names)) for names in (CENTRE, VELOCITY, SPIN)
     )
     centre, turned = pose(np.array(size.offsets_m), places)
     arm, spin = places.mean(axis=1) - centre, spin[:, 0]

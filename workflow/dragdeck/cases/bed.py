@@ -1,6 +1,6 @@
 """The media of a study as numbers: radii, Rayleigh time, time steps, neighbour skin."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -19,6 +19,7 @@ from dragdeck.physics.contact_mechanics import (
     stiffness_number,
 )
 from dragdeck.physics.rounding import round_to, rounded, timestep
+from dragdeck.records.case import BodiesOfRun
 from dragdeck.study.media import Array, Media, few_sizes
 from dragdeck.study.model import Study
 from dragdeck.study.shapes import SOLID_FRACTION_ESTIMATE, AnyShape
@@ -87,33 +88,18 @@ _CORE = 0.01
 no clump of one sphere, and nothing reaches this one."""
 
 
-@dataclass(frozen=True)
-class BodySize:
-    """Clumps of one class and size.
+class BodySize(BodiesOfRun):
+    """Clumps of one class and size, with what LIGGGHTS must know of them beside.
 
     Attributes
     ----------
     type : int
         Of their material in LIGGGHTS.
-    radius_m : float
-        Of the sphere of equal volume.
-    density_kg_m3, mass_kg, inertia_kg_m2
-        The last is the three principal moments.
-    count, first_id, first_sphere : int
-        Number of the particles, id of the first one, and of its first sphere.
-    spheres_m : K sequences of float
-        Places of the spheres, in the principal frame about the centre of mass, and radii.
+    density_kg_m3 : float
     """
 
     type: int
-    radius_m: float
     density_kg_m3: float
-    mass_kg: float
-    inertia_kg_m2: Sequence[float]
-    count: int
-    first_id: int
-    first_sphere: int
-    spheres_m: Sequence[Sequence[float]]
 
 
 def body_sizes(study: Study) -> list[BodySize]:
@@ -127,10 +113,21 @@ def body_sizes(study: Study) -> list[BodySize]:
             spheres = np.vstack([spheres, _CORE * spheres])
         for size, count in zip(*map(np.ndarray.tolist, np.unique(one.radii_m, return_counts=True)),
                                strict=True):  # fmt: skip
-            mass = particle_mass(material, size)
-            inertia = (mass * size**2 * one.clump.inertia).tolist()
-            of_size = kind, size, material.density_kg_m3, mass, inertia, count
-            found.append(BodySize(*of_size, body, sphere, (size * spheres).tolist()))
+            mass, scaled = particle_mass(material, size), size * spheres
+            found.append(
+                BodySize(
+                    type=kind,
+                    density_kg_m3=material.density_kg_m3,
+                    first_id=body,
+                    count=count,
+                    first_sphere=sphere,
+                    radius_m=size,
+                    mass_kg=mass,
+                    inertia_kg_m2=(mass * size**2 * one.clump.inertia).tolist(),
+                    offsets_m=scaled[:, :3].tolist(),
+                    radii_m=scaled[:, 3].tolist(),
+                )
+            )
             body, sphere = body + count, sphere + count * len(spheres)
     return found
 

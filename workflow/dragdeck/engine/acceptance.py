@@ -12,7 +12,7 @@ from dragdeck.engine import log
 from dragdeck.engine.checkpoints import is_whole
 from dragdeck.engine.completeness import coverage, part_files, some_frames
 from dragdeck.physics.contact_mechanics import Floats, stability_number
-from dragdeck.physics.rigid import RigidBodies, pose
+from dragdeck.physics.rigid import Ints, RigidBodies, pose
 from dragdeck.records.case import CaseOfRun
 from dragdeck.records.run import (
     AcceptanceCheck,
@@ -227,30 +227,26 @@ def _stability_number(case: CaseOfRun, rows: Floats) -> float:
     """That of centres, radii and ids; infinite for those of no packing."""
     if not (rows.size and np.isfinite(rows).all()):
         return math.inf
+    rows = rows[np.argsort(rows[:, 4])] if case.bodies else rows
     ids = rows[:, 4].astype(np.int64)
+    ids = case.body_of(ids) if case.bodies else ids
     bodies = [*(one.name for one in case.classes), "bowl"] if case.classes else ["particle", "bowl"]
     constants = [[one.contact_moduli[body] for body in bodies] for one in case.classes or (case,)]
     of_case = case.density_of(ids), case.bowl.radius_m, constants, case.timestep_s
-    if case.bodies:
-        rows = rows[np.argsort(ids)]
-        classes = case.class_of(case.body_of(np.sort(ids)))
-        return stability_number(rows[:, :3], rows[:, 3], *of_case, classes, _rigid(case, rows))
-    return stability_number(rows[:, :3], rows[:, 3], *of_case, case.class_of(ids))
+    rigid = _rigid(case, rows[:, :3], ids) if case.bodies else None
+    return stability_number(rows[:, :3], rows[:, 3], *of_case, case.class_of(ids), rigid)
 
 
-def _rigid(case: CaseOfRun, rows: Floats) -> RigidBodies:
-    """The bodies of a frame of spheres in the order of their ids."""
+def _rigid(case: CaseOfRun, places_m: Floats, body_id: Ints) -> RigidBodies:
+    """The bodies of (N,) spheres in the order of their ids."""
     centres, masses, roots = [], [], []
     for one in case.bodies:
-        many, first = len(one.radii_m), one.first_sphere - 1
-        own = rows[first : first + one.count * many, :3].reshape(one.count, many, 3)
-        centre, turned = pose(np.array(one.offsets_m), own)
+        centre, turned = pose(np.array(one.offsets_m), one.by_particle(places_m))
         axes = turned.as_matrix()
         centres.append(centre)
         masses.append(np.full(one.count, one.mass_kg))
         roots.append(axes / np.sqrt(one.inertia_kg_m2) @ axes.transpose(0, 2, 1))
-    body = case.body_of(rows[:, 4].astype(np.int64)) - 1
-    return RigidBodies(body, *map(np.concatenate, (centres, masses, roots)))
+    return RigidBodies(body_id - 1, *map(np.concatenate, (centres, masses, roots)))
 
 
 def ranks_check(split: Decomposition | None, ranks: int) -> AcceptanceCheck:

@@ -128,6 +128,22 @@ class BodiesOfRun(Part):
     offsets_m: tuple[tuple[float, float, float], ...]
     radii_m: tuple[PositiveFloat, ...]
 
+    @property
+    def spheres_m(self) -> list[list[float]]:
+        """Place and radius of each sphere of a particle, m."""
+        pairs = zip(self.offsets_m, self.radii_m, strict=True)
+        return [[*place, radius] for place, radius in pairs]
+
+    @property
+    def rows(self) -> slice:
+        """The spheres of all these particles, in rows of all spheres in the order of their ids."""
+        first = self.first_sphere - 1
+        return slice(first, first + self.count * len(self.radii_m))
+
+    def by_particle(self, values: Floats) -> Floats:
+        """Values of all spheres, (N, C), in the order of their ids, as (particle, sphere, C)."""
+        return values[self.rows].reshape(self.count, len(self.radii_m), -1)
+
 
 class BowlOfRun(Part):
     """The bowl: a cylinder about the z axis with its floor at z = 0.

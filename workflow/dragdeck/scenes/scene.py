@@ -29,7 +29,6 @@ from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import round_to
 from dragdeck.records.case import (
     AssumptionOfRun,
-    BodiesOfRun,
     BowlOfRun,
     CaseOfRun,
     ClassOfRun,
@@ -198,7 +197,7 @@ def case_of_study(
         "contact_moduli": _contact_moduli(study, main, fidelity.youngs_modulus_scale),
         "attractive": _attractive(study, main, fidelity.youngs_modulus_scale),
         "classes": _classes(study, fidelity.youngs_modulus_scale),
-        "bodies": _bodies_of(study),
+        "bodies": body_sizes(study),
         "assumptions": [*_assumptions(study), *assumed],
         "reference": study.reference,
         "versions": {"dragdeck": __version__},
@@ -265,23 +264,6 @@ def _classes(study: Study, scale: float) -> tuple[ClassOfRun, ...]:
         )
         first += len(one.radii_m)
     return tuple(found)
-
-
-def _bodies_of(study: Study) -> tuple[BodiesOfRun, ...]:
-    """The particles by class and size, if they are clumps."""
-    return tuple(
-        BodiesOfRun(
-            first_id=one.first_id,
-            count=one.count,
-            first_sphere=one.first_sphere,
-            radius_m=one.radius_m,
-            mass_kg=one.mass_kg,
-            inertia_kg_m2=one.inertia_kg_m2,
-            offsets_m=[sphere[:3] for sphere in one.spheres_m],
-            radii_m=[sphere[3] for sphere in one.spheres_m],
-        )
-        for one in body_sizes(study)
-    )
 
 
 def _bodies(study: Study) -> dict[str, str]:
