@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 from scipy.signal import lfilter
 
-from dragchain.report.removal import joined, patch_means, predict
+from dragchain.report.removal import joined_half_width, patch_means, predict
 from dragchain.statistics.correlated import estimate_mean, slow_error
 from dragchain.statistics.estimate import Estimate, mean_of, student_quantile
 from dragdeck.study.removal import Removal
@@ -45,7 +45,7 @@ def contained(random: np.random.Generator, packings: int, trials: int) -> dict[s
     )
     errors = np.array([[slow_error(one)[0] for one in each] for each in series])
     mean, error, degrees = patch_means(series.mean(axis=2), errors)
-    half = joined(student_quantile(degrees) * error, mean * rate.coefficient, degrees)
+    half = joined_half_width(student_quantile(degrees) * error, mean * rate.coefficient, degrees)
     depth = Estimate.around(mean[0], half[0])
     return {
         "volume": rate.combined.contains(TRUE_M2_N * true.sum()),

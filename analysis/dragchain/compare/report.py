@@ -125,8 +125,8 @@ def _difference(quantity: Quantity, first: ComparedCase, other: ComparedCase) ->
     if paired:
         change = mean_of([own[1][seed] - own[0][seed] for seed in own[0]])
     else:
-        widths = [one.ci95_high - one.ci95_low for one in (before, after)]
-        change = Estimate.around(after.value - before.value, 0.5 * math.hypot(*widths))
+        half = math.hypot(before.half_width, after.half_width)
+        change = Estimate.around(after.value - before.value, half)
     basis = str(next(iter(several[0].values())).basis) if corrected else "as simulated"
     return CaseDifference(other.name, quantity, before, after, change, basis, paired)
 

@@ -147,13 +147,13 @@ def _types(sampled: Sampled, events: pd.DataFrame, event: Ints) -> dict[str, Con
         name: ContactType(
             events=int((kind == name).sum()),
             fraction_of={key: next(found) for key in (*_BY_TYPE, "events")},
-            intensity={key: quantiles(events[key][kind == name]) for key in _INTENSITIES},
+            intensity={key: event_quantiles(events[key][kind == name]) for key in _INTENSITIES},
         )
         for name in TYPES
     }
 
 
-def quantiles(values: pd.Series) -> Quantiles:
+def event_quantiles(values: pd.Series) -> Quantiles:
     """Quartiles and 95th percentile of values."""
     return Quantiles.model_validate(
         {f"p{percent}": float(values.quantile(percent / 100)) for percent in (25, 50, 75, 95)}

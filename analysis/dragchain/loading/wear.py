@@ -18,7 +18,7 @@ from dragchain.loading.contact_events import SLIP, find_events
 from dragchain.loading.document import Loading, Quantiles
 from dragchain.loading.edges import EdgeBands, edge_bands
 from dragchain.loading.samples import TOUCHED, Sampled, patches, sample, standard_errors
-from dragchain.loading.summary import quantiles
+from dragchain.loading.summary import event_quantiles
 from dragchain.run.kinematics import needed
 from dragchain.run.workpiece import Surface
 from dragchain.statistics.correlated import estimates
@@ -26,8 +26,9 @@ from dragchain.statistics.estimate import Estimate
 from dragchain.tables.by_step import read_table
 from dragdeck.decks.outputs import TOUCHES, load_outputs
 from dragdeck.documents import Document, Part
+from dragdeck.physics.contact_mechanics import sphere_mass
 from dragdeck.records.case import CaseOfRun
-from dragdeck.study.removal import LAWS, Law, Wearing
+from dragdeck.study.removal import LAWS, Law, Wearing, impact_angle
 
 FILE = Path("tables") / "wear.json"
 
@@ -131,7 +132,7 @@ def compute_wear(
             time_s=part.frames * part.interval_s,
             interval_s=part.interval_s,
             per_s=per_s,
-            quantities={name: quantiles(events[name]) for name in TOUCH_QUANTITIES},
+            quantities={name: event_quantiles(events[name]) for name in TOUCH_QUANTITIES},
         )
         if laws[-1].impact:
             action = impact_action(laws[-1], events, case)
@@ -176,8 +177,8 @@ def _action(
 
 def _sum(parts: Sequence[Estimate]) -> Estimate:
     """The sum of independent estimates."""
-    halves = ((one.ci95_high - one.ci95_low) / 2 for one in parts)
-    return Estimate.around(math.fsum(one.value for one in parts), math.hypot(*halves))
+    half = math.hypot(*(one.half_width for one in parts))
+    return Estimate.around(math.fsum(one.value for one in parts), half)
 
 
 def _share(one: Estimate, others: Sequence[Estimate]) -> Estimate:
@@ -216,7 +217,7 @@ def first_touches(run_dir: Path, part: Sampled, case: CaseOfRun) -> pd.DataFrame
         radius_m=radius,
         touch_normal_m_s=normal,
         touch_tangential_m_s=tangential,
-        impact_angle_rad=np.arctan2(np.maximum(normal, 0.0), tangential),
+        impact_angle_rad=impact_angle(normal, tangential),
         peak_pressure_pa=pressure,
     )
     return found[found["frame"] > 0].reset_index(drop=True)
@@ -228,7 +229,7 @@ def impact_action(law: Law, events: pd.DataFrame, case: CaseOfRun) -> Floats:
     density = case.density_of(events["particle_id"].to_numpy(np.int64))
     wearing = Wearing(
         force_slide_n_m=events["force_slide_n_m"].to_numpy(),
-        mass_kg=density * 4 / 3 * np.pi * radius**3,
+        mass_kg=sphere_mass(radius, density),
         radius_m=radius,
         normal_m_s=events["touch_normal_m_s"].to_numpy(),
         tangential_m_s=events["touch_tangential_m_s"].to_numpy(),

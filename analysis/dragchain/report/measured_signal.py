@@ -188,9 +188,9 @@ def _over_packings(values: Sequence[Estimate]) -> tuple[Estimate, bool]:
         return values[0], False
     within, count = mean_over_packings(values), len(values)
     reliable = all(one.reliable for one in values)
-    own = np.mean([(one.ci95_high - one.ci95_low) ** 2 for one in values]) / (2 * _NORMAL) ** 2
+    own = np.mean([one.half_width**2 for one in values]) / _NORMAL**2
     variance = float(np.var([one.value for one in values], ddof=1))
-    half = (within.ci95_high - within.ci95_low) / 2
+    half = within.half_width
     between = variance * (count - 1) > own * chdtri(count - 1, _BEYOND)
     if between:
         reach = student_quantile(count - 1, JOINT) * math.sqrt(variance * (1 + 1 / count))

@@ -98,10 +98,9 @@ def ends(estimate: Estimate) -> str:
 def _alike(estimate: Estimate) -> tuple[list[str], str]:
     """Value and ends with the same decimals, four digits at most, and their power of ten."""
     numbers = (estimate.value, estimate.ci95_low, estimate.ci95_high)
-    half = 0.5 * (estimate.ci95_high - estimate.ci95_low)
     power = math.floor(math.log10(max(map(abs, numbers))))
     shift = power if power < -3 else 0
-    decimals = max(0, min(1 - math.floor(math.log10(half)), 3 - power) + shift)
+    decimals = max(0, min(1 - math.floor(math.log10(estimate.half_width)), 3 - power) + shift)
     times = f" {TIMES} 10{str(shift).translate(_RAISED)}" if shift else ""
     return [fixed(one / 10.0**shift, decimals) for one in numbers], times
 

@@ -37,7 +37,7 @@ _ROUNDED_S = 1800.0
 """Time after which the radius of an edge is reported."""
 
 
-def joined(scatter: ArrayLike, known: ArrayLike, degrees: float) -> Floats:
+def joined_half_width(scatter: ArrayLike, known: ArrayLike, degrees: float) -> Floats:
     """Half-widths of 95 % intervals, (...,), of which one has such degrees of freedom, as one."""
     square = np.maximum(np.asarray(scatter) / student_quantile(degrees), 1e-60) ** 2
     total = square + (np.asarray(known) / NORMAL_QUANTILE) ** 2
@@ -62,14 +62,14 @@ class Parted(NamedTuple):
     @property
     def combined(self) -> Estimate:
         """With both together."""
-        return self.within(float(joined(self.scatter, self.coefficient, self.degrees)))
+        return self.within(float(joined_half_width(self.scatter, self.coefficient, self.degrees)))
 
     def times(self, factor: float) -> "Parted":
         """A multiple."""
         return self._replace(value=factor * self.value)
 
 
-class Fit(NamedTuple):
+class TrialsFit(NamedTuple):
     """Mass loss per time from weighed trials, by weighted least squares through the origin.
 
     Attributes
@@ -86,7 +86,7 @@ class Fit(NamedTuple):
     residuals: Sequence[float]
 
 
-def fit_trials(removal: Removal) -> Fit | None:
+def fit_trials(removal: Removal) -> TrialsFit | None:
     """The fit to the trials of a study, None if its coefficient is given."""
     if removal.calibrate is None:
         return None
@@ -98,7 +98,7 @@ def fit_trials(removal: Removal) -> Fit | None:
     square, degrees = float((residuals**2).sum()), max(len(trials) - 1, 1)
     birge = math.sqrt(square / degrees) if square > chdtri(degrees, 1 - CONFIDENCE) else 1.0
     half = NORMAL_QUANTILE * birge / math.sqrt(information) / rate
-    return Fit(rate, half, residuals.tolist())
+    return TrialsFit(rate, half, residuals.tolist())
 
 
 def predict(
@@ -138,7 +138,7 @@ class RemovalOfCase:
     Attributes
     ----------
     removal : Removal
-    fit : Fit or None
+    fit : TrialsFit or None
         To the trials, if there are any.
     edges : sequence of (str, Estimate, float)
         Of each band along sharp edges: its distances in mm, depth per hour and, after half an
@@ -159,7 +159,7 @@ class RemovalOfCase:
     """
 
     removal: Removal
-    fit: Fit | None
+    fit: TrialsFit | None
     edges: Sequence[tuple[str, Estimate, float]]
     edge_length_m: float
     facets: pd.DataFrame
@@ -239,7 +239,7 @@ def _facets(wears: Sequence[Wear], scale: float, uncertainty: float) -> pd.DataF
     found = [np.array([one.patch_w_m2, one.patch_se_w_m2]) for one in wears]
     densities, errors = scale * np.swapaxes(found, 0, 1)
     mean, error, degrees = patch_means(densities, errors)
-    half = joined(student_quantile(degrees) * error, mean * uncertainty, degrees)
+    half = joined_half_width(student_quantile(degrees) * error, mean * uncertainty, degrees)
     columns = {
         "area_m2": wears[0].area_m2,
         "immersed": wears[0].immersed,

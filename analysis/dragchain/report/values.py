@@ -335,9 +335,9 @@ def _common(values: Sequence[Estimate], basis: Basis) -> Estimate | None:
 
 def mean_over_packings(values: Sequence[Estimate]) -> Estimate:
     """The mean of values whose intervals include the scatter between packings."""
-    widths = [one.ci95_high - one.ci95_low for one in values]
     mean = math.fsum(one.value for one in values) / len(values)
-    return Estimate.around(mean, 0.5 * math.hypot(*widths) / len(values))
+    half = math.hypot(*(one.half_width for one in values))
+    return Estimate.around(mean, half / len(values))
 
 
 def _of_packings(values: Values) -> Iterator[str]:

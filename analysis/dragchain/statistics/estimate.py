@@ -60,9 +60,14 @@ class Estimate:
         return self.value, self.ci95_low, self.ci95_high
 
     @property
+    def half_width(self) -> float:
+        """Half of the width of the interval."""
+        return (self.ci95_high - self.ci95_low) / 2
+
+    @property
     def relative_half_width(self) -> float:
         """Half-width of the interval over the magnitude of the value."""
-        return abs((self.ci95_high - self.ci95_low) / 2 / self.value)
+        return abs(self.half_width / self.value)
 
     def contains(self, value: float) -> bool:
         """Whether a value is within the interval."""

@@ -197,8 +197,7 @@ def _write_workpiece_contacts(run: Run, file: Path) -> None:
     shared = run.case.bowl.walls == "mesh"
     closure = Closure(limit=SHARED_LIMIT if shared else LIMIT)
     samples = WorkpieceSamples(run.prints("workpiece_force"))
-    own = WORKPIECE_CONTACTS + ((ATTRACTION,) if attracts(run.case) else ())
-    with table_writer(file, _with_classes(own, "workpiece_contacts", run.case)) as table:
+    with table_writer(file, _contact_names(run.case)) as table:
         for frames in run.workpiece_frames():
             force, place = samples.at(frames.step)
             contacts, at = _of_bodies(run.case, frames)
@@ -215,13 +214,17 @@ def _write_workpiece_contacts(run: Run, file: Path) -> None:
 
 def _write_touches(run: Run, file: Path) -> None:
     samples = WorkpieceSamples(run.prints("workpiece_force"))
-    own = WORKPIECE_CONTACTS + ((ATTRACTION,) if attracts(run.case) else ())
-    with table_writer(file, _with_classes(own, "workpiece_contacts", run.case)) as table:
+    with table_writer(file, _contact_names(run.case)) as table:
         for frames in run.workpiece_frames(TOUCHES):
             contacts, at = _of_bodies(run.case, frames)
             steps = frames.step[at]
             place = samples.places_between(steps)
             table.write(workpiece_contact_rows(steps, contacts, place, run.case))
+
+
+def _contact_names(case: CaseOfRun) -> tuple[str, ...]:
+    own = WORKPIECE_CONTACTS + ((ATTRACTION,) if attracts(case) else ())
+    return _with_classes(own, "workpiece_contacts", case)
 
 
 def _of_bodies(case: CaseOfRun, frames: WorkpieceFrames) -> tuple[WallContacts, Ints]:

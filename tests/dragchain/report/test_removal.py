@@ -15,7 +15,7 @@ from report_files import PICTURES, case_json, make_run, page_of, process_finding
 from dragchain.errors import TableError
 from dragchain.loading.document import Loading
 from dragchain.loading.write import write_loading
-from dragchain.report.removal import Parted, fit_trials, joined, patch_means, predict
+from dragchain.report.removal import Parted, fit_trials, joined_half_width, patch_means, predict
 from dragchain.report.study_report import write_study_report
 from dragchain.statistics.estimate import Estimate, student_quantile
 from dragdeck.study.removal import Removal
@@ -45,10 +45,12 @@ def test_a_trial_gives_the_volume_and_with_the_load_the_coefficient() -> None:
 def test_intervals_join_by_welch_and_satterthwaite() -> None:
     """Equal standard errors, one with 2 degrees of freedom: 8 in all."""
     halves = student_quantile(2) * 0.1, Z * 0.1
-    assert joined(*halves, 2) == pytest.approx(student_quantile(8) * 0.1 * math.sqrt(2), rel=1e-6)
-    assert joined(halves[0], 0.0, 2) == pytest.approx(halves[0])
-    assert joined(0.0, halves[1], 2) == pytest.approx(halves[1])
-    np.testing.assert_allclose(joined([0.3, 0.0], [0.4, 0.4], math.inf), [0.5, 0.4])
+    assert joined_half_width(*halves, 2) == pytest.approx(
+        student_quantile(8) * 0.1 * math.sqrt(2), rel=1e-6
+    )
+    assert joined_half_width(halves[0], 0.0, 2) == pytest.approx(halves[0])
+    assert joined_half_width(0.0, halves[1], 2) == pytest.approx(halves[1])
+    np.testing.assert_allclose(joined_half_width([0.3, 0.0], [0.4, 0.4], math.inf), [0.5, 0.4])
 
 
 @pytest.mark.parametrize(("off", "birge"), [(0.5, 1.0), (6.0, 6.0)])

@@ -83,7 +83,7 @@ def particle_mass(material: Material, radius_m: float) -> float:
     return sphere_mass(radius_m, material.density_kg_m3)
 
 
-def sphere_mass(radius_m: Size, density_kg_m3: float) -> Size:
+def sphere_mass(radius_m: Size, density_kg_m3: Size | float) -> Size:
     """Mass of solid spheres, kg."""
     return 4 / 3 * math.pi * radius_m**3 * density_kg_m3
 

@@ -14,6 +14,7 @@ from dragdeck.cases.bed import (
     bed_radii,
     bed_rayleigh_time,
     bed_timestep,
+    bed_volume,
     particle_material,
     widest_skin,
 )
@@ -178,7 +179,7 @@ def _heap(study: Study, rig: Repose, speed_m_s: float) -> _Placed:
     """The cylinder on its glued layer, whose tops are at z = 0."""
     size, inner, radii = study.media.typical_radius_m, rig.cylinder_radius_m, bed_radii(study)
     poured = pour([radii], inner, study.seed)
-    volume = float(4 / 3 * math.pi * (radii**3).sum()) / SOLID_FRACTION_ESTIMATE
+    volume = bed_volume(study) / SOLID_FRACTION_ESTIMATE
     edge = max((3 * volume / math.pi / _FLATTEST) ** (1 / 3), inner) + 4 * size
     line = np.arange(-edge + size, edge - size, 2 * size)
     flat = np.stack(np.meshgrid(line, line)).reshape(2, -1)

@@ -129,8 +129,13 @@ class Wearing:
 
     @property
     def angle_rad(self) -> _Floats:
-        """Angle of impact from the surface, (N,), 0 to pi/2."""
-        return np.arctan2(np.maximum(self.normal_m_s, 0.0), self.tangential_m_s)
+        """Angle of impact, (N,)."""
+        return impact_angle(self.normal_m_s, self.tangential_m_s)
+
+
+def impact_angle(normal_m_s: _Floats, tangential_m_s: _Floats) -> _Floats:
+    """Angle from the surface at which N surfaces close at these velocities, (N,), 0 to pi/2."""
+    return np.arctan2(np.maximum(normal_m_s, 0.0), tangential_m_s)
 
 
 @dataclass(frozen=True)
