@@ -33,10 +33,25 @@ def soft_study() -> dict[str, Any]:
     return data
 
 
-@pytest.fixture(scope="module")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+CLASSES = {
+    "coarse": {"material": "ceramic", "fraction": 0.7, "radius_mean_m": 3.3e-3},
+    "fine": {"material": "steel", "fraction": 0.3, "radius_mean_m": 2.6e-3},
+}
+MEDIA: dict[str, dict[str, Any]] = {
+    "spheres": {},
+    "mixture": {"media": {"count": 350, "classes": CLASSES},
+                "pairs": {"steel-steel": {"restitution": 0.68, "friction": 0.2}}},
+    "clumps": {"media": {"material": "ceramic", "count": 220, "radius_mean_m": 3.27e-3,
+                         "shape": {"kind": "cylinder", "aspect": 1.2, "spheres": 2}}},
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module", params=MEDIA)
+def finished(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A project in which the study was run with windows."""
-    data = soft_study()
+    data, media = soft_study(), MEDIA[request.param]
+    data |= {"media": media.get("media", data["media"])}
+    data["pairs"] |= media.get("pairs", {})
     data["fidelity"] = {
         "youngs_modulus_scale": 0.1, "timestep_fraction": 0.5, "ranks": 1, "windows": WINDOWS,
     }  # fmt: skip

@@ -3,7 +3,7 @@
 // the shader reads by the number of the vertex. Drivers that compute without a graphics card draw this many
 // times faster than instanced geometry.
 import { BufferAttribute, BufferGeometry, DataTexture, FloatType, Mesh, RGBAFormat, Vector3 } from "three";
-import { CLASS_COLOURS, COLOURS, MEDIA, PALE, STEEL, blend, rgb } from "./colours.js";
+import { CLASS_COLOURS, COLOURS, MEDIA, PALE, STEEL, blend, mediaColour, rgb } from "./colours.js";
 import { DOMINANT, QUASI_LINEAR, vector } from "./data.js";
 import { bodyMaterial } from "./shading.js";
 
@@ -96,6 +96,8 @@ export class Media {
     const onPath = look.path ? particlesOnPath(frame) : new Set(),
       measures = { speed: () => frame.speed, displacement: () => this.frames.moved(frame) },
       measure = measures[look.colour]?.();
+    const { classes } = this.frames.head.media,
+      ofClass = (k) => rgb(mediaColour(classes.findLastIndex(({ first }) => first <= frame.id[k])));
     const plain = rgb(MEDIA),
       path = blend(rgb(COLOURS.dominant_path), [1, 1, 1], 0.25);
     this.spheres.clear();
@@ -103,7 +105,8 @@ export class Media {
       const size = onPath.has(k) ? Math.max(look.size, MARKED) : look.size;
       if (size <= 0 || !look.kept[k]) continue;
       const centre = vector(frame.centre, k),
-        tint = measure ? colourOf(measure[k] / look.top) : onPath.has(k) ? path : plain;
+        own = look.colour === "media" ? ofClass(k) : onPath.has(k) ? path : plain,
+        tint = measure ? colourOf(measure[k] / look.top) : own;
       for (const [place, radius] of this.frames.spheres(frame, k)) {
         const at = centre.map((one, axis) => one + size * place[axis]);
         this.spheres.add(k, at, at, size * radius, tint);

@@ -8,6 +8,9 @@ export const PALE = "#dfe3e8",
   STEEL = "#8d98a5",
   CHOSEN = "#d55e00";
 export const CLASS_COLOURS = ["#56657a", "#d55e00", "#0072b2"]; // told apart with any colour vision
+const OF_MEDIA = ["#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00"];
+/** Colour of a class of media by its number. */
+export const mediaColour = (number) => OF_MEDIA[number % OF_MEDIA.length];
 
 export const rgb = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16) / 255);
 

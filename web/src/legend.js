@@ -1,5 +1,6 @@
 // What colours and lengths mean.
 import { digits, make } from "./dom.js";
+import { CLASS_COLOURS, mediaColour } from "./colours.js";
 import { CLASSES } from "./data.js";
 
 const SCALES = {
@@ -9,11 +10,16 @@ const SCALES = {
 };
 
 /** Fill the legend with the scale of the scene and that of the load on the workpiece. */
-export function showLegend(element, { colours, scales }, look, load) {
+export function showLegend(element, { colours, scales, media }, look, load) {
   const key = `${look.colour} ${load?.name}`;
   if (element.dataset.key === key) return;
   element.dataset.key = key;
-  const parts = [look.colour === "class" ? classes() : scale(SCALES[look.colour], scales[look.colour], colours)];
+  const names = media.classes.map(({ name }) => name),
+    lists = {
+      class: () => list("Class of a contact", CLASSES, (kind) => CLASS_COLOURS[kind]),
+      media: () => list("Class of a particle", names, mediaColour),
+    };
+  const parts = [lists[look.colour]?.() ?? scale(SCALES[look.colour], scales[look.colour], colours)];
   if (load) parts.push(scale(`Workpiece: ${load.label} (${load.unit})`, load.top, colours));
   element.replaceChildren(...parts);
 }
@@ -25,9 +31,13 @@ function scale(title, top, colours) {
   return make("div", {}, title, bar, make("div", { className: "ends" }, ...words));
 }
 
-function classes() {
-  const rows = CLASSES.map((name, kind) => make("div", {}, make("i", { className: `class-${kind}` }), name));
-  return make("div", {}, "Class of a contact", ...rows);
+function list(title, names, colourOf) {
+  const rows = names.map((name, number) => {
+    const mark = make("i");
+    mark.style.background = colourOf(number);
+    return make("div", {}, mark, name);
+  });
+  return make("div", {}, title, ...rows);
 }
 
 /** Draw a bar of a round length in mm. */

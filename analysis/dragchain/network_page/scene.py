@@ -256,6 +256,7 @@ def page_scene(run: Run) -> PageScene:
             "count": shown.most,
             "most": MOST_PARTICLES,
             "reach": 1e3 * shown.reach_m(),
+            "classes": [{"name": one.name, "first": one.first_id} for one in case.classes],
         },
         **({"clumps": [_clump(one) for one in case.bodies]} if case.bodies else {}),
         "workpieces": [_workpiece(columns, run, shown, series.steps)],

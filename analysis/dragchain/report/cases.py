@@ -24,7 +24,7 @@ from dragchain.report.findings import (
     Findings,
     ProcessFindings,
 )
-from dragchain.report.page import TIMES, number
+from dragchain.report.page import TIMES, number, with_interval
 from dragchain.report.values import (
     Extrapolated,
     ExtrapolatedQuantity,
@@ -35,6 +35,7 @@ from dragchain.report.values import (
 )
 from dragchain.run.case import changed_inputs, upstream_folders
 from dragchain.run.kinematics import axis_speed, drag_phase, motion_of, needed, path_passed
+from dragchain.statistics.estimate import mean_of
 from dragdeck.errors import DocumentError, RejectedRunError
 from dragdeck.records.case import CaseOfRun, ClassOfRun, load_case
 from dragdeck.records.run import RunRecord, read_accepted
@@ -46,7 +47,7 @@ def set_up(
     case: CaseOfRun,
     packings: int,
     filling: FillingFindings | None,
-    segregation: Sequence[Mapping[str, tuple[float, float]]],
+    findings: Sequence[ProcessFindings],
 ) -> list[tuple[str, str]]:
     """Workpiece, path, speed, media, bowl and settings of a case.
 
@@ -58,8 +59,8 @@ def set_up(
         Number of packings (seeds) that are averaged.
     filling : FillingFindings or None
         Of its packing.
-    segregation : sequence of mapping of str to (float, float)
-        Of each class in each packing, at the start and the end of the drag.
+    findings : sequence of ProcessFindings
+        One per packing.
 
     Returns
     -------
@@ -71,7 +72,7 @@ def set_up(
         ("Path and depth", "; ".join(_path(case))),
         ("Speed", "; ".join(_speed(case))),
         ("Media", "; ".join(_media(case))),
-        *((f"Class {one.name}", "; ".join(_class(one, case, segregation))) for one in case.classes),
+        *((f"Class {one.name}", "; ".join(_class(one, case, findings))) for one in case.classes),
         ("Bowl", "; ".join(_bowl(case, filling))),
         ("Settings", "; ".join(_settings(case, packings))),
     ]
@@ -121,10 +122,8 @@ def _media(case: CaseOfRun) -> Iterator[str]:
     yield f"diameter {_mm(2 * media.radius_mean_m)}{spread}"
 
 
-def _class(
-    one: ClassOfRun, case: CaseOfRun, segregation: Sequence[Mapping[str, tuple[float, float]]]
-) -> Iterator[str]:
-    """Asked and obtained amounts of a class, and how it moves in the bed."""
+def _class(one: ClassOfRun, case: CaseOfRun, findings: Sequence[ProcessFindings]) -> Iterator[str]:
+    """Asked and obtained amounts of a class, how it moves in the bed and loads the workpiece."""
     amounts: Mapping[str, Mapping[str, float]] = {
         "number": {each.name: each.count for each in case.classes},
         "volume": {each.name: each.volume_m3 for each in case.classes},
@@ -132,20 +131,31 @@ def _class(
     }
     of = str(case.inputs.get("media.fractions_of", "mass"))
     asked = case.inputs.get(f"media.classes.{one.name}.fraction")
-    yield f"{number(one.count)} {one.material} spheres"
+    shape = _text(case.inputs.get(f"media.classes.{one.name}.shape.kind"))
+    what = f"particles ({shape.replace('_', ' ')})" if shape else "spheres"
+    yield f"{number(one.count)} {one.material} {what}"
     mean, spread = _mm(2 * one.radius_mean_m), _mm(2 * one.radius_std_m)
     yield f"diameter {mean} \N{PLUS-MINUS SIGN} {spread} (standard deviation)"
     got = amounts[of][one.name] / sum(amounts[of].values())
     yield f"{number(100 * got)} % of the {of}" + (
         f" (asked: {number(100 * asked)} %)" if isinstance(asked, int | float) else ""
     )
-    found = np.array([of_packing[one.name] for of_packing in segregation if of_packing])
+    found = np.array([each.segregation[one.name] for each in findings if each.segregation])
     if len(found):
         start, end = (f"{value:+.3f}" for value in found.mean(axis=0))
         change = np.diff(found, axis=1)[:, 0]
         scatter = f" (standard deviation of the change {change.std(ddof=1):.3f})"
         packings = scatter if len(found) > 1 else ""
         yield f"segregation {start} at the start of the drag, {end} at its end{packings}"
+    if own := [each.by_class[one.name] for each in findings if each.by_class]:
+        contacts, force, part = (
+            values[0] if len(values) == 1 else mean_of([value.value for value in values])
+            for values in zip(*own, strict=True)
+        )
+        yield (
+            f"{with_interval(contacts)} contacts on the workpiece at a time of "
+            f"{with_interval(force, 'N')} each: {with_interval(part.over(0.01), '%')} of the load"
+        )
 
 
 def _bowl(case: CaseOfRun, filling: FillingFindings | None) -> Iterator[str]:
@@ -295,8 +305,8 @@ class ReportedCase:
         """What was simulated, in six lines."""
         filling = self.first.filling
         bed = filling.findings if filling else None
-        moved = [study.process.findings.segregation for study in self.studies]
-        return set_up(self.first.process.case, len(self.studies), bed, moved)
+        findings = [study.process.findings for study in self.studies]
+        return set_up(self.first.process.case, len(self.studies), bed, findings)
 
 
 def cases_of(studies: Iterable[StudyRuns]) -> list[ReportedCase]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from dragchain.run.reference import ReferenceDrag
 from dragchain.statistics.correlated import MeanEstimate
@@ -157,6 +157,24 @@ class Wake(Part):
     ratio: Estimate
 
 
+class OfClass(NamedTuple):
+    """What a class of the media does to the workpiece.
+
+    Attributes
+    ----------
+    contacts : Estimate
+        Contacts at a time.
+    contact_force_n : Estimate
+        Mean normal force of one of them, N.
+    load_fraction : Estimate
+        Part of the normal forces of all classes.
+    """
+
+    contacts: Estimate
+    contact_force_n: Estimate
+    load_fraction: Estimate
+
+
 class Findings(Document):
     """What the findings of every scene have."""
 
@@ -193,6 +211,8 @@ class ProcessFindings(Findings):
     segregation : mapping of str to (float, float)
         Of each class of the media, at the first and the last frame of the drag; see
         `segregation`. Absent if the media have no classes.
+    by_class : mapping of str to OfClass
+        Absent if the media have no classes.
     """
 
     scene: Literal["process"] = "process"
@@ -209,6 +229,7 @@ class ProcessFindings(Findings):
     depth: DepthProfile
     wake: Wake | None = None
     segregation: Mapping[str, tuple[float, float]] = omitted({})
+    by_class: Mapping[str, OfClass] = omitted({})
 
 
 class FillingFindings(Findings):

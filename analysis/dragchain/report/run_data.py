@@ -1,5 +1,6 @@
 """A run with its tables, each read once and only if it is needed, and its findings from them."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -35,13 +36,14 @@ from dragchain.report.findings import (
     DropRestitution,
     FillingFindings,
     Findings,
+    OfClass,
     Peaks,
     ProcessFindings,
     Wake,
 )
 from dragchain.run.kinematics import drag_start_s, needed, path_passed, process_time
 from dragchain.run.reference import reference_drags
-from dragchain.statistics.correlated import estimate_mean
+from dragchain.statistics.correlated import estimate_mean, estimates, frame_sums
 from dragchain.statistics.estimate import CONFIDENCE, EstimateColumns
 from dragchain.tables.bed import segregation
 from dragchain.tables.by_step import read_groups, read_table
@@ -156,6 +158,7 @@ def process_findings(run: RunData) -> ProcessFindings:
     samples = read_counted(run.folder, ("step", "time_s", *FORCES))
     forces = summarise_forces(samples)
     frame, frames, contacts = _workpiece_contacts(run, samples)
+    names = [one.name for one in run.case.classes]
     azimuth, depth, force = (
         contacts[name].to_numpy(np.float64) for name in ("azimuth_rad", "depth_m", "normal_force_n")
     )
@@ -180,8 +183,37 @@ def process_findings(run: RunData) -> ProcessFindings:
             slope_n_per_m=depth_slope(frame, frames, depth, force),
         ),
         wake=_wake(samples, run.case),
-        segregation=_segregation(run) if run.case.classes else {},
+        segregation=_segregation(run) if names else {},
+        by_class=of_classes(names, frame, frames, contacts) if names else {},
     )
+
+
+def of_classes(
+    names: Sequence[str], frame: Ints, frames: int, contacts: pd.DataFrame
+) -> dict[str, OfClass]:
+    """What each class of the media does to the workpiece.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of the classes.
+    frame : (c,) array
+        Frame of each contact, 0 to `frames` - 1.
+    frames : int
+    contacts : DataFrame
+        ``class`` and ``normal_force_n`` of c contacts.
+    """
+    own = (contacts["class"].to_numpy()[:, None] == np.array(names)).astype(np.float64)
+    load = own * contacts["normal_force_n"].to_numpy(np.float64)[:, None]
+
+    def statistic(sums: Floats) -> Floats:
+        count, force = np.split(sums, 2, axis=-1)
+        part = force / force.sum(axis=-1, keepdims=True)
+        return np.concatenate([count, force / count, part], axis=-1)
+
+    found = estimates(frame_sums(frame, frames, np.hstack([own, load])), statistic)
+    each = (found[at :: len(names)] for at in range(len(names)))
+    return {name: OfClass(*one) for name, one in zip(names, each, strict=True)}
 
 
 def _segregation(run: RunData) -> dict[str, tuple[float, float]]:
@@ -253,6 +285,7 @@ def _chains(chains: pd.DataFrame, frames: int) -> Chains:
 def _workpiece_contacts(run: RunData, samples: pd.DataFrame) -> tuple[Ints, int, pd.DataFrame]:
     """Frame of each counted contact, number of frames (those without contact too), contacts."""
     columns = ["step", "azimuth_rad", "depth_m", "normal_force_n", "in_statistics"]
+    columns += ["class"] if run.case.classes else []
     contacts = run.table("workpiece_contacts", columns)
     contacts = contacts[contacts["in_statistics"]]
     output = load_outputs(run.folder)["workpiece_contacts"]

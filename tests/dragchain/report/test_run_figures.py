@@ -18,7 +18,7 @@ from dragchain.figures import network_picture as scene
 from dragchain.figures.rendering import RenderError, check_rendering
 from dragchain.network.frame import SIDE, NetworkFrame
 from dragchain.report.findings import FIGURES, FILE, FillingFindings, ProcessFindings
-from dragchain.report.run_data import RunData, dominant_bottlenecks, process_findings
+from dragchain.report.run_data import RunData, dominant_bottlenecks, of_classes, process_findings
 from dragchain.report.run_figures import energy_ratio, write_figures
 from dragchain.run.reference import reference_drags
 from dragchain.statistics.estimate import Estimate
@@ -61,6 +61,17 @@ def test_findings_of_a_process_are_those_of_its_tables(found: ProcessFindings) -
     assert found.chains.widest_paths_per_frame == 1.0
     assert found.chains.widest_paths_to_side_fraction == 1.0
     assert found.chains.dominant_azimuth_mean_rad == pytest.approx(0.0)
+
+
+def test_classes_share_contacts_and_load() -> None:
+    """In each of 40 frames, three contacts of the coarse class, 2 N each, one of the fine, 1 N."""
+    frame = np.repeat(np.arange(40), 4)
+    kinds = pd.Categorical(["coarse", "coarse", "fine", "coarse"] * 40, ["coarse", "fine", "none"])
+    contacts = pd.DataFrame({"class": kinds, "normal_force_n": [2.0, 2.0, 1.0, 2.0] * 40})
+    found = of_classes(["coarse", "fine", "absent"], frame, 40, contacts)
+    assert [value.value for value in found["coarse"]] == pytest.approx([3, 2, 6 / 7])
+    assert [value.value for value in found["fine"]] == pytest.approx([1, 1, 1 / 7])
+    assert [value.known for value in found["absent"]] == [True, False, True]
 
 
 def test_a_frame_without_a_path_has_no_bottleneck() -> None:

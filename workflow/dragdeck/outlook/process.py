@@ -97,9 +97,9 @@ def _ranks(case: Case) -> str:
 
 
 def not_corrected(case: Case) -> str:
-    """What the results of a process with a reduced modulus lack; empty if nothing."""
+    """What results with a reduced modulus lack; empty if nothing, or for a part of another case."""
     chosen = case.study.chosen_fidelity()
-    if chosen.youngs_modulus_scale == 1 or chosen.windows is not None:
+    if chosen.youngs_modulus_scale == 1 or chosen.windows is not None or case.part:
         return ""
     return (
         f"E x {chosen.youngs_modulus_scale:g} gives more and smaller contact forces than the "
