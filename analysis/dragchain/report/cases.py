@@ -111,15 +111,20 @@ def _media(case: CaseOfRun) -> Iterator[str]:
         what = "particles" if case.bodies else "spheres"
         yield f"{number(media.count)} {what} in {len(case.classes)} classes"
         return
-    shape = _text(case.inputs.get("media.shape.kind"))
-    what = f"particles ({shape.replace('_', ' ')})" if shape else "spheres"
+    what, diameter = _shape(case, "media")
     yield " ".join(filter(None, (number(media.count), material, what)))
     spread = (
         f" \N{PLUS-MINUS SIGN} {_mm(2 * media.radius_std_m)} (standard deviation)"
         if media.radius_std_m
         else ""
     )
-    yield f"diameter {_mm(2 * media.radius_mean_m)}{spread}"
+    yield f"{diameter} {_mm(2 * media.radius_mean_m)}{spread}"
+
+
+def _shape(case: CaseOfRun, media: str) -> tuple[str, str]:
+    """What the particles of a block of the study are, and what their diameter is."""
+    kind = _text(case.inputs.get(f"{media}.shape.kind")).replace("_", " ")
+    return (f"particles ({kind})", "diameter of equal volume") if kind else ("spheres", "diameter")
 
 
 def _class(one: ClassOfRun, case: CaseOfRun, findings: Sequence[ProcessFindings]) -> Iterator[str]:
@@ -131,11 +136,10 @@ def _class(one: ClassOfRun, case: CaseOfRun, findings: Sequence[ProcessFindings]
     }
     of = str(case.inputs.get("media.fractions_of", "mass"))
     asked = case.inputs.get(f"media.classes.{one.name}.fraction")
-    shape = _text(case.inputs.get(f"media.classes.{one.name}.shape.kind"))
-    what = f"particles ({shape.replace('_', ' ')})" if shape else "spheres"
+    what, diameter = _shape(case, f"media.classes.{one.name}")
     yield f"{number(one.count)} {one.material} {what}"
     mean, spread = _mm(2 * one.radius_mean_m), _mm(2 * one.radius_std_m)
-    yield f"diameter {mean} \N{PLUS-MINUS SIGN} {spread} (standard deviation)"
+    yield f"{diameter} {mean} \N{PLUS-MINUS SIGN} {spread} (standard deviation)"
     got = amounts[of][one.name] / sum(amounts[of].values())
     yield f"{number(100 * got)} % of the {of}" + (
         f" (asked: {number(100 * asked)} %)" if isinstance(asked, int | float) else ""

@@ -132,7 +132,7 @@ def _reliability(ours: MeanEstimate) -> str:
 
 
 def _doubt(ours: MeanEstimate | Estimate) -> str:
-    return "" if ours.reliable else " (too few for a reliable CI)"
+    return "" if ours.reliable else " (too few)"
 
 
 def force_around_workpiece(run: RunData, found: ProcessFindings) -> Figure:

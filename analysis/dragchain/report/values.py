@@ -96,9 +96,9 @@ class LoadMap(Part):
     def said(self) -> str:
         """How far both maps are expected to be off, in a sentence."""
         return (
-            f"The load map of the run is off by about {self.soft_error:.0%} of the load at the "
+            f"The load map of the run is off by about {100 * self.soft_error:.0f} % of the load at the "
             f"physical Young's modulus, the corrected one in {EXTRAPOLATED.name} by about "
-            f"{self.error:.0%} (sum of the absolute errors of 48 patches, over the total load)."
+            f"{100 * self.error:.0f} % (sum of the absolute errors of 48 patches, over the total load)."
         )
 
 
