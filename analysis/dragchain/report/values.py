@@ -95,10 +95,11 @@ class LoadMap(Part):
     @property
     def said(self) -> str:
         """How far both maps are expected to be off, in a sentence."""
+        soft, corrected = 100 * self.soft_error, 100 * self.error
         return (
-            f"The load map of the run is off by about {100 * self.soft_error:.0f} % of the load at the "
-            f"physical Young's modulus, the corrected one in {EXTRAPOLATED.name} by about "
-            f"{100 * self.error:.0f} % (sum of the absolute errors of 48 patches, over the total load)."
+            f"The load map of the run is off by about {soft:.0f} % of the load at the physical "
+            f"Young's modulus, the corrected one in {EXTRAPOLATED.name} by about {corrected:.0f} % "
+            "(sum of the absolute errors of 48 patches, over the total load)."
         )
 
 
