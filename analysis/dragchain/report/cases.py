@@ -24,7 +24,7 @@ from dragchain.report.findings import (
     Findings,
     ProcessFindings,
 )
-from dragchain.report.page import TIMES, number, with_interval
+from dragchain.report.page import TIMES, fixed, number, with_interval
 from dragchain.report.values import (
     Extrapolated,
     ExtrapolatedQuantity,
@@ -146,7 +146,7 @@ def _class(one: ClassOfRun, case: CaseOfRun, findings: Sequence[ProcessFindings]
     )
     found = np.array([each.segregation[one.name] for each in findings if each.segregation])
     if len(found):
-        start, end = (f"{value:+.3f}" for value in found.mean(axis=0))
+        start, end = (fixed(value, 3, sign=True) for value in found.mean(axis=0))
         change = np.diff(found, axis=1)[:, 0]
         scatter = f" (standard deviation of the change {change.std(ddof=1):.3f})"
         packings = scatter if len(found) > 1 else ""
