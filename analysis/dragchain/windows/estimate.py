@@ -71,7 +71,7 @@ class WindowsRecord(Document):
     quantities : mapping
     """
 
-    remedy = "make it with: benchmarks/windows.py"
+    remedy = "make it with: python benchmarks/windows_record.py"
 
     measured: str
     source: str
