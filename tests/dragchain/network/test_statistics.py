@@ -25,11 +25,9 @@ from dragchain.network.statistics import (
     FORCE_FACTORS,
     SPANS,
     cluster_rows,
-    contact_counts,
     find_clusters,
     frame_clusters,
     frame_statistics,
-    mechanical_coordination_number,
 )
 from dragchain.network.write import write_chains
 
@@ -78,12 +76,6 @@ def test_statistics_of_a_star() -> None:
     assert found["normal_force_mean_n"] == pytest.approx(3.0)
     assert found["normal_force_max_n"] == 5.0
     assert found["above_mean_fraction"] == pytest.approx(3 / 7)
-
-
-def test_least_of_two_is_the_formula_of_thornton() -> None:
-    # N = 6, N0 = 1 and N1 = 2 by hand; 11 ends of contacts
-    counts = contact_counts(a_frame(STAR, STAR_IDS))
-    assert mechanical_coordination_number(counts, least=2) == pytest.approx((11 - 2) / (6 - 1 - 2))
 
 
 def test_a_frame_without_contacts_is_not_zero_but_unknown() -> None:
