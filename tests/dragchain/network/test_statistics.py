@@ -28,6 +28,7 @@ from dragchain.network.statistics import (
     find_clusters,
     frame_clusters,
     frame_statistics,
+    mechanical_coordination_number,
 )
 from dragchain.network.write import write_chains
 
@@ -76,6 +77,10 @@ def test_statistics_of_a_star() -> None:
     assert found["normal_force_mean_n"] == pytest.approx(3.0)
     assert found["normal_force_max_n"] == 5.0
     assert found["above_mean_fraction"] == pytest.approx(3 / 7)
+
+
+def test_a_particle_with_four_contacts_carries_load() -> None:
+    assert mechanical_coordination_number(np.array([0, 3, 4, 6])) == 5.0
 
 
 def test_a_frame_without_contacts_is_not_zero_but_unknown() -> None:
