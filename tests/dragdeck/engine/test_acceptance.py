@@ -1,6 +1,5 @@
 """What tells a whole output file from one that was cut short."""
 
-import struct
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -25,17 +24,12 @@ LOCAL = output_of_run("contacts", "local", COLUMNS, 1, 0, None)
 CUSTOM = output_of_run("particles", "custom", COLUMNS, 1, 0, None, binary=True)
 
 
-def text_frame(step: int, rows: list[str]) -> str:
-    box = "ITEM: BOX BOUNDS ff ff ff\n0 1\n0 1\n0 1\n"
-    head = f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ENTRIES\n{len(rows)}\n{box}"
-    head += "ITEM: ENTRIES a_id force_n \n"
-    return head + "".join(row + "\n" for row in rows)
+def text_frame(step: int, rows: list[list[float]]) -> bytes:
+    return Raw.text(step, rows, COLUMNS, "local")
 
 
-def binary_frame(step: int, chunks: list[list[float]]) -> bytes:
-    rows = sum(len(chunk) for chunk in chunks) // 2
-    head = struct.pack("<qqi6i6d2i", step, rows, 0, *[1] * 6, *[0.0] * 6, 2, len(chunks))
-    return head + b"".join(struct.pack(f"<i{len(c)}d", len(c), *c) for c in chunks)
+def binary_frame(step: int, rows: list[list[float]], ranks: int) -> bytes:
+    return Raw.binary(step, rows, len(COLUMNS), ranks)
 
 
 @pytest.mark.parametrize(
@@ -45,15 +39,15 @@ def binary_frame(step: int, chunks: list[list[float]]) -> bytes:
         (PRINT, b"step force_n\n10 1.5\n20 1", None),
         (PRINT, b"step force_n\n10 1.5\n20\n", None),
         (PRINT, b"step force_n\n", None),
-        (LOCAL, (text_frame(5, ["1 2"]) + text_frame(9, ["1 2", "3 4"])).encode(), 9),
-        (LOCAL, text_frame(7, []).encode(), 7),
-        (LOCAL, text_frame(9, ["1 2", "3 4"])[:-3].encode(), None),
-        (LOCAL, text_frame(9, ["1 2", "3 4"])[:-4].encode(), None),
+        (LOCAL, text_frame(5, [[1, 2]]) + text_frame(9, [[1, 2], [3, 4]]), 9),
+        (LOCAL, text_frame(7, []), 7),
+        (LOCAL, text_frame(9, [[1, 2], [3, 4]])[:-4], None),
+        (LOCAL, text_frame(9, [[1, 2], [3, 4]])[:-5], None),
         (LOCAL, b"", None),
-        (CUSTOM, binary_frame(3, [[1, 2], []]) + binary_frame(6, [[1, 2, 3, 4]]), 6),
-        (CUSTOM, binary_frame(3, [[]]), 3),
-        (CUSTOM, binary_frame(3, [[1, 2]])[:-1], None),
-        (CUSTOM, (binary_frame(3, [[1, 2]]) * 2)[:-70], None),
+        (CUSTOM, binary_frame(3, [[1, 2]], 2) + binary_frame(6, [[1, 2], [3, 4]], 1), 6),
+        (CUSTOM, binary_frame(3, [], 1), 3),
+        (CUSTOM, binary_frame(3, [[1, 2]], 1)[:-1], None),
+        (CUSTOM, (binary_frame(3, [[1, 2]], 1) * 2)[:-70], None),
         (CUSTOM, b"", None),
     ],
 )

@@ -1,13 +1,13 @@
 """The acceptance check of the time step: on made frames, and on LIGGGHTS."""
 
 import json
-import struct
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from made_run import Raw
 from made_study import Made
 
 from dragdeck.cases.case import Case
@@ -29,15 +29,12 @@ RADIUS = 3e-3
 
 def frame(step: int, overlap_m: float, ranks: int) -> bytes:
     """Two particles on the floor, far from each other, dumped by some ranks."""
-    width = len(OUTPUT.columns)
-    rows = np.zeros((2, width))
+    rows = np.zeros((2, len(OUTPUT.columns)))
     names = [column.name for column in OUTPUT.columns]
     rows[:, names.index("x_m")] = -0.01, 0.01
     rows[:, names.index("z_m")] = RADIUS - overlap_m
     rows[:, names.index("radius_m")] = RADIUS
-    head = struct.pack("<qqi6i6d2i", step, 2, 0, *[1] * 6, *[0.0] * 6, width, ranks)
-    chunks = [rows] if ranks == 1 else [rows[:1], rows[1:]]
-    return head + b"".join(struct.pack("<i", part.size) + part.tobytes() for part in chunks)
+    return Raw.binary(step, rows, len(names), ranks)
 
 
 def checked(
