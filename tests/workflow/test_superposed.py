@@ -15,6 +15,8 @@ from paths import ROOT, SMALL_STUDY
 from plate import FRICTION, GRAVITY, MASS, engine, write_plate
 
 from dragchain import load_case, write_tables
+from dragchain.loading.samples import TOUCHED, sample
+from dragchain.loading.wear import first_touches
 from dragchain.loading.write import compute_loading
 from dragchain.run.kinematics import (
     axis_speed,
@@ -131,12 +133,16 @@ class Runs:
         self.beds: dict[int, Bed] = {}
         self.done: dict[str, Path] = {}
 
-    def rendered(self, count: int, force_hz: float = 1000, **motion: Any) -> Path:
+    def rendered(
+        self, count: int, force_hz: float = 1000, touches: float = 0.0, **motion: Any
+    ) -> Path:
         """The folder of a process run, not yet run, with a filling that is."""
         data = yaml.safe_load(SMALL_STUDY.read_text())
         data["media"]["count"] = count
         data["motion"] |= {"plunge_speed_m_s": 0.5, "approach_speed_m_s": 0.5, **motion}
-        data["outputs"] = {"n_checkpoints": 3, "workpiece_force_hz": force_hz}
+        data["outputs"] = {
+            "n_checkpoints": 3, "workpiece_force_hz": force_hz, "first_touch_fraction": touches,
+        }  # fmt: skip
         (self.study / "study.yaml").write_text(yaml.safe_dump(data))
         (case,) = load_cases(self.study / "study.yaml")
         if count not in self.beds:
@@ -247,6 +253,31 @@ def test_a_resumed_run_continues_the_motion(runs: Runs, name: str) -> None:
     np.testing.assert_allclose(place, whole[1][np.isin(whole[0], steps)], atol=1e-11)
     assert off_pose(folder, steps, place) < 1e-9
     assert farthest_corner(folder, steps, place) < 1e-7
+
+
+def test_a_resumed_run_sees_the_same_first_touches(runs: Runs) -> None:
+    """Up to where it goes on they are the same to the bit, and no contact is seen to begin anew."""
+    folder = runs.rendered(
+        120, 1e4, 0.6, immersion_depth_m=0.004, transient_m=0.0, path=LINE
+    )  # fmt: skip
+    engine(folder)
+    write_tables(folder)
+    whole = pd.read_parquet(folder / "tables/touches.parquet")
+    written = [int(file.name.split(".")[1]) for file in folder.glob("checkpoint.*.restart")]
+    step = min(step for step in written if step > whole["step"].min() + 100)
+    engine(folder, *f"-var part 2 -var resume 1 -var from checkpoint.{step}.restart".split())
+    write_tables(folder)
+    found = pd.read_parquet(folder / "tables/touches.parquet")
+    before = found["step"] <= step
+    pd.testing.assert_frame_equal(found[before], whole[whole["step"] <= step])
+    assert found["step"].max() == pytest.approx(whole["step"].max(), abs=100)
+    assert not found.duplicated(["step", "particle_id", "facet_id"]).any()
+    touching = set(found.loc[found["step"] == step, "particle_id"])
+    case = load_case(folder)
+    events = first_touches(folder, sample(folder, case, TOUCHED), case)
+    since = events["start_s"] / case.timestep_s - step
+    assert touching
+    assert not touching & set(events.loc[(since > 0) & (since < 3), "particle_id"])
 
 
 def test_a_reversal_reverses_the_torque(runs: Runs) -> None:
