@@ -8,7 +8,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -149,15 +148,9 @@ def compute_wear(
     return wear, None if events is None else events.drop(columns=["frame", *POINT])
 
 
-class Acting(NamedTuple):
-    """What the laws of removal of a run read; see `acting`."""
-
-    of_laws: Sequence[Sampled]
-    touched: Sampled | None
-    events: pd.DataFrame | None
-
-
-def acting(run_dir: Path, case: CaseOfRun, sampled: Sampled) -> Acting:
+def acting(
+    run_dir: Path, case: CaseOfRun, sampled: Sampled
+) -> tuple[Sequence[Sampled], Sampled | None, pd.DataFrame | None]:
     """What the laws of removal of a run read, that of Archard if it has none.
 
     For each law that is added up its contacts with ``frame``, ``facet_id``, `POINT` and ``action``
@@ -178,13 +171,14 @@ def acting(run_dir: Path, case: CaseOfRun, sampled: Sampled) -> Acting:
             raise TableError(
                 f"{run_dir}: the law of removal reads impacts, which the run has not written"
             )
-        return Acting([sliding], None, None)
+        return [sliding], None, None
     part = sample(run_dir, case, TOUCHED)
     events = first_touches(run_dir, part, case)
     if not law.impact:
-        return Acting([sliding], part, events)
+        return [sliding], part, events
     impacts = replace(part, rows=events[names].assign(action=impact_action(law, events, case)))
-    return Acting([sliding, impacts][-len(needed(case.removal, "removal").laws) :], part, events)
+    count = len(needed(case.removal, "removal").laws)
+    return [sliding, impacts][-count:], part, events
 
 
 def _action(

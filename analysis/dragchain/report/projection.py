@@ -112,7 +112,7 @@ class Target:
             weight = self.surface.areas[to] * (1 - near["v"] / self.length_m) * same
             total = np.bincount(at, weight, len(part))
             if (lost := np.flatnonzero(total == 0.0)).size:
-                raise self._unreached(float(tree.query(points[part][lost])[0].max()))
+                raise self._unreached(float(np.max(tree.query(points[part][lost])[0])))
             shares = csr_array((weight / total[at], (at, to)), shape=(len(part), len(facing)))
             sums += shares.T @ amounts[part]
         return sums
