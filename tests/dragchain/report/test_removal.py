@@ -10,7 +10,14 @@ import pandas as pd
 import pytest
 from loading_files import PLATE, made_contacts, write_run
 from loading_files import case_json as contact_case
-from report_files import PICTURES, case_json, make_run, page_of, process_findings
+from report_files import (
+    PICTURES,
+    case_json,
+    make_run,
+    page_of,
+    process_findings,
+    write_quantities,
+)
 
 from dragchain.errors import TableError
 from dragchain.loading.document import Loading
@@ -125,7 +132,13 @@ def test_what_is_removed_near_an_edge_rounds_it(degrees: float) -> None:
 # --- report --------------------------------------------------------------------------------------
 
 
-def report(tmp_path: Path, removal: dict[str, Any], seeds: int = 1, wear: bool = True) -> Path:
+def report(
+    tmp_path: Path,
+    removal: dict[str, Any],
+    seeds: int = 1,
+    wear: bool = True,
+    corrected: float | None = None,
+) -> Path:
     """The report on runs whose contacts are those made by hand, 50 % more with each seed."""
     runs = []
     for seed in range(seeds):
@@ -143,6 +156,8 @@ def report(tmp_path: Path, removal: dict[str, Any], seeds: int = 1, wear: bool =
         for file in ("tables/loading.json", *(["tables/wear.json"] if wear else [])):
             (run / file).write_bytes((made / file).read_bytes())
         (run / "workpiece.stl").write_text(PLATE)
+        if corrected:
+            write_quantities(run, corrected)
         runs.append(run)
     write_study_report(tmp_path / "out", runs)
     return tmp_path / "out"
@@ -163,6 +178,21 @@ def test_the_report_has_depth_mass_and_minutes(tmp_path: Path) -> None:
     assert "min (mean depth)" in page.words
     assert "Young's modulus \N{MULTIPLICATION SIGN} 0.01" in page.words
     assert "not corrected" in page.words
+
+
+def test_windows_correct_the_load_of_a_soft_run(tmp_path: Path) -> None:
+    """To half of it, with the interval of the windows: 10 %, beside 5 % of the coefficient."""
+    out = report(tmp_path, GIVEN, corrected=0.5)
+    plain = report(tmp_path / "plain", GIVEN)
+    facets, soft = (pd.read_csv(one / "run-0-removal.csv") for one in (out, plain))
+    np.testing.assert_allclose(facets["depth_m_s"], 0.5 * soft["depth_m_s"])
+    assert facets["corrected"].all()
+    assert not soft["corrected"].any()
+    words = page_of(out).words
+    assert "sliding load is from 3 windows at the physical Young's modulus" in words
+    half = math.hypot(0.2, 0.05 * Z)
+    load = 0.5 * 2.0 * 0.01  # N m per metre of path, times the speed
+    assert f"{3600e6 * 2e-11 * load / 4e-4 * (1 + half):.3g}" in words
 
 
 def test_packings_are_one_removal_with_the_scatter_between_them(tmp_path: Path) -> None:
