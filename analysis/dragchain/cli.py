@@ -77,6 +77,24 @@ COMMANDS = (
         Argument("--replace", action="store_true",
                   help="overwrite an earlier export (default: refuse to)")),
             "dragchain export results/uhlmann2015/process/RUN --to paraview --every 10"),
+    Command("project", "project load and removal on a mesh of your own",
+            "Project the load on the workpiece, and the removal if the study has a law, on a mesh "
+            "of your own, such as a fine STL or a finite-element surface; sums are conserved. It "
+            "reads the tables of the runs and writes projection.vtu, .csv and .parquet to the "
+            "folder.",
+            "report.projection:write_projection", (
+        OUT_DIR,
+        Argument("run_dirs", type=Path, nargs="+", metavar="RUN_DIR",
+                  help="folders of the runs of one case, its packings: results/STUDY/process/RUN"),
+        Argument("--mesh", type=Path, required=True, metavar="FILE",
+                  help="surface in the coordinates of workpiece.vtp: STL, OBJ, PLY, VTK or VTU; "
+                  "required"),
+        Argument("--unit", default="m", choices=("m", "cm", "mm", "um", "in"),
+                  help="unit of length in that file (default: %(default)s)"),
+        Argument("--smoothing-length", type=float, required=True, metavar="M",
+                  help="radius of the cone over which a contact is spread, m; required")),
+            "dragchain project --out results/removal/projection --mesh part.stl --unit mm "
+            "--smoothing-length 0.002 results/removal/process/RUN"),
     Command("report", "write the report on a study",
             "Write the report on the process runs of a study. It reads their tables and figures "
             "and writes report.html and summary.csv, .parquet and .xlsx to the folder.",

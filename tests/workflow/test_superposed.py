@@ -1,7 +1,6 @@
 """Superposed motions on LIGGGHTS: where both packages and the engine say that the workpiece is."""
 
 import json
-import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -10,12 +9,14 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from loading_files import STEP_S, case_json
+from loading_files import STEP_S
 from made_run import line, with_motion
 from paths import ROOT, SMALL_STUDY
-from plate import PLATE
+from plate import FRICTION, GRAVITY, MASS, engine, write_plate
 
 from dragchain import load_case, write_tables
+from dragchain.loading.samples import TOUCHED, sample
+from dragchain.loading.wear import first_touches
 from dragchain.loading.write import compute_loading
 from dragchain.run.kinematics import (
     axis_speed,
@@ -26,10 +27,8 @@ from dragchain.run.kinematics import (
 )
 from dragchain.run.workpiece import read_surface
 from dragdeck.decks import outputs
-from dragdeck.decks.outputs import ColumnsFile
 from dragdeck.decks.render import write_run
 from dragdeck.decks.templates import environment
-from dragdeck.engine.process import find_engine
 from dragdeck.engine.reports import silent
 from dragdeck.engine.run_folder import run_to_outcome
 from dragdeck.physics.packing import Bed
@@ -38,7 +37,6 @@ from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import PROCESS
 from dragdeck.scenes.scene import read_bed
 from dragdeck.study.drive import Drive, rotated
-from dragdeck.study.superposed.motion import SuperposedMotion
 from dragdeck.study.superposed.spin import Spin
 from dragdeck.sweep.cases import load_cases
 
@@ -135,12 +133,16 @@ class Runs:
         self.beds: dict[int, Bed] = {}
         self.done: dict[str, Path] = {}
 
-    def rendered(self, count: int, force_hz: float = 1000, **motion: Any) -> Path:
+    def rendered(
+        self, count: int, force_hz: float = 1000, touches: float = 0.0, **motion: Any
+    ) -> Path:
         """The folder of a process run, not yet run, with a filling that is."""
         data = yaml.safe_load(SMALL_STUDY.read_text())
         data["media"]["count"] = count
         data["motion"] |= {"plunge_speed_m_s": 0.5, "approach_speed_m_s": 0.5, **motion}
-        data["outputs"] = {"n_checkpoints": 3, "workpiece_force_hz": force_hz}
+        data["outputs"] = {
+            "n_checkpoints": 3, "workpiece_force_hz": force_hz, "first_touch_fraction": touches,
+        }  # fmt: skip
         (self.study / "study.yaml").write_text(yaml.safe_dump(data))
         (case,) = load_cases(self.study / "study.yaml")
         if count not in self.beds:
@@ -168,13 +170,6 @@ class Runs:
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory: pytest.TempPathFactory) -> Runs:
     return Runs(tmp_path_factory.mktemp("project"))
-
-
-def engine(folder: Path, *words: str) -> None:
-    """Run the input script of a folder as it stands."""
-    command = [find_engine().path, "-in", "in.liggghts", "-log", "none", *words]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout[-2000:]
 
 
 def reference(folder: Path, part: int = 1) -> tuple[np.ndarray, np.ndarray]:
@@ -260,6 +255,31 @@ def test_a_resumed_run_continues_the_motion(runs: Runs, name: str) -> None:
     assert farthest_corner(folder, steps, place) < 1e-7
 
 
+def test_a_resumed_run_sees_the_same_first_touches(runs: Runs) -> None:
+    """Up to where it goes on they are the same to the bit, and no contact is seen to begin anew."""
+    folder = runs.rendered(
+        120, 1e4, 0.6, immersion_depth_m=0.004, transient_m=0.0, path=LINE
+    )  # fmt: skip
+    engine(folder)
+    write_tables(folder)
+    whole = pd.read_parquet(folder / "tables/touches.parquet")
+    written = [int(file.name.split(".")[1]) for file in folder.glob("checkpoint.*.restart")]
+    step = min(step for step in written if step > whole["step"].min() + 100)
+    engine(folder, *f"-var part 2 -var resume 1 -var from checkpoint.{step}.restart".split())
+    write_tables(folder)
+    found = pd.read_parquet(folder / "tables/touches.parquet")
+    before = found["step"] <= step
+    pd.testing.assert_frame_equal(found[before], whole[whole["step"] <= step])
+    assert found["step"].max() == pytest.approx(whole["step"].max(), abs=100)
+    assert not found.duplicated(["step", "particle_id", "facet_id"]).any()
+    touching = set(found.loc[found["step"] == step, "particle_id"])
+    case = load_case(folder)
+    events = first_touches(folder, sample(folder, case, TOUCHED), case)
+    since = events["start_s"] / case.timestep_s - step
+    assert touching
+    assert not touching & set(events.loc[(since > 0) & (since < 3), "particle_id"])
+
+
 def test_a_reversal_reverses_the_torque(runs: Runs) -> None:
     """Facets gather in the body frame, whose sums are those of the workpiece; work is power."""
     schedule = [{"until_s": 0.12, "rpm": 300}, {"until_s": 1, "rpm": -300}]
@@ -329,71 +349,7 @@ def test_contacts_lie_on_an_inclined_workpiece_that_spins(runs: Runs) -> None:
 
 # --- a particle on a spinning plate --------------------------------------------------------------
 
-RADIUS, DENSITY, MODULUS, FRICTION, GRAVITY = 3e-3, 2500.0, 1e7, 0.3, 9.81
-STEPS, SPEED, RPM, PLACE = 200, 0.1, 200.0, (-0.008, 0.006)
-DECK = """units si
-soft_particles yes
-atom_style granular
-atom_modify map array
-boundary f f f
-newton off
-communicate single vel yes
-read_data particle.data
-neighbor 0.001 bin
-neigh_modify delay 0
-fix youngs all property/global youngsModulus peratomtype {{ modulus }}
-fix poisson all property/global poissonsRatio peratomtype 0.3
-fix restitution all property/global coefficientRestitution peratomtypepair 1 0.5
-fix friction all property/global coefficientFriction peratomtypepair 1 {{ friction }}
-pair_style gran model {{ law }}
-pair_coeff * *
-timestep {{ timestep }}
-fix gravity all gravity {{ gravity }} vector 0 0 -1
-fix workpiece all mesh/surface/stress file workpiece.stl type 1 reference_point 0. 0. 0.
-fix workpiece_wall all wall/gran model {{ law }} mesh n_meshes 1 meshes workpiece store_force yes
-compute workpiece_contacts all wall/gran/local pos id force delta
-fix integrate all nve/sphere
-variable part index 1
-variable reference_x equal f_workpiece[7]
-variable reference_y equal f_workpiece[8]
-variable reference_z equal f_workpiece[9]
-fix drag all move/mesh mesh workpiece linear {{ speed }} 0. 0.
-{% for name, formula in superposed.variables | items %}
-variable {{ name }} equal {{ formula }}
-{% endfor %}
-fix superposed all move/mesh mesh workpiece {{ superposed.movers[""] }}
-{% from "outputs.j2" import write %}
-{% for output in outputs %}
-{{ write(output) }}
-{% endfor %}
-run {{ steps }}
-"""
-
-
-def static_overlap(mass: float) -> float:
-    """The overlap at which Hertz' force on a plate of the same material carries a particle."""
-    stiffness = 4 / 3 * MODULUS / (2 * (1 - 0.3**2)) * np.sqrt(RADIUS)
-    return float((mass * GRAVITY / stiffness) ** (2 / 3))
-
-
-def write_plate(
-    folder: Path, motion: SuperposedMotion, drag: Drive, speed_m_s: float, written: Any
-) -> None:
-    """Input script, plate and a particle that rests on it."""
-    deck = environment(ROOT / "templates").from_string(DECK)
-    text = deck.render(
-        superposed=motion.on_engine(drag, 0.0), outputs=written, steps=drag.end,
-        timestep=drag.timestep_s, modulus=MODULUS, friction=FRICTION, gravity=GRAVITY,
-        speed=speed_m_s, law="hertz tangential history",
-    )  # fmt: skip
-    (folder / "in.liggghts").write_text(text)
-    (folder / "workpiece.stl").write_text(PLATE)
-    mass = DENSITY * 4 / 3 * np.pi * RADIUS**3
-    place = f"{PLACE[0]} {PLACE[1]} {RADIUS - static_overlap(mass)}"
-    (folder / "particle.data").write_text(
-        "one particle\n\n1 atoms\n\n1 atom types\n\n-0.05 0.05 xlo xhi\n-0.05 0.05 ylo yhi\n"
-        f"-0.01 0.05 zlo zhi\n\nAtoms\n\n1 1 {2 * RADIUS} {DENSITY} {place}\n"
-    )
+STEPS, SPEED, RPM = 200, 0.1, 200.0
 
 
 def test_a_particle_on_a_moving_and_spinning_plate_slips_as_it_should(tmp_path: Path) -> None:
@@ -401,7 +357,6 @@ def test_a_particle_on_a_moving_and_spinning_plate_slips_as_it_should(tmp_path: 
 
     Friction then accelerates its centre by mu g, and its surface by another 5/2 mu g.
     """
-    mass = DENSITY * 4 / 3 * np.pi * RADIUS**3
     drag = Drive(0, STEPS, STEP_S / 10, length_m=SPEED * STEPS * STEP_S / 10)
     written = outputs.in_writing_order(
         [
@@ -411,16 +366,8 @@ def test_a_particle_on_a_moving_and_spinning_plate_slips_as_it_should(tmp_path: 
         ]
     )
     spin = Spin(rpm=RPM, ramp_s=0.0)
-    write_plate(tmp_path, spin, drag, SPEED, written)
-    ColumnsFile(outputs={each.name: each.as_part() for each in written}).write(
-        tmp_path / "columns.json"
-    )
-    made = case_json() | {
-        "timestep_s": drag.timestep_s,
-        "phases": [{"name": "drag", "start_step": 0, "end_step": STEPS}],
-    }
+    made = write_plate(tmp_path, spin, drag, written)
     made = with_motion(made, **line(SPEED), spin={"rpm": RPM, "ramp_s": 0})
-    made["inputs"] |= {"bowl.material": "steel", "pairs.ceramic-steel.friction": FRICTION}
     (tmp_path / "case.json").write_text(json.dumps(made))
     engine(tmp_path)
     write_tables(tmp_path)
@@ -434,4 +381,4 @@ def test_a_particle_on_a_moving_and_spinning_plate_slips_as_it_should(tmp_path: 
     slip = -(np.linalg.norm(plate, axis=1) - 3.5 * FRICTION * GRAVITY * time)[:, None] * along
     np.testing.assert_allclose(rows[["slip_x_m_s", "slip_y_m_s"]], slip, atol=0.005 * 0.2)
     force = -rows[["force_x_n", "force_y_n"]].to_numpy()
-    np.testing.assert_allclose(force, FRICTION * mass * GRAVITY * along, rtol=0.02, atol=2e-6)
+    np.testing.assert_allclose(force, FRICTION * MASS * GRAVITY * along, rtol=0.02, atol=2e-6)

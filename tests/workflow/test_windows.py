@@ -13,13 +13,15 @@ from paths import SMALL_STUDY
 from snakemake_calls import copy_of_project, jobs, succeed
 
 from dragchain.report.values import Extrapolated
-from dragchain.run.kinematics import drag_phase
+from dragchain.run.kinematics import axis_speed, drag_phase
 from dragchain.windows.estimate import Round
 from dragdeck.records.case import load_case
 
 pytestmark = [pytest.mark.engine, pytest.mark.slow]
 
-WINDOWS = {"tolerance": 0.01, "quantities": ["drag_mean", "workpiece_contacts"], "most": 3}
+ASKED = ["drag_mean", "workpiece_contacts", "force_slide"]
+WINDOWS = {"tolerance": 0.01, "quantities": ASKED, "most": 3}
+COEFFICIENT_M2_N = 1e-15
 
 
 def soft_study() -> dict[str, Any]:
@@ -30,6 +32,8 @@ def soft_study() -> dict[str, Any]:
     data["motion"] |= {"speed_m_s": 0.05, "transient_m": 0.012}
     data["motion"]["path"]["revolutions"] = 1
     data["motion"]["spin"] = {"rpm": 30}
+    data["removal"] = {"coefficient_m2_n": COEFFICIENT_M2_N}
+    data["outputs"] = {"first_touch_fraction": 0.05}
     return data
 
 
@@ -87,6 +91,23 @@ def test_the_report_takes_its_values_from_the_windows(finished: Path) -> None:
     )
     page = html.unescape((finished / "report/report.html").read_text())
     assert found.said in page.replace("\N{NO-BREAK SPACE}", " ")
+
+
+def test_removal_is_that_of_the_windows(finished: Path) -> None:
+    """The soft run has first touches, its windows none; the map has their sum."""
+    (run,) = (finished / "process").iterdir()
+    assert len(pd.read_parquet(run / "tables/touch_events.parquet"))
+    assert not list(finished.glob("windows/*/touch*"))
+    load = Extrapolated.read(run / "tables/extrapolated.json").of("force_slide")
+    assert load is not None and load.value is not None
+    assert load.value.value != pytest.approx(load.measured.value, rel=1e-6)
+    (file,) = (finished / "report").glob("*-removal.csv")
+    facets = pd.read_csv(file)
+    assert facets["corrected"].all()
+    assert (facets["youngs_modulus_scale"] == 0.1).all()
+    volume = facets["depth_m_s"] @ facets["area_m2"]
+    expected = COEFFICIENT_M2_N * load.value.value * axis_speed(load_case(run))
+    assert volume == pytest.approx(expected, rel=0.02)  # blocks leave out an end of the path
 
 
 def test_a_window_is_where_the_course_is(finished: Path) -> None:

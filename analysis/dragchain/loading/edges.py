@@ -33,8 +33,8 @@ class EdgeBands(Part):
         Edges of the bands.
     area_m2 : tuple of float
         Of the surface in each band.
-    action_w : EstimateColumns
-        Per process time in each band, W.
+    action_w, within_w : EstimateColumns
+        Per process time in each band, and in all up to its far side, W.
     """
 
     length_m: float
@@ -42,6 +42,7 @@ class EdgeBands(Part):
     distance_m: tuple[float, ...]
     area_m2: tuple[float, ...]
     action_w: EstimateColumns
+    within_w: EstimateColumns
 
 
 def sharp_edges(surface: Surface, highest_m: float) -> tuple[Floats, Floats]:
@@ -106,7 +107,8 @@ def edge_bands(
     sums = np.zeros((sampled.frames, len(limits)))
     band = np.searchsorted(limits, away, side="right") - 1
     np.add.at(sums, (sampled.rows["frame"], band), sampled.rows["force_slide_n_m"])
-    found = estimates(sums[:, :-1], lambda means: means / seconds)
+    sums = sums[:, :-1]
+    found = estimates(np.hstack([sums, sums.cumsum(axis=1)]), lambda means: means / seconds)
     lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     area = np.histogram(spread, limits)[0] * surface.areas.sum() / len(points)
     return EdgeBands(
@@ -114,5 +116,6 @@ def edge_bands(
         angle_rad=float(np.average(angles, weights=lengths)),
         distance_m=tuple(limits.tolist()),
         area_m2=tuple(area.tolist()),
-        action_w=EstimateColumns.of(found),
+        action_w=EstimateColumns.of(found[: sums.shape[1]]),
+        within_w=EstimateColumns.of(found[sums.shape[1] :]),
     )

@@ -14,7 +14,7 @@ import pandas as pd
 
 from dragchain.arrays import Floats, Ints
 from dragchain.errors import TableError
-from dragchain.loading.contact_events import SLIP, find_events
+from dragchain.loading.contact_events import POINT, SLIP, find_events
 from dragchain.loading.document import Loading, Quantiles
 from dragchain.loading.edges import EdgeBands, edge_bands
 from dragchain.loading.samples import TOUCHED, Sampled, patches, sample, standard_errors
@@ -114,17 +114,13 @@ def compute_wear(
         If ``touches.parquet`` is missing or has no contact, or the law reads impacts and the run
         has not written first touches.
     """
-    written = TOUCHES[1] in load_outputs(run_dir)
-    if case.removal is None and not written:
+    if case.removal is None and TOUCHES[1] not in load_outputs(run_dir):
         return None, None
     factor, size = case.fidelity.speed_factor, case.media.radius_mean_m
     immersion = needed(case.workpiece, "workpiece").immersion_depth_m
-    loads = sampled.rows[["frame", "facet_id"]].assign(action=sampled.rows["force_slide_n_m"])
-    group, laws = patches(surface, size), case.removal.laws if case.removal else [LAWS["archard"]]
-    of_laws, touched, events = [replace(sampled, rows=loads)], None, None
-    if written:
-        part = sample(run_dir, case, TOUCHED)
-        events = first_touches(run_dir, part, case)
+    group, touched = patches(surface, size), None
+    of_laws, part, events = acting(run_dir, case, sampled)
+    if part is not None and events is not None:
         begun = np.bincount(events["frame"], minlength=part.frames).astype(np.float64)[:, None]
         per_s = estimates(begun, lambda means: means / (factor * part.interval_s))[0]
         touched = TouchesOfRun(
@@ -134,14 +130,7 @@ def compute_wear(
             per_s=per_s,
             quantities={name: event_quantiles(events[name]) for name in TOUCH_QUANTITIES},
         )
-        if laws[-1].impact:
-            action = impact_action(laws[-1], events, case)
-            impacts = replace(part, rows=events[["frame", "facet_id"]].assign(action=action))
-            of_laws = [*of_laws, impacts][-len(laws) :]
-    elif laws[-1].impact:
-        raise TableError(
-            f"{run_dir}: the law of removal reads impacts, which the run has not written"
-        )
+    impact = case.removal is not None and case.removal.laws[-1].impact
     each = [_action(one, surface, group, factor * one.interval_s) for one in of_laws]
     total, density, error = zip(*each, strict=True)
     share = loading.types["impact"].fraction_of["force_slide_n_m"]
@@ -152,11 +141,44 @@ def compute_wear(
         action_w=_sum(total),
         patch_w_m2=tuple(np.sum(density, axis=0)[group].tolist()),
         patch_se_w_m2=tuple(np.linalg.norm(error, axis=0)[group].tolist()),
-        impact_share=_share(total[-1], total[:-1]) if laws[-1].impact else share,
+        impact_share=_share(total[-1], total[:-1]) if impact else share,
         touches=touched,
         edges=edge_bands(sampled, surface, immersion, size, factor * sampled.interval_s),
     )
-    return wear, None if events is None else events.drop(columns="frame")
+    return wear, None if events is None else events.drop(columns=["frame", *POINT])
+
+
+def acting(
+    run_dir: Path, case: CaseOfRun, sampled: Sampled
+) -> tuple[Sequence[Sampled], Sampled | None, pd.DataFrame | None]:
+    """What the laws of removal of a run read, that of Archard if it has none.
+
+    For each law that is added up its contacts with ``frame``, ``facet_id``, `POINT` and ``action``
+    in J; and where they are written, contacts and events of first touches.
+
+    Raises
+    ------
+    TableError
+        As `compute_wear`.
+    """
+    law = case.removal.laws[-1] if case.removal else LAWS["archard"]
+    names = ["frame", "facet_id", *POINT]
+    sliding = replace(
+        sampled, rows=sampled.rows[names].assign(action=sampled.rows["force_slide_n_m"])
+    )
+    if TOUCHES[1] not in load_outputs(run_dir):
+        if law.impact:
+            raise TableError(
+                f"{run_dir}: the law of removal reads impacts, which the run has not written"
+            )
+        return [sliding], None, None
+    part = sample(run_dir, case, TOUCHED)
+    events = first_touches(run_dir, part, case)
+    if not law.impact:
+        return [sliding], part, events
+    impacts = replace(part, rows=events[names].assign(action=impact_action(law, events, case)))
+    count = len(needed(case.removal, "removal").laws)
+    return [sliding, impacts][-count:], part, events
 
 
 def _action(
@@ -214,6 +236,7 @@ def first_touches(run_dir: Path, part: Sampled, case: CaseOfRun) -> pd.DataFrame
         6 * events["peak_normal_force_n"].clip(lower=0) * modulus**2 / (np.pi**3 * radius**2)
     )
     found = events.assign(
+        **first[POINT].reset_index(drop=True),
         radius_m=radius,
         touch_normal_m_s=normal,
         touch_tangential_m_s=tangential,

@@ -140,14 +140,15 @@ class RemovalOfCase:
     removal : Removal
     fit : TrialsFit or None
         To the trials, if there are any.
-    edges : sequence of (str, Estimate, float)
+    edges : sequence of (str, Estimate, Estimate)
         Of each band along sharp edges: its distances in mm, depth per hour and, after half an
         hour, the radius of the edge, both in micrometres.
     edge_length_m : float
     facets : DataFrame
         ``area_m2``, ``immersed``, and of the patch of each facet the depth of removal per time
         ``depth_m_s``, its standard error by the scatter of the load ``depth_m_s_se``, and the ends
-        of its combined 95 % interval.
+        of its combined 95 % interval; in each row the settings of the run, and whether windows
+        corrected the load.
     impact_share : Estimate
         Part of the removal that comes from impacts.
     depth_um_h, mass_mg_h, coefficient_m2_n : Parted
@@ -160,7 +161,7 @@ class RemovalOfCase:
 
     removal: Removal
     fit: TrialsFit | None
-    edges: Sequence[tuple[str, Estimate, float]]
+    edges: Sequence[tuple[str, Estimate, Estimate]]
     edge_length_m: float
     facets: pd.DataFrame
     impact_share: Estimate
@@ -222,9 +223,14 @@ def removal_of(case: ReportedCase) -> RemovalOfCase | None:
     return RemovalOfCase(
         removal=removal,
         fit=fit_trials(removal),
-        edges=() if removal.laws[0].impact else _bands(wears, coefficient.value * factor, rate),
+        edges=() if removal.laws[0].impact else edge_rows(wears, coefficient.value * factor, rate),
         edge_length_m=edges.length_m if edges else 0.0,
-        facets=facets,
+        facets=facets.assign(
+            youngs_modulus_scale=first.fidelity.youngs_modulus_scale,
+            timestep_fraction=first.fidelity.timestep_fraction,
+            speed_factor=first.fidelity.speed_factor,
+            corrected=load.corrected and not removal.laws[-1].impact,
+        ),
         impact_share=_over_packings([one.impact_share for one in wears]),
         depth_um_h=rate.times(UM_PER_H / float(area.sum())),
         mass_mg_h=rate.times(UM_PER_H * density),
@@ -255,23 +261,31 @@ def _over_packings(values: Sequence[Estimate]) -> Estimate:
     return values[0] if len(values) == 1 else mean_of([one.value for one in values])
 
 
-def _bands(wears: Sequence[Wear], scale: float, rate: Parted) -> list[tuple[str, Estimate, float]]:
+def edge_rows(
+    wears: Sequence[Wear], scale: float, rate: Parted
+) -> list[tuple[str, Estimate, Estimate]]:
     """The bands along sharp edges; see `RemovalOfCase`.
 
     By volume balance, all removal nearer to the edge than the far side of a band rounds it: an edge
-    of the interior angle b with the radius r lacks ``r^2 (1/tan(b/2) - (pi - b)/2)``.
+    of the interior angle b with the radius r lacks ``r^2 (1/tan(b/2) - (pi - b)/2)``. `scale` is
+    the removed volume per action, m2/N, and the uncertainty of the coefficient that of `rate`.
     """
-    found, several, summed = list[tuple[str, Estimate, float]](), [one.edges for one in wears], 0.0
+    found, several = list[tuple[str, Estimate, Estimate]](), [one.edges for one in wears]
     if (edges := several[0]) is None:
         return found
+
+    def removed(bands: str, band: int) -> Parted:
+        own = _over_packings([getattr(one, bands).at(band) for one in several if one])
+        half = own.relative_half_width if own.value else 0.0
+        return Parted(scale * own.value, half, *rate[2:])
+
     lacks = 1 / math.tan(edges.angle_rad / 2) - (math.pi - edges.angle_rad) / 2
     for band, (near, far) in enumerate(pairwise(edges.distance_m)):
-        own = _over_packings([one.action_w.at(band) for one in several if one])
-        summed += scale * own.value
-        half = own.relative_half_width if own.value else 0.0
-        depth = Parted(UM_PER_H * scale * own.value / edges.area_m2[band], half, *rate[2:])
-        radius = 1e6 * math.sqrt(summed * _ROUNDED_S / edges.length_m / lacks)
-        found.append((f"{1e3 * near:.2g} to {1e3 * far:.2g}", depth.combined, radius))
+        depth = removed("action_w", band).times(UM_PER_H / edges.area_m2[band]).combined
+        rounded = removed("within_w", band).times(_ROUNDED_S / edges.length_m / lacks).combined
+        ends = (rounded.value, rounded.ci95_low, rounded.ci95_high)
+        radius = Estimate(*(1e6 * math.sqrt(one) for one in ends))
+        found.append((f"{1e3 * near:.2g} to {1e3 * far:.2g}", depth, radius))
     return found
 
 

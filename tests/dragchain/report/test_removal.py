@@ -10,14 +10,30 @@ import pandas as pd
 import pytest
 from loading_files import PLATE, made_contacts, write_run
 from loading_files import case_json as contact_case
-from report_files import PICTURES, case_json, make_run, page_of, process_findings
+from report_files import (
+    PICTURES,
+    case_json,
+    make_run,
+    page_of,
+    process_findings,
+    write_quantities,
+)
 
 from dragchain.errors import TableError
 from dragchain.loading.document import Loading
+from dragchain.loading.edges import EdgeBands
+from dragchain.loading.wear import Wear
 from dragchain.loading.write import write_loading
-from dragchain.report.removal import Parted, fit_trials, joined_half_width, patch_means, predict
+from dragchain.report.removal import (
+    Parted,
+    edge_rows,
+    fit_trials,
+    joined_half_width,
+    patch_means,
+    predict,
+)
 from dragchain.report.study_report import write_study_report
-from dragchain.statistics.estimate import Estimate, student_quantile
+from dragchain.statistics.estimate import Estimate, EstimateColumns, student_quantile
 from dragdeck.study.removal import Removal
 
 GIVEN = {"coefficient_m2_n": 2e-11, "sd_m2_n": 1e-12, "target_depth_m": 1e-6}
@@ -86,10 +102,43 @@ def test_patches_have_the_scatter_between_packings_or_else_over_time() -> None:
     assert degrees == 8
 
 
+@pytest.mark.parametrize("degrees", [60.0, 90.0, 140.0])
+def test_what_is_removed_near_an_edge_rounds_it(degrees: float) -> None:
+    """An arc that is tangent to both faces lacks as much as was removed in half an hour."""
+    angle, length, k = math.radians(degrees), 0.08, 1e-12
+    bands = [Estimate(3.0, 2.7, 3.3), Estimate(5.0, 4.5, 5.5)]
+    edges = EdgeBands(
+        length_m=length, angle_rad=angle, distance_m=(0.0, 1e-3, 2e-3), area_m2=(1e-4, 2e-4),
+        action_w=EstimateColumns.of(bands),
+        within_w=EstimateColumns.of([bands[0], Estimate(8.0, 7.2, 8.8)]),
+    )  # fmt: skip
+    rows = edge_rows([Wear.model_construct(edges=edges)], k, Parted(math.nan, 0.0, 0.2))
+    assert [name for name, _, _ in rows] == ["0 to 1", "1 to 2"]
+    for (_, depth, radius), action, within, area in zip(
+        rows, (3, 5), (3, 8), (1e-4, 2e-4), strict=True
+    ):
+        assert depth.value == pytest.approx(3600e6 * k * action / area)
+        r, half = 1e-6 * radius.value, (math.pi - angle) / 2
+        at = np.linspace(-half, half, 20_001)
+        x = np.r_[0.0, r / math.sin(angle / 2) - r * np.cos(at)]  # the corner, and the arc
+        y = np.r_[0.0, r * np.sin(at)]
+        lacks = abs(np.dot(x, np.roll(y, 1)) - np.dot(y, np.roll(x, 1))) / 2
+        assert lacks * length == pytest.approx(k * within * 1800, rel=1e-6)
+        low, high = ((1 + side * math.hypot(0.1, 0.2)) ** 0.5 for side in (-1, 1))
+        found = (radius.ci95_low / radius.value, radius.ci95_high / radius.value)
+        assert found == pytest.approx((low, high), rel=1e-5)
+
+
 # --- report --------------------------------------------------------------------------------------
 
 
-def report(tmp_path: Path, removal: dict[str, Any], seeds: int = 1, wear: bool = True) -> Path:
+def report(
+    tmp_path: Path,
+    removal: dict[str, Any],
+    seeds: int = 1,
+    wear: bool = True,
+    corrected: float | None = None,
+) -> Path:
     """The report on runs whose contacts are those made by hand, 50 % more with each seed."""
     runs = []
     for seed in range(seeds):
@@ -107,6 +156,8 @@ def report(tmp_path: Path, removal: dict[str, Any], seeds: int = 1, wear: bool =
         for file in ("tables/loading.json", *(["tables/wear.json"] if wear else [])):
             (run / file).write_bytes((made / file).read_bytes())
         (run / "workpiece.stl").write_text(PLATE)
+        if corrected:
+            write_quantities(run, corrected)
         runs.append(run)
     write_study_report(tmp_path / "out", runs)
     return tmp_path / "out"
@@ -127,6 +178,21 @@ def test_the_report_has_depth_mass_and_minutes(tmp_path: Path) -> None:
     assert "min (mean depth)" in page.words
     assert "Young's modulus \N{MULTIPLICATION SIGN} 0.01" in page.words
     assert "not corrected" in page.words
+
+
+def test_windows_correct_the_load_of_a_soft_run(tmp_path: Path) -> None:
+    """To half of it, with the interval of the windows: 10 %, beside 5 % of the coefficient."""
+    out = report(tmp_path, GIVEN, corrected=0.5)
+    plain = report(tmp_path / "plain", GIVEN)
+    facets, soft = (pd.read_csv(one / "run-0-removal.csv") for one in (out, plain))
+    np.testing.assert_allclose(facets["depth_m_s"], 0.5 * soft["depth_m_s"])
+    assert facets["corrected"].all()
+    assert not soft["corrected"].any()
+    words = page_of(out).words
+    assert "sliding load is from 3 windows at the physical Young's modulus" in words
+    half = math.hypot(0.2, 0.05 * Z)
+    load = 0.5 * 2.0 * 0.01  # N m per metre of path, times the speed
+    assert f"{3600e6 * 2e-11 * load / 4e-4 * (1 + half):.3g}" in words
 
 
 def test_packings_are_one_removal_with_the_scatter_between_them(tmp_path: Path) -> None:

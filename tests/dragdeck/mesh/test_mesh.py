@@ -417,7 +417,7 @@ def test_a_missing_file_and_what_cannot_be_a_length_are_refused(tmp_path: Path):
 
 @settings(max_examples=60)
 @example(part=0.9453125, suffix=".stl")
-@given(part=st.floats(0.0, 0.99), suffix=st.sampled_from([".stl", ".obj", ".ply", ".vtk"]))
+@given(part=st.floats(0.0, 0.99), suffix=st.sampled_from([".stl", ".obj", ".ply", ".vtk", ".vtu"]))
 def test_a_file_cut_short_never_passes(
     tmp_path_factory: pytest.TempPathFactory, part: float, suffix: str
 ):

@@ -93,6 +93,16 @@ def test_a_removal_that_cannot_be_is_refused(
         load({"removal": block})
 
 
+def test_a_tolerance_is_of_removal_by_sliding_alone(load: Load) -> None:
+    law = {"law": "archard+finnie", "impact_ratio": 2.0, "coefficient_m2_n": 1e-15}
+    study = {"fidelity": {"tolerance": 0.2, "quantity": ["force_slide"]},
+             "outputs.first_touch_fraction": 0.1}  # fmt: skip
+    with pytest.raises(InputError, match="a tolerance cannot be used here"):  # without the advisor
+        load(study | {"removal": {"coefficient_m2_n": 1e-15}})
+    with pytest.raises(InputError, match=r"(?s)fidelity\.quantity.*archard\+finnie"):
+        load(study | {"removal": law})
+
+
 @pytest.mark.parametrize(
     "several", [{"sweep": {"motion.speed_m_s": [0.01, 0.02]}}, {"workpieces": {"count": 2}}]
 )

@@ -35,7 +35,7 @@ def read(
     facet_size_m: float | None = None,
     edge_facet_size_m: float | None = None,
 ) -> Trimesh:
-    """Read a surface from STL (ASCII or binary), OBJ, PLY or legacy VTK, or mesh a STEP part.
+    """Read a surface from STL (ASCII or binary), OBJ, PLY, legacy VTK or VTU, or mesh a STEP part.
 
     trimesh reads STL, meshio the rest: trimesh cuts quadrilaterals along
     whichever diagonal comes first, here they are cut along the shorter one. VTK
@@ -105,6 +105,7 @@ def _load(path: Path) -> tuple[Floats, list[Any]]:
         ".obj": meshio.obj.read,
         ".ply": _read_ply,
         ".vtk": meshio.vtk.read,
+        ".vtu": meshio.vtu.read,
     }
     suffix = path.suffix.lower()
     if suffix not in readers:

@@ -14,7 +14,7 @@ from pydantic_core import ErrorDetails
 
 from dragdeck.errors import Caution, InputError, RecordError, choices, near, together
 from dragdeck.study.base import Json, Model, flat
-from dragdeck.study.model import BUILT_IN_FIDELITIES, AnyPath, Scaling, Study
+from dragdeck.study.model import BUILT_IN_FIDELITIES, AnyPath, Scaling, Study, Tolerance
 from dragdeck.study.plausible import implausible
 from dragdeck.study.recorded import Places, recorded_file, with_recording
 from dragdeck.study.workpiece import CylinderShape, Shape
@@ -209,6 +209,10 @@ def _removal(study: Study) -> _Found:
     if any(law.impact for law in removal.laws) and not study.outputs.first_touch_fraction:
         problem = f"the law {removal.law} reads impacts, but no run writes them"
         yield "removal.law", problem, "outputs.first_touch_fraction: 0.05, or the law archard"
+    asked = study.fidelity.quantities if isinstance(study.fidelity, Tolerance) else ()
+    if "force_slide" in asked and removal.laws[-1].impact:
+        problem = f"windows do not see the impacts that the law {removal.law} reads"
+        yield "fidelity.quantity", problem, "the law archard, or without force_slide"
     several = study.workpieces is not None or {*study.sweep} - {"seed"}
     if removal.calibrate and several:
         problem = "a weighed trial is of one process, but the study has several cases"

@@ -307,6 +307,7 @@ Quantity = Literal[
     "normal_load",
     "sliding_distance",
     "friction_work",
+    "force_slide",
     "coordination_number",
     "mechanical_coordination_number",
     "network_force_mean",

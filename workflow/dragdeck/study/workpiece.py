@@ -28,7 +28,7 @@ class MeshShape(Model):
 
     kind: Literal["mesh"] = Field(description="mesh: the workpiece is read from a file")
     file: Line = Field(
-        description="mesh file in STL, OBJ, PLY, VTK or STEP format; its "
+        description="mesh file in STL, OBJ, PLY, VTK, VTU or STEP format; its "
         "path is relative to the study "
         "or to meshes/"
     )
