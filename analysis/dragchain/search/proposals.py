@@ -149,7 +149,7 @@ def propose(trials: Trials, seed: int) -> Floats:
 
     count, dimensions = trials.places.shape
     if (~trials.refused).sum() < 2:
-        return np.random.default_rng(seed).random(dimensions)
+        return np.asarray(np.random.default_rng(seed).random(dimensions))
     mean, _ = Model(trials).predict(trials.places)
     gone = trials.refused[:, None]
     spread = np.nanstd(trials.values, axis=0)
@@ -163,7 +163,7 @@ def propose(trials: Trials, seed: int) -> Floats:
     limits, options = None, dict[str, Any]()
     if columns:
         limits, spoilt, low, high = zip(*columns, strict=True)
-        options["constraint"] = NonlinearConstraint(lambda **_: 0.0, list(low), list(high))
+        options["constraint"] = NonlinearConstraint(_unused, list(low), list(high))
     names = [f"x{k}" for k in range(dimensions)]
     search = BayesianOptimization(
         None,
@@ -175,20 +175,28 @@ def propose(trials: Trials, seed: int) -> Floats:
         **options,
     )
     search.set_gp_params(**_parameters(values[:, 0], errors[:, 0], dimensions))
-    if limits is not None:
+    if limits is not None and search.constraint is not None:
         for one, value, error in zip(search.constraint.model, limits, spoilt, strict=True):
             one.set_params(**_parameters(value, error, dimensions))
     for number, place in enumerate(trials.places):
-        own = {} if limits is None else {"constraint_value": [one[number] for one in limits]}
-        own = {key: value[0] if len(value) == 1 else value for key, value in own.items()}
-        search.register(dict(zip(names, place, strict=True)), -values[number, 0], **own)
+        own = np.array([one[number] for one in limits or ()])
+        search.register(
+            dict(zip(names, place, strict=True)),
+            -values[number, 0],
+            None if limits is None else own if len(own) > 1 else own[0],
+        )
     try:
         with _quiet():
-            found: Mapping[str, float] = search.suggest()
+            found = search.suggest()
     except NoValidPointRegisteredError:  # no limit was ever met: go where that is most probable
         places = candidates(dimensions)
         return np.asarray(places[Model(trials).allowed(places).argmax()])
     return np.array([found[name] for name in names])
+
+
+def _unused(_: Any) -> Any:
+    """The package asks for a function of a limit, but never calls it: values are registered."""
+    raise NotImplementedError
 
 
 def _parameters(values: Floats, errors: Floats, dimensions: int) -> Mapping[str, Any]:

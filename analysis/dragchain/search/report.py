@@ -11,7 +11,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from dragchain.figures.panels import band, legend_below, new_panels
-from dragchain.figures.style import BLUE, COLOURS, GREEN, GREY, MARKERS, ORANGE, RED, WIDE_IN
+from dragchain.figures.style import BLUE, GREEN, GREY, MARKERS, ORANGE, RED, WIDE_IN
 from dragchain.report.campaign import write_report
 from dragchain.report.page import number, with_interval
 from dragchain.search.proposals import Model
@@ -168,7 +168,9 @@ def draw(found: SearchFindings, rows: list[SearchRow]) -> dict[str, Figure]:
             colour = _COLOURS[one.point.purpose]
             axes.errorbar(one.predicted.value, one.objective.value, one.objective.half_width,
                           one.predicted.half_width, fmt="o", color=colour)  # fmt: skip
-        axes.axline((said[0].objective.value,) * 2, slope=1, color=COLOURS.get("ahead", GREY))
+        first = said[0].predicted
+        assert first
+        axes.axline((first.value, first.value), slope=1, color=GREY)
         axes.set(xlabel="predicted before the run", ylabel="measured")
     return figures
 

@@ -52,7 +52,7 @@ _OWN: Mapping[str, tuple[str, str]] = {
 }
 """Label and unit of the quantities that are not in the registry of the report."""
 
-_LABELS = _OWN | {one.name: (one.label, one.unit) for one in QUANTITIES}
+_LABELS = {**_OWN, **{one.name: (one.label, one.unit) for one in QUANTITIES}}
 
 
 def label(measure: Measure) -> str:
