@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 from scipy.optimize import NonlinearConstraint
-from scipy.special import ndtr
+from scipy.special import log_ndtr
 from scipy.stats import qmc
 
 from dragchain.arrays import Floats
@@ -117,14 +117,11 @@ class Model:
         return mean, error
 
     def allowed(self, places: Floats) -> Floats:
-        """Probability that all limits hold at (M, D) places, (M,)."""
+        """Logarithm of the probability that all limits hold at (M, D) places, each apart, (M,)."""
         mean, error = self.predict(places)
-        return np.asarray(_within(mean, error, self.trials).prod(axis=1))
-
-
-def _within(mean: Floats, error: Floats, trials: Trials) -> Floats:
-    error = np.maximum(error, 1e-12)
-    return np.asarray(ndtr((trials.high - mean) / error) - ndtr((trials.low - mean) / error))
+        ends = self.trials.high - mean, mean - self.trials.low
+        each = [log_ndtr(end / np.maximum(error, 1e-12)) for end in ends]
+        return np.asarray(sum(each).sum(axis=1))
 
 
 def spread_places(count: int, dimensions: int, seed: int) -> Floats:
