@@ -121,7 +121,7 @@ class Model:
         mean, error = self.predict(places)
         ends = self.trials.high - mean, mean - self.trials.low
         each = [log_ndtr(end / np.maximum(error, 1e-12)) for end in ends]
-        return np.asarray(sum(each).sum(axis=1))
+        return np.asarray(np.sum(each, axis=(0, 2)))
 
 
 def spread_places(count: int, dimensions: int, seed: int) -> Floats:
