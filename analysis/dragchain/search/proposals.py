@@ -58,15 +58,14 @@ class Trials:
 
     def believing(self, place: Floats) -> "Trials":
         """With a place whose run has not ended: its values are those that the model expects."""
-        mean, _ = Model(self).predict(place[None])
-        error = np.full((1, self.values.shape[1]), 1e-9)
-        return Trials(
-            np.vstack([self.places, place]),
-            np.vstack([self.values, mean]),
-            np.vstack([self.errors, error]),
-            self.low,
-            self.high,
-        )
+        mean, _ = Responses(self).predict(place[None])
+        return self.joined(place, mean, 1e-9)
+
+    def joined(self, place: Floats, values: Any, errors: float) -> "Trials":
+        """With a further place; its values are NaN if it was refused."""
+        rows = [np.broadcast_to(one, (1, len(self.low))) for one in (values, errors)]
+        every = (self.places, place), (self.values, rows[0]), (self.errors, rows[1])
+        return Trials(*map(np.vstack, every), self.low, self.high)
 
 
 @contextmanager
@@ -94,7 +93,7 @@ def _process(values: Floats, errors: Floats, dimensions: int) -> Any:
 
 
 @dataclass(frozen=True)
-class Model:
+class Responses:
     """The Gaussian processes of all responses."""
 
     trials: Trials
@@ -147,7 +146,7 @@ def propose(trials: Trials, seed: int) -> Floats:
     count, dimensions = trials.places.shape
     if (~trials.refused).sum() < 2:
         return np.asarray(np.random.default_rng(seed).random(dimensions))
-    mean, _ = Model(trials).predict(trials.places)
+    mean, _ = Responses(trials).predict(trials.places)
     gone = trials.refused[:, None]
     spread = np.nanstd(trials.values, axis=0)
     values = np.where(gone, mean, trials.values)
@@ -187,7 +186,7 @@ def propose(trials: Trials, seed: int) -> Floats:
             found = search.suggest()
     except NoValidPointRegisteredError:  # no limit was ever met: go where that is most probable
         places = candidates(dimensions)
-        return np.asarray(places[Model(trials).allowed(places).argmax()])
+        return np.asarray(places[Responses(trials).allowed(places).argmax()])
     return np.array([found[name] for name in names])
 
 
@@ -207,7 +206,7 @@ def best_place(trials: Trials, accepted: Callable[[Floats], bool]) -> Floats | N
     Where that is nowhere, of the largest probability that they do; None if none is accepted.
     """
     places = np.vstack([trials.places[~trials.refused], candidates(trials.places.shape[1])])
-    model = Model(trials)
+    model = Responses(trials)
     mean, _ = model.predict(places)
     holds = ((mean >= trials.low) & (mean <= trials.high)).all(axis=1)
     rank = np.where(holds, mean[:, 0], np.inf) if holds.any() else -model.allowed(places)

@@ -14,15 +14,15 @@ from dragchain.figures.panels import band, legend_below, new_panels
 from dragchain.figures.style import BLUE, GREEN, GREY, MARKERS, ORANGE, RED, WIDE_IN
 from dragchain.report.campaign import write_report
 from dragchain.report.page import number, with_interval
-from dragchain.search.proposals import Model
+from dragchain.search.proposals import Responses
 from dragchain.search.rounds import (
     Measured,
     SearchedStudy,
     SearchFindings,
-    findings,
     label,
     loss,
     next_points,
+    read_findings,
     read_point,
 )
 from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate, EstimateColumns, flattened
@@ -62,7 +62,7 @@ def advance(
         raise InputError("the study has changed since this search began", file=file, field="asked",
                          remedy="remove the file to search anew (runs of the same settings are "
                          "not repeated), or undo the change")  # fmt: skip
-    found = findings(studied, record.points, measure)
+    found = read_findings(studied, record.points, measure)
     if found is None:
         return "unfinished"
     more = next_points(found)
@@ -112,7 +112,7 @@ def rows_of(found: SearchFindings) -> list[SearchRow]:
     return rows
 
 
-def verdict(limit: SearchLimit, value: Estimate) -> str:
+def limit_verdict(limit: SearchLimit, value: Estimate) -> str:
     """Whether a limit holds with the whole interval."""
     low = -math.inf if limit.at_least is None else limit.at_least
     high = math.inf if limit.at_most is None else limit.at_most
@@ -129,7 +129,7 @@ def at_bounds(found: SearchFindings, point: SearchPoint) -> list[str]:
     return [f"{fields[k]} ({end} value)" for end, on in ends.items() for k in np.flatnonzero(on)]
 
 
-def draw(found: SearchFindings, rows: list[SearchRow]) -> dict[str, Figure]:
+def draw_search(found: SearchFindings, rows: list[SearchRow]) -> dict[str, Figure]:
     """The path of the search, the response along each field, and predicted against measured."""
     objective = label(found.studied.search.objective)
     path, (axes,) = new_panels(3.2, width_in=WIDE_IN)
@@ -141,7 +141,7 @@ def draw(found: SearchFindings, rows: list[SearchRow]) -> dict[str, Figure]:
               transform=axes.get_xaxis_transform())  # fmt: skip
     axes.set(xlabel="setting in the order of the search", ylabel=objective)
     figures = {"path": legend_below(path)}
-    fields, model = list(found.studied.search.vary.items()), Model(found.trials)
+    fields, model = list(found.studied.search.vary.items()), Responses(found.trials)
     if found.studied.search.objective.goal != "target":
         at = _centre(found)
         figures["response"], panels = new_panels(
@@ -218,7 +218,7 @@ def write_search(out_dir: Path, found: SearchFindings) -> None:
     write_report(
         out_dir,
         "search/search.html.j2",
-        draw=lambda: draw(found, rows),
+        draw=lambda: draw_search(found, rows),
         tables={"points": table},
         name=NAME,
         filters={"label": label, "estimated": with_interval, "six": lambda value: number(value, 6)},
@@ -227,6 +227,6 @@ def write_search(out_dir: Path, found: SearchFindings) -> None:
         rows=rows,
         best=best,
         lowest=lowest,
-        verdict_of=verdict,
+        verdict_of=limit_verdict,
         packings=found.packings.shape[1],
     )

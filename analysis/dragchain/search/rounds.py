@@ -6,7 +6,7 @@ the runs alone, so that an interrupted search goes on as if it had not been inte
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ from dragchain.report.cases import ReportedCase, read_study_runs
 from dragchain.report.removal import depth_spread, removal_of
 from dragchain.run.basis import QUANTITIES
 from dragchain.run.workpiece import read_surface
-from dragchain.search.proposals import Model, Trials, best_place, propose, spread_places
+from dragchain.search.proposals import Responses, Trials, best_place, propose, spread_places
 from dragchain.statistics.estimate import Estimate, t_interval
 from dragdeck.advice.advise import resolve
 from dragdeck.cases.case import Case, digest
@@ -31,9 +31,9 @@ from dragdeck.study.check import validate
 from dragdeck.study.model import Study
 from dragdeck.study.search import (
     RECORD,
-    Measure,
     Objective,
     Search,
+    SearchedMeasure,
     SearchPoint,
 )
 from dragdeck.study.yaml import read_study
@@ -55,14 +55,14 @@ _OWN: Mapping[str, tuple[str, str]] = {
 _LABELS = {**_OWN, **{one.name: (one.label, one.unit) for one in QUANTITIES}}
 
 
-def label(measure: Measure) -> str:
+def label(measure: SearchedMeasure) -> str:
     """What is measured, with its unit."""
     (text, unit), part = _LABELS[measure.quantity], measure.heights_m
     heights = f" from {1e3 * part[0]:g} to {1e3 * part[1]:g} mm above the tip" if part else ""
     return text + heights + (f" ({unit})" if unit else "")
 
 
-def measured(measure: Measure, run_dir: Path) -> float:
+def quantity_of(measure: SearchedMeasure, run_dir: Path) -> float:
     """A quantity of one process run, NaN if it has no finite value."""
     one, name = ReportedCase((read_study_runs(run_dir),)), measure.quantity
     if name == "peak_pressure":
@@ -125,7 +125,7 @@ class SearchedStudy:
         return self.study.search
 
     @property
-    def measures(self) -> Sequence[Measure]:
+    def measures(self) -> Sequence[SearchedMeasure]:
         """The objective, and the quantities of the limits."""
         return [self.search.objective, *self.search.limits]
 
@@ -190,7 +190,7 @@ def read_point(studied: SearchedStudy, point: SearchPoint) -> Measured:
         return failed.problem.partition("\n")[0]
     if any(one.state != "complete" for one in states):
         return None
-    found = np.array([[measured(one, folder) for one in studied.measures] for folder in folders])
+    found = np.array([[quantity_of(one, folder) for one in studied.measures] for folder in folders])
     return found if np.isfinite(found).all() else "a quantity has no finite value"
 
 
@@ -269,7 +269,7 @@ def loss(objective: Objective, value: Any) -> Any:
     return -value if objective.goal == "maximise" else value
 
 
-def findings(
+def read_findings(
     studied: SearchedStudy,
     points: Sequence[SearchPoint],
     measure: Callable[[SearchedStudy, SearchPoint], Measured],
@@ -296,19 +296,14 @@ def next_points(found: SearchFindings) -> list[SearchPoint]:
     studied, search, points = found.studied, found.studied.search, found.of_search
     tried = [one for one in points if not one.refused or one.refused.startswith(_REJECTED)]
     number = 1 + max((one.round for one in found.points), default=0)
-    if len(points) < len(found.points):
-        return []
     if not points:
         places = list(spread_places(search.start, len(search.vary), search.seed))
         return [_point(studied, place, number, "start") for place in places]
     if np.isfinite(found.means[:, 0]).sum() < 2:
-        raise InputError(
-            f"of {len(points)} settings, fewer than two can be compared",
-            file=studied.file, field="search.vary", value=points[0].refused or None,
-            remedy="narrower bounds; the reason of each setting is in points.csv",
-        )  # fmt: skip
+        raise _stuck(studied, "fewer than two settings can be compared", points[0].refused)
     if len(tried) >= search.runs:
-        return _confirmation(found, number)
+        done = found.points[-1].purpose == "confirmation"
+        return [] if done else _confirmation(found, number)
     trials, chosen = found.trials, list[SearchPoint]()
     wanted = min(search.at_once, search.runs - len(tried))
     while sum(not one.refused for one in chosen) < wanted and len(chosen) < _MOST_REFUSED:
@@ -318,19 +313,19 @@ def next_points(found: SearchFindings) -> list[SearchPoint]:
             place = np.random.default_rng(seed).random(len(search.vary))
             one = _point(studied, place, number, "model", trials)
         place = studied.place(one.values)
-        if one.refused:
-            row = np.full((1, len(trials.low)), np.nan)
-            trials = replace(trials, places=np.vstack([trials.places, place]),
-                             values=np.vstack([trials.values, row]),
-                             errors=np.vstack([trials.errors, row]))  # fmt: skip
-        else:
-            trials = trials.believing(place)
+        gone = bool(one.refused)
+        trials = trials.joined(place, math.nan, math.nan) if gone else trials.believing(place)
         chosen.append(one)
     if all(one.refused for one in chosen):
-        raise InputError("the study's checks refuse one setting after the other",
-                         file=studied.file, field="search.vary", value=chosen[-1].refused,
-                         remedy="narrower bounds")  # fmt: skip
+        raise _stuck(studied, "one setting after the other is refused", chosen[-1].refused)
     return chosen
+
+
+def _stuck(studied: SearchedStudy, problem: str, value: str = "") -> InputError:
+    remedy = "other bounds; search/points.json has the reason of each setting"
+    return InputError(
+        problem, file=studied.file, field="search.vary", value=value or None, remedy=remedy
+    )
 
 
 def _point(
@@ -339,7 +334,7 @@ def _point(
     values = studied.values_at(place)
     said: dict[str, float] = {}
     if trials is not None:
-        mean, error = Model(trials).predict(studied.place(values)[None])
+        mean, error = Responses(trials).predict(studied.place(values)[None])
         said = {"predicted": float(mean[0, 0]), "predicted_se": float(error[0, 0])}
     return SearchPoint(
         values=values, round=number, purpose=purpose, refused=studied.refusal(values), **said
@@ -350,22 +345,17 @@ def _confirmation(found: SearchFindings, number: int) -> list[SearchPoint]:
     """The best setting by the model at the fidelity of the confirmation, and at the study's own."""
     studied = found.studied
 
+    gone = [one.values for one in found.points if one.refused]
+
     def accepted(place: Floats) -> bool:
         values = studied.values_at(place)
-        return not studied.refusal(values) and not any(
-            one.refused and one.values == values for one in found.points
-        )
+        return values not in gone and not studied.refusal(values)
 
     place = best_place(found.trials, accepted)
     if place is None:
-        raise InputError(
-            "the study's checks refuse every setting that the model expects to be good",
-            file=studied.file,
-            field="search.vary",
-            remedy="other bounds",
-        )
+        raise _stuck(studied, "every setting that the model expects to be good is refused")
     soft = _point(studied, place, number, "confirmation", found.trials)
     values = {**soft.values, "fidelity": studied.search.confirm}
     full = soft.model_copy(update={"values": values, "refused": studied.refusal(values)})
-    known = any(one.values == soft.values for one in found.points)
-    return [full] if known else [soft, full]
+    known = [one.values for one in found.points]
+    return [one for one in (soft, full) if one.values not in known]

@@ -12,9 +12,9 @@ from made_study import Load
 from pages import stands_alone
 
 from dragchain.search import report, rounds
-from dragchain.search.proposals import Model, Trials, best_place, propose, spread_places
+from dragchain.search.proposals import Responses, Trials, best_place, propose, spread_places
 from dragchain.search.report import advance, at_bounds
-from dragchain.search.rounds import SearchedStudy, findings
+from dragchain.search.rounds import SearchedStudy, read_findings
 from dragdeck.errors import InputError
 from dragdeck.project import Project
 from dragdeck.study.search import SearchPoint, SearchRecord
@@ -47,7 +47,7 @@ def test_the_best_place_is_that_of_the_model_within_the_limit() -> None:
     found = best_place(known, lambda place: True)
     assert found is not None
     np.testing.assert_allclose(found, BEST, atol=0.12)
-    mean, error = Model(known).predict(found[None])
+    mean, error = Responses(known).predict(found[None])
     assert abs(mean[0] - truth(found)) == pytest.approx([0, 0], abs=3 * error[0].max())
     assert error[0, 0] < SD[0]  # it knows that neighbours have noise of their own
     other = best_place(known, lambda place: place[1] > 0.3)
@@ -68,7 +68,7 @@ def test_proposals_follow_from_the_trials_and_keep_off_what_was_refused() -> Non
     first = propose(known, 3)
     assert (propose(known, 3) == first).all()
     assert first[0] < 0.75
-    assert Model(known).allowed(first[None])[0] > math.log(0.2)
+    assert Responses(known).allowed(first[None])[0] > math.log(0.2)
 
 
 # --- rounds --------------------------------------------------------------------------------------
@@ -157,13 +157,16 @@ def test_a_search_finds_the_best_setting_and_resumes_as_if_never_stopped(
     assert [text.split(" ")[0] for text in at_bounds(found_of(studied, engine), full)] == on
     assert ("lies on a bound" in page) == bool(on)
     # more runs continue it; another wish does not
+    load(CHANGES | {"search": SEARCH | {"runs": 10}})
+    assert advance(SearchedStudy(project, "small"), engine) == "round 5"
+    assert [one.purpose for one in points_of(studied)[len(points) :]] == ["model"]
     load(CHANGES | {"search": SEARCH | {"start": 5}})
     with pytest.raises(InputError, match="the study has changed since this search began"):
         advance(SearchedStudy(project, "small"), engine)
 
 
 def found_of(studied: SearchedStudy, engine: StandIn) -> rounds.SearchFindings:
-    found = findings(studied, points_of(studied), engine)
+    found = read_findings(studied, points_of(studied), engine)
     assert found is not None
     return found
 
@@ -185,7 +188,9 @@ def test_settings_that_are_refused_or_fail_are_infeasible(
     def fails(of: SearchedStudy, point: SearchPoint) -> Any:
         return "particles were lost" if point == points[-1] else engine(of, point)
 
-    found = findings(studied, [*points[:-1], points[-1].model_copy(update={"refused": ""})], fails)
+    found = read_findings(
+        studied, [*points[:-1], points[-1].model_copy(update={"refused": ""})], fails
+    )
     assert found is not None
     known = [k for k, one in enumerate(found.points) if not one.refused]
     assert np.isfinite(found.means[known]).all() and math.isnan(found.errors[-1, 0])

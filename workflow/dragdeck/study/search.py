@@ -38,7 +38,7 @@ SearchedQuantity = Literal[
 ]
 
 
-class Measure(Model):
+class SearchedMeasure(Model):
     """A quantity of a process, of the whole workpiece or of a part of its surface."""
 
     quantity: SearchedQuantity = Field(
@@ -54,7 +54,7 @@ class Measure(Model):
     )
 
     @model_validator(mode="after")
-    def _part(self) -> "Measure":
+    def _part(self) -> "SearchedMeasure":
         if self.heights_m and self.quantity not in ("removal_depth", "removal_variation"):
             raise ValueError(f"heights_m has no meaning for {self.quantity}: remove it")
         if self.heights_m and self.heights_m[0] >= self.heights_m[1]:
@@ -71,7 +71,7 @@ class Measure(Model):
         return next((name for name, missing in found.items() if missing), "")
 
 
-class Objective(Measure):
+class Objective(SearchedMeasure):
     """What is to be as small or large as possible, or near a value."""
 
     goal: Literal["minimise", "maximise", "target"] = Field(
@@ -86,7 +86,7 @@ class Objective(Measure):
         return self
 
 
-class SearchLimit(Measure):
+class SearchLimit(SearchedMeasure):
     """What must hold."""
 
     at_least: Number | None = Field(default=None, description="smallest accepted value")
