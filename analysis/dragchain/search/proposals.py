@@ -8,7 +8,7 @@ standard error of each value.
 """
 
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -27,7 +27,7 @@ _CANDIDATES = 12
 _LEAST_NOISE = 1e-4
 """Least variance of a value over that of all, which keeps the covariance invertible."""
 
-_REFUSED_LIMIT = 0.5
+_REFUSED_LIMIT, _REFUSED_SE = 0.5, 0.05
 """Of the response that is 1 where the study's checks refuse a setting, and else 0."""
 
 
@@ -61,11 +61,12 @@ class Trials:
         mean, _ = Responses(self).predict(place[None])
         return self.joined(place, mean, 1e-9)
 
-    def joined(self, place: Floats, values: Any, errors: float) -> "Trials":
+    def joined(self, place: Floats, value: Any, error: float) -> "Trials":
         """With a further place; its values are NaN if it was refused."""
-        rows = [np.broadcast_to(one, (1, len(self.low))) for one in (values, errors)]
+        rows = [np.broadcast_to(one, (1, len(self.low))) for one in (value, error)]
         every = (self.places, place), (self.values, rows[0]), (self.errors, rows[1])
-        return Trials(*map(np.vstack, every), self.low, self.high)
+        places, values, errors = (np.vstack(pair) for pair in every)
+        return Trials(places, values, errors, self.low, self.high)
 
 
 @contextmanager
@@ -143,44 +144,33 @@ def propose(trials: Trials, seed: int) -> Floats:
     from bayes_opt.acquisition import ExpectedImprovement
     from bayes_opt.exception import NoValidPointRegisteredError
 
-    count, dimensions = trials.places.shape
-    if (~trials.refused).sum() < 2:
+    dimensions, gone = trials.places.shape[1], trials.refused[:, None]
+    if (~gone).sum() < 2:
         return np.asarray(np.random.default_rng(seed).random(dimensions))
     mean, _ = Responses(trials).predict(trials.places)
-    gone = trials.refused[:, None]
-    spread = np.nanstd(trials.values, axis=0)
-    values = np.where(gone, mean, trials.values)
-    errors = np.where(gone, spread, trials.errors)
-    limited = [k for k in range(1, values.shape[1])]
-    columns = [(values[:, k], errors[:, k], trials.low[k], trials.high[k]) for k in limited]
-    if gone.any():
-        known = gone[:, 0].astype(float)
-        columns.append((known, np.full(count, 0.05), -np.inf, _REFUSED_LIMIT))
-    limits, options = None, dict[str, Any]()
-    if columns:
-        limits, spoilt, low, high = zip(*columns, strict=True)
-        options["constraint"] = NonlinearConstraint(_unused, list(low), list(high))
+    values = np.hstack([np.where(gone, mean, trials.values), gone])
+    errors = np.where(gone, np.nanstd(trials.values, axis=0), trials.errors)
+    errors = np.hstack([errors, np.full(gone.shape, _REFUSED_SE)])
+    processes = [_process(*pair, dimensions) for pair in zip(values.T, errors.T, strict=True)]
     names = [f"x{k}" for k in range(dimensions)]
     search = BayesianOptimization(
         None,
         dict.fromkeys(names, (0.0, 1.0)),
         acquisition_function=ExpectedImprovement(xi=0.0),
+        constraint=NonlinearConstraint(
+            _unused, [*trials.low[1:], -np.inf], [*trials.high[1:], _REFUSED_LIMIT]
+        ),
         random_state=seed,
         verbose=0,
         allow_duplicate_points=True,
-        **options,
     )
-    search.set_gp_params(**_parameters(values[:, 0], errors[:, 0], dimensions))
-    if limits is not None and search.constraint is not None:
-        for one, value, error in zip(search.constraint.model, limits, spoilt, strict=True):
-            one.set_params(**_parameters(value, error, dimensions))
-    for number, place in enumerate(trials.places):
-        own = np.array([one[number] for one in limits or ()])
-        search.register(
-            dict(zip(names, place, strict=True)),
-            -values[number, 0],
-            None if limits is None else own if len(own) > 1 else own[0],
-        )
+    assert search.constraint is not None
+    search.set_gp_params(**processes[0].get_params(deep=False))
+    for one, process in zip(search.constraint.model, processes[1:], strict=True):
+        one.set_params(**process.get_params(deep=False))
+    for place, row in zip(trials.places, values, strict=True):
+        limits = row[1:] if len(row) > 2 else row[1]
+        search.register(dict(zip(names, place, strict=True)), -row[0], limits)
     try:
         with _quiet():
             found = search.suggest()
@@ -193,11 +183,6 @@ def propose(trials: Trials, seed: int) -> Floats:
 def _unused(_: Any) -> Any:
     """The package asks for a function of a limit, but never calls it: values are registered."""
     raise NotImplementedError
-
-
-def _parameters(values: Floats, errors: Floats, dimensions: int) -> Mapping[str, Any]:
-    parameters: Mapping[str, Any] = _process(values, errors, dimensions).get_params(deep=False)
-    return parameters
 
 
 def best_place(trials: Trials, accepted: Callable[[Floats], bool]) -> Floats | None:
