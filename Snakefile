@@ -53,6 +53,14 @@ rule process:
         WORK.every_table("process"),
 
 
+# What a search reads of the settings so far: ./run search calls this round by round.
+rule searched:
+    input:
+        WORK.every("process", "run.json", "tables/figures.json", "tables/loading.json"),
+        WORK.every("process", "tables/extrapolated.json"),
+        WORK.every("filling", "run.json", "tables/figures.json"),
+
+
 # summary.csv, summary.parquet, summary.xlsx and report.html.
 rule report:
     input:

@@ -149,7 +149,7 @@ def test_tests_bring_their_packages(clone: Clone, arguments: list[str], called: 
     ended = clone.run("test", *arguments)
     assert ended.returncode == 0
     assert re.fullmatch(rf"{called} in .*\n", ended.stdout)
-    assert clone.extras() == ["cad", "compare", "crate", "docs", "notebook", "test"]
+    assert clone.extras() == ["cad", "compare", "crate", "docs", "notebook", "search", "test"]
 
 
 def test_a_failed_check_fails_the_whole_and_still_tests(clone: Clone, tmp_path: Path) -> None:
@@ -168,6 +168,36 @@ def test_studies_are_run_one_by_one_and_then_compared(clone: Clone) -> None:
     assert called == [each.format("a"), each.format("b"), last]
     failed = clone.run("compare", "--config", "studies=a,b", FAILS="snakemake")
     assert failed.returncode != 0 and len(failed.stdout.splitlines()) == 1
+
+
+STEPS = """\
+#!/bin/sh
+state=$(cat rounds)
+printf '%s\\n' "${state%% *}"
+[ "$state" = "${state#* }" ] || printf '%s' "${state#* }" > rounds
+"""
+"""A search whose steps say one word after the other of a file; the last one again and again."""
+
+
+@pytest.mark.parametrize(
+    ("rounds", "fails", "calls", "status"),
+    [
+        ("round round complete", "", 2, 0),
+        ("unfinished round complete", "", 2, 0),
+        ("round round complete", "snakemake", 2, 0),  # a run that failed is a finding
+        ("round unfinished", "snakemake", 1, 5),  # nothing can go on
+    ],
+)
+def test_a_search_goes_on_round_by_round(
+    clone: Clone, rounds: str, fails: str, calls: int, status: int
+) -> None:
+    (clone.root / "rounds").write_text(rounds)
+    write_program(clone.packages / "dragchain", STEPS)
+    clone.stamp.write_text(clone.stamp.read_text() + "search\n")
+    ended = clone.run("search", "--config", "study=a", FAILS=fails)
+    called = [line.partition(" in ")[0] for line in ended.stdout.splitlines()]
+    assert called == [f"{SNAKEMAKE} [searched] [--config] [study=a]"] * calls
+    assert ended.returncode == status
 
 
 # --- what is missing -----------------------------------------------------------------------
@@ -198,6 +228,7 @@ chmod +x ../bin/df"""
         ("", ["all", "--profile", "profiles/slurm"], {}, ["--workflow-profile"]),
         ("", ["compare", "--config", "study=a"], {}, ["no studies to compare", "studies=A,B"]),
         ("", ["compare", "--config", "studies=a b;c"], {}, ["not names of studies", "a b;c"]),
+        ("", ["search", "--config", "study=a", "fidelity=full"], {}, ["fidelity=full"]),
         ("", ["setup", "crates"], {}, ["crates", "cad, compare, crate, docs"]),
     ],
 )

@@ -178,6 +178,12 @@ STEPS = (
                 WINDOWS_RECORD,
                 Argument("--out", type=Path, required=True, metavar="FILE",
                           help="file to write; required"))),
+    Command("search", "choose the next settings of a search",
+            "Choose the next settings of the search of a study. It reads the runs of those so far, "
+            "writes points.json and search.html to results/STUDY/search, and prints unfinished, "
+            "the number of the round, or complete.",
+            "search.report:write_round", (
+        Argument("study", metavar="STUDY", help="name of the study"),)),
     Command("scaling", "fit a power law to the mean drag",
             "Fit a power law of the mean drag as a function of one field of the study. It reads "
             "the tables of the runs and writes scaling.json, .csv and .png to the folder.",

@@ -14,6 +14,7 @@ from dragdeck.scenes.lead import FIRST_WINDOWS, LEAD, with_leads
 from dragdeck.scenes.process import PROCESS, SCENES
 from dragdeck.scenes.scene import SceneType
 from dragdeck.study.base import NAME, NAME_LIMIT
+from dragdeck.study.search import RECORD as SEARCHED
 from dragdeck.study.workpiece import MeshShape
 from dragdeck.study.yaml import located, study_folders
 from dragdeck.sweep.cases import load_cases, study_file
@@ -70,7 +71,8 @@ class Project:
         """
         file = study_file(self.studies, study)
         try:
-            found = load_cases(file, fidelity, partial(resolve, tradeoff=tradeoff))
+            found_by = partial(resolve, tradeoff=tradeoff)
+            found = load_cases(file, fidelity, found_by, self.results(study) / SEARCHED)
             for case in found:
                 check_timestep(case)
                 check_timestep(case.of_filling, "fidelity.soft_start")

@@ -215,10 +215,7 @@ def removal_of(case: ReportedCase) -> RemovalOfCase | None:
     coefficient, rate = predict(removal, action, density, degrees)
     facets = _facets(wears, coefficient.value * factor, rate.coefficient)
     own = facets[facets["immersed"]]
-    depth, error, area = own[["depth_m_s", "depth_m_s_se", "area_m2"]].to_numpy(np.float64).T
-    mean = float(np.average(depth, weights=area))
-    square, scatter = (float(np.average(x**2, weights=area)) for x in (depth - mean, error))
-    ends = np.quantile(UM_PER_H * depth, (0.05, 0.95), weights=area, method="inverted_cdf")
+    _, variation, ends = depth_spread(own)
     edges = wears[0].edges
     return RemovalOfCase(
         removal=removal,
@@ -232,12 +229,22 @@ def removal_of(case: ReportedCase) -> RemovalOfCase | None:
             corrected=load.corrected and not removal.laws[-1].impact,
         ),
         impact_share=_over_packings([one.impact_share for one in wears]),
-        depth_um_h=rate.times(UM_PER_H / float(area.sum())),
+        depth_um_h=rate.times(UM_PER_H / float(own["area_m2"].sum())),
         mass_mg_h=rate.times(UM_PER_H * density),
         coefficient_m2_n=coefficient,
-        variation=(math.sqrt(square) / mean, math.sqrt(max(0.0, square - scatter)) / mean),
-        percentiles_um_h=(float(ends[0]), float(ends[1])),
+        variation=variation,
+        percentiles_um_h=ends,
     )
+
+
+def depth_spread(facets: pd.DataFrame) -> tuple[float, tuple[float, float], tuple[float, float]]:
+    """Mean depth over facets, um/h, coefficients of variation and percentiles (`RemovalOfCase`)."""
+    depth, error, area = facets[["depth_m_s", "depth_m_s_se", "area_m2"]].to_numpy(np.float64).T
+    mean = float(np.average(depth, weights=area))
+    square, scatter = (float(np.average(x**2, weights=area)) for x in (depth - mean, error))
+    low, high = np.quantile(UM_PER_H * depth, (0.05, 0.95), weights=area, method="inverted_cdf")
+    variation = (math.sqrt(square) / mean, math.sqrt(max(0.0, square - scatter)) / mean)
+    return UM_PER_H * mean, variation, (float(low), float(high))
 
 
 def _facets(wears: Sequence[Wear], scale: float, uncertainty: float) -> pd.DataFrame:

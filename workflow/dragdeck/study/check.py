@@ -17,10 +17,20 @@ from dragdeck.study.base import Json, Model, flat
 from dragdeck.study.model import BUILT_IN_FIDELITIES, AnyPath, Scaling, Study, Tolerance
 from dragdeck.study.plausible import implausible
 from dragdeck.study.recorded import Places, recorded_file, with_recording
+from dragdeck.study.search import Search
 from dragdeck.study.workpiece import CylinderShape, Shape
 from dragdeck.study.yaml import located, shown
 
-_NO_SWEEP = ("accepted", "assumptions", "reference", "removal", "scaling", "sweep", "title")
+_NO_SWEEP = (
+    "accepted",
+    "assumptions",
+    "reference",
+    "removal",
+    "scaling",
+    "search",
+    "sweep",
+    "title",
+)
 """Blocks that no run depends on: cases that differ in them would be the same."""
 
 _LEAST_LEVELS = 3
@@ -213,7 +223,7 @@ def _removal(study: Study) -> _Found:
     if "force_slide" in asked and removal.laws[-1].impact:
         problem = f"windows do not see the impacts that the law {removal.law} reads"
         yield "fidelity.quantity", problem, "the law archard, or without force_slide"
-    several = study.workpieces is not None or {*study.sweep} - {"seed"}
+    several = study.workpieces is not None or study.search or {*study.sweep} - {"seed"}
     if removal.calibrate and several:
         problem = "a weighed trial is of one process, but the study has several cases"
         yield "removal.calibrate", problem, "one workpiece, and a sweep over seed at most"
@@ -233,6 +243,29 @@ def _sweep(study: Study) -> _Found:
         yield "sweep", f"makes {count} cases, more than are accepted", limit
     if study.scaling is not None:
         yield from _scaling(study.scaling, study)
+    if study.search is not None:
+        yield from _search(study.search, study)
+
+
+def _search(search: Search, study: Study) -> _Found:
+    """Why no run of the study could answer the search."""
+    if {*study.sweep} != {"seed"} or len(study.sweep["seed"]) < 2:
+        problem = "a search knows the scatter of its runs from several packings at each setting"
+        yield "sweep", problem, "seed: [1, 2] or more, and no other field"
+    if study.workpieces is not None:
+        yield "search", "a search is of one workpiece", "a study without workpieces"
+    removal, touches = study.removal, bool(study.outputs.first_touch_fraction)
+    target = bool(removal and removal.target_depth_m)
+    measures = {f"limits.{number}": one for number, one in enumerate(search.limits)}
+    for name, one in {"objective": search.objective, **measures}.items():
+        if lacking := one.lacks(removal is not None, target, touches):
+            limit = f"a study with {lacking}, or another quantity"
+            yield f"search.{name}.quantity", f"no run has {one.quantity}", limit
+    for field in search.vary:
+        if field.split(".")[0] in (*_NO_SWEEP, "fidelity", "fidelities", "seed", "outputs"):
+            yield f"search.vary.{field}", "it is no setting of the machine", "another field"
+    known = {**BUILT_IN_FIDELITIES, **study.fidelities}
+    yield from _known("search.confirm", search.confirm, known, "unknown fidelity")
 
 
 def _scaling(scaling: Scaling, study: Study) -> _Found:

@@ -31,6 +31,7 @@ from dragdeck.study.paths.rest import RestPath
 from dragdeck.study.paths.waypoints import WaypointsPath
 from dragdeck.study.reference import Reference
 from dragdeck.study.removal import Removal
+from dragdeck.study.search import Search
 from dragdeck.study.superposed.motion import SuperposedMotion
 from dragdeck.study.superposed.oscillation import Oscillation
 from dragdeck.study.superposed.spin import Spin, SpinStage
@@ -552,6 +553,7 @@ class Study(Model):
     assumptions: list[Assumption] = Field(default_factory=list)
     reference: Reference | None = None
     removal: Removal | None = Field(default=None, exclude_if=lambda value: value is None)
+    search: Search | None = Field(default=None, exclude_if=lambda value: value is None)
 
     def of_each_workpiece(self) -> Sequence["Study"]:
         """The study of each workpiece alone, its path and its place of immersion turned.

@@ -124,6 +124,7 @@ _RANGES = {
     "reference.signal.*_s*": _Range(-1e10, -1e3, 1e5, 1e10, {"ms": 1e-3}),
     "reference.signal.margin": _Range(1e-4, 1e-3, 0.5, 1, {"%": 0.01}),
     "reference.signal.sign": _Range(-1, -1, 1, 1, {}),
+    "search.*": _Range(-1e30, -1e20, 1e20, 1e30, {}),
     "removal.*_m2_n": _Range(1e-22, 1e-19, 1e-9, 1e-6, {"mm3/(N m)": 1e-9}),
     "removal.calibrate*_kg": _Range(1e-12, 1e-9, 0.1, 10, {"g": 1e-3, "mg": 1e-6}),
     "removal.calibrate*time_s": _Range(0.01, 1, 1e6, 1e8, {"min": 60}),

@@ -29,6 +29,7 @@ from dragdeck.errors import InputError, choices, together
 from dragdeck.study.base import NAME, NAME_LIMIT, STUDY_FILE, Json, Model
 from dragdeck.study.check import explained, validate
 from dragdeck.study.model import Tolerance
+from dragdeck.study.search import Search, SearchRecord
 from dragdeck.study.yaml import read_study, read_yaml
 
 Settings = Mapping[str, Any]
@@ -125,7 +126,10 @@ Resolve = Callable[[Case, Tolerance], Case]
 
 
 def load_cases(
-    file: Path, fidelity: str | None = None, resolve: Resolve | None = None
+    file: Path,
+    fidelity: str | None = None,
+    resolve: Resolve | None = None,
+    searched: Path | None = None,
 ) -> list[Case]:
     """All cases of a study file.
 
@@ -137,6 +141,8 @@ def load_cases(
         Instead of the study's own.
     resolve : callable, optional
         Finds the settings where a case asks for a tolerance.
+    searched : Path, optional
+        The record of the study's search: its points are cases, too.
 
     Raises
     ------
@@ -146,8 +152,16 @@ def load_cases(
     data = read_study(file)
     if fidelity is not None:
         data["fidelity"] = fidelity
-    plain, found, errors = {**data, "sweep": {}}, [], []
-    for settings in combinations(validate(data, file, whole=True).sweep):
+    study = validate(data, file, whole=True)
+    plain, found, errors = {**data, "sweep": {}, "search": None}, [], []
+    points = list[Settings]([{}])
+    if study.search is not None:
+        _check_bounds(file, plain, study.search)
+        if searched and searched.is_file():
+            known = SearchRecord.read(searched).points
+            points = [one.values for one in known if not one.refused] or points
+    for point, settings in itertools.product(points, combinations(study.sweep)):
+        settings = {**point, **settings}
         try:
             found.append(settle_case(file, plain, settings, resolve=resolve))
         except InputError as error:
@@ -156,6 +170,19 @@ def load_cases(
         raise together(errors)
     _check_doubles(found)
     return beside_each_other(found)
+
+
+def _check_bounds(file: Path, plain: Json, search: Search) -> None:
+    """Refuse a field that can be varied neither to its lowest nor to its highest value."""
+    for field, bounds in search.vary.items():
+        errors = []
+        for value in bounds:
+            try:
+                settle_case(file, {**plain, "fidelity": search.confirm}, {field: value})
+            except InputError as error:
+                errors.append(error)
+        if len(errors) == len(bounds):
+            raise errors[0]
 
 
 def _check_doubles(found: list[Case]) -> None:

@@ -1,0 +1,1 @@
+"""A search for a setting of the machine by Bayesian optimisation."""

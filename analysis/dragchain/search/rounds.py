@@ -1,0 +1,361 @@
+"""The rounds of a search: read the runs of its settings, choose the next ones, confirm the best.
+
+`write_round` is called before each round. What it chooses follows from the study, the record and
+the runs alone, so that an interrupted search goes on as if it had not been interrupted.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dragchain.arrays import Floats
+from dragchain.report.cases import ReportedCase, read_study_runs
+from dragchain.report.removal import depth_spread, removal_of
+from dragchain.run.basis import QUANTITIES
+from dragchain.run.workpiece import read_surface
+from dragchain.search.proposals import Responses, Trials, best_place, propose, spread_places
+from dragchain.statistics.estimate import Estimate, t_interval
+from dragdeck.advice.advise import resolve
+from dragdeck.cases.case import Case, digest
+from dragdeck.engine.status import run_status
+from dragdeck.errors import InputError
+from dragdeck.outlook.timestep import check_timestep
+from dragdeck.project import Project
+from dragdeck.scenes.process import PROCESS, SCENES
+from dragdeck.study.check import validate
+from dragdeck.study.model import Study
+from dragdeck.study.search import (
+    RECORD,
+    Objective,
+    Search,
+    SearchedMeasure,
+    SearchPoint,
+)
+from dragdeck.study.yaml import read_study
+from dragdeck.sweep.cases import Settings, settle_case, study_file
+
+_REJECTED = "run rejected: "
+_MOST_REFUSED = 20
+"""Settings of a round that the study's checks may refuse one after the other."""
+
+_OWN: Mapping[str, tuple[str, str]] = {
+    "removal_depth": ("mean depth of removal per hour", "µm/h"),
+    "removal_variation": ("coefficient of variation of the depth of removal", ""),
+    "minutes": ("time to the target depth on average", "min"),
+    "minutes_slowest": ("time to the target depth on 95 % of the surface", "min"),
+    "peak_pressure": ("95th percentile of the peak Hertz pressure", "Pa"),
+}
+"""Label and unit of the quantities that are not in the registry of the report."""
+
+_LABELS = {**_OWN, **{one.name: (one.label, one.unit) for one in QUANTITIES}}
+
+
+def label(measure: SearchedMeasure) -> str:
+    """What is measured, with its unit."""
+    (text, unit), part = _LABELS[measure.quantity], measure.heights_m
+    heights = f" from {1e3 * part[0]:g} to {1e3 * part[1]:g} mm above the tip" if part else ""
+    return text + heights + (f" ({unit})" if unit else "")
+
+
+def quantity_of(measure: SearchedMeasure, run_dir: Path) -> float:
+    """A quantity of one process run, NaN if it has no finite value."""
+    one, name = ReportedCase((read_study_runs(run_dir),)), measure.quantity
+    if name == "peak_pressure":
+        touches = one.first.wear.touches if one.first.wear else None
+        return touches.quantities["peak_pressure_pa"].p95 if touches else math.nan
+    if name not in _OWN:
+        standing = one.values.of(name)
+        return standing.shown.value if standing else math.nan
+    found = removal_of(one)
+    if found is None:
+        return math.nan
+    if name in ("minutes", "minutes_slowest"):
+        mean, slowest = found.minutes.values()
+        value = (mean if name == "minutes" else slowest).value
+        return value if math.isfinite(value) else math.nan
+    own = found.facets[found.facets["immersed"]]
+    if measure.heights_m:
+        low, high = measure.heights_m
+        height = read_surface(run_dir, one.first.process.case).centres[:, 2]
+        own = own[((height >= low) & (height < high))[own.index]]
+    if own.empty or not own["depth_m_s"].any():
+        return math.nan
+    depth, variation, _ = depth_spread(own)
+    return depth if name == "removal_depth" else variation[1]
+
+
+# --- the study -----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class SearchedStudy:
+    """A study with a search."""
+
+    project: Project
+    name: str
+
+    @cached_property
+    def file(self) -> Path:
+        """The study file."""
+        return study_file(self.project.studies, self.name)
+
+    @cached_property
+    def study(self) -> Study:
+        """The study with its search; its bounds are checked."""
+        self.project.cases(self.name)
+        found = validate(read_study(self.file), self.file, whole=True)
+        if found.search is None:
+            raise InputError(
+                "a required key is missing",
+                file=self.file,
+                field="search",
+                remedy="say what may vary and what is wanted: docs/howto/sweep.md",
+            )
+        return found
+
+    @property
+    def search(self) -> Search:
+        """Its search."""
+        assert self.study.search is not None
+        return self.study.search
+
+    @property
+    def measures(self) -> Sequence[SearchedMeasure]:
+        """The objective, and the quantities of the limits."""
+        return [self.search.objective, *self.search.limits]
+
+    @property
+    def record(self) -> Path:
+        """The file of the record."""
+        return self.project.results(self.name) / RECORD
+
+    def asked(self) -> str:
+        """Hash of all that the choice of settings depends on, but not of how many there are."""
+        base = PROCESS.digest(self.case({}, self.study.sweep["seed"][0]))
+        search = {name: one for name, one in self.search.plain().items() if name != "runs"}
+        return digest({"base": base, "search": search, "sweep": dict(self.study.sweep)})
+
+    def case(self, values: Settings, seed: int) -> Case:
+        """The case of a setting with a packing."""
+        plain = {**read_study(self.file), "sweep": {}, "search": None}
+        return settle_case(self.file, plain, {**values, "seed": seed}, resolve=resolve)
+
+    def folders(self, values: Settings) -> list[Path]:
+        """The process runs of a setting, one per packing."""
+        cases = [self.case(values, seed) for seed in self.study.sweep["seed"]]
+        return [self.project.run_folder(case, PROCESS) for case in cases]
+
+    def refusal(self, values: Settings) -> str:
+        """Why the study's checks refuse a setting, in one line; empty if they accept it."""
+        try:
+            case = self.case(values, self.study.sweep["seed"][0])
+            check_timestep(case)
+            for scene in SCENES.values():
+                scene.build(case, None)
+        except InputError as error:
+            return " ".join(filter(None, (error.field, error.problem)))
+        return ""
+
+    def place(self, values: Settings) -> Floats:
+        """A setting in fractions of its bounds."""
+        return np.array(
+            [(values[one] - low) / (high - low) for one, (low, high) in self.search.vary.items()]
+        )
+
+    def values_at(self, place: Floats) -> dict[str, Any]:
+        """The setting at a place, rounded to a thousandth of its range."""
+        found: dict[str, Any] = {}
+        for part, (field, (low, high)) in zip(place, self.search.vary.items(), strict=True):
+            digits = 2 - math.floor(math.log10(high - low))
+            value = min(max(round(low + float(part) * (high - low), digits), low), high)
+            found[field] = int(value) if value.is_integer() else value
+        return found
+
+
+Measured = Floats | str | None
+"""Of a setting: its (P, Q) quantities in each packing; why its runs were rejected; or not yet."""
+
+
+def read_point(studied: SearchedStudy, point: SearchPoint) -> Measured:
+    """What the runs of a setting say."""
+    folders = studied.folders(point.values)
+    states = [run_status(folder) for folder in folders]
+    failed = next((one for one in states if one.state == "failed" and one.final), None)
+    if failed:
+        return failed.problem.partition("\n")[0]
+    if any(one.state != "complete" for one in states):
+        return None
+    found = np.array([[quantity_of(one, folder) for one in studied.measures] for folder in folders])
+    return found if np.isfinite(found).all() else "a quantity has no finite value"
+
+
+# --- findings ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class SearchFindings:
+    """What the settings so far have shown.
+
+    Attributes
+    ----------
+    studied : SearchedStudy
+    points : sequence of SearchPoint
+    packings : (N, P, Q) ndarray
+        Quantities of each point in each packing; NaN where no run counts.
+    """
+
+    studied: SearchedStudy
+    points: Sequence[SearchPoint]
+    packings: Floats
+
+    @cached_property
+    def searched(self) -> Any:
+        """Whether a point is no confirmation, (N,)."""
+        return np.array([one.purpose != "confirmation" for one in self.points])
+
+    @cached_property
+    def means(self) -> Floats:
+        """Means over the packings, (N, Q)."""
+        return np.asarray(self.packings.mean(axis=1))
+
+    @cached_property
+    def errors(self) -> Floats:
+        """Standard errors of the means, (N, Q), from the scatter pooled over all points searched.
+
+        The scatter of a coefficient of variation is taken as the same at all points, that of any
+        other quantity as in proportion to it.
+        """
+        means, count = self.means, self.packings.shape[1]
+        own = [one.quantity == "removal_variation" for one in self.studied.measures]
+        scale = np.where(own, 1.0, np.abs(means))
+        variance = self.packings.var(axis=1, ddof=1) / scale**2
+        pooled = np.sqrt(np.nanmean(variance[self.searched], axis=0) / count)
+        return np.asarray(np.where(np.isnan(means), np.nan, pooled * scale))
+
+    def estimate(self, point: int, measure: int) -> Estimate:
+        """A quantity at a point with its interval."""
+        known = np.isfinite(self.means[self.searched, 0]).sum() * (self.packings.shape[1] - 1)
+        return t_interval(self.means[point, measure], self.errors[point, measure], int(known))
+
+    @cached_property
+    def trials(self) -> Trials:
+        """Points searched as the model knows them: its first response is to be small."""
+        search, values = self.studied.search, self.means[self.searched].copy()
+        values[:, 0] = loss(search.objective, values[:, 0])
+        ends = [(one.at_least, one.at_most) for one in search.limits]
+        return Trials(
+            np.array([self.studied.place(one.values) for one in self.of_search]),
+            values,
+            self.errors[self.searched],
+            np.array([-np.inf, *(-np.inf if low is None else low for low, _ in ends)]),
+            np.array([np.inf, *(np.inf if high is None else high for _, high in ends)]),
+        )
+
+    @property
+    def of_search(self) -> list[SearchPoint]:
+        """The points that are no confirmation."""
+        return [one for one in self.points if one.purpose != "confirmation"]
+
+
+def loss(objective: Objective, value: Any) -> Any:
+    """What is to be small for the goal; its own inverse but for a target."""
+    if objective.goal == "target":
+        return abs(value - objective.value)
+    return -value if objective.goal == "maximise" else value
+
+
+def read_findings(
+    studied: SearchedStudy,
+    points: Sequence[SearchPoint],
+    measure: Callable[[SearchedStudy, SearchPoint], Measured],
+) -> SearchFindings | None:
+    """Read all points; those whose runs were rejected say so then. None if a run has not ended."""
+    rows, known = list[Floats](), list[SearchPoint]()
+    shape = len(studied.study.sweep["seed"]), len(studied.measures)
+    for one in points:
+        found = one.refused if one.refused else measure(studied, one)
+        if found is None:
+            return None
+        gone = isinstance(found, str)
+        rows.append(np.full(shape, np.nan) if isinstance(found, str) else found)
+        why = f"{_REJECTED}{found}" if gone and not one.refused else one.refused
+        known.append(one.model_copy(update={"refused": why}))
+    return SearchFindings(studied, known, np.array(rows).reshape(-1, *shape))
+
+
+# --- the next round ------------------------------------------------------------------------------
+
+
+def next_points(found: SearchFindings) -> list[SearchPoint]:
+    """The points of the next round; none if the search is complete."""
+    studied, search, points = found.studied, found.studied.search, found.of_search
+    tried = [one for one in points if not one.refused or one.refused.startswith(_REJECTED)]
+    number = 1 + max((one.round for one in found.points), default=0)
+    if not points:
+        places = list(spread_places(search.start, len(search.vary), search.seed))
+        return [_point(studied, place, number, "start") for place in places]
+    if np.isfinite(found.means[:, 0]).sum() < 2:
+        raise _stuck(studied, "fewer than two settings can be compared", points[0].refused)
+    if len(tried) >= search.runs:
+        done = found.points[-1].purpose == "confirmation"
+        return [] if done else _confirmation(found, number)
+    trials, chosen = found.trials, list[SearchPoint]()
+    wanted = min(search.at_once, search.runs - len(tried))
+    while sum(not one.refused for one in chosen) < wanted and len(chosen) < _MOST_REFUSED:
+        seed = search.seed + 1000 * len(found.points) + len(chosen)
+        one = _point(studied, propose(trials, seed), number, "model", trials)
+        if any(one.values == other.values for other in (*found.points, *chosen)):
+            place = np.random.default_rng(seed).random(len(search.vary))
+            one = _point(studied, place, number, "model", trials)
+        place = studied.place(one.values)
+        gone = bool(one.refused)
+        trials = trials.joined(place, math.nan, math.nan) if gone else trials.believing(place)
+        chosen.append(one)
+    if all(one.refused for one in chosen):
+        raise _stuck(studied, "one setting after the other is refused", chosen[-1].refused)
+    return chosen
+
+
+def _stuck(studied: SearchedStudy, problem: str, value: str = "") -> InputError:
+    remedy = "other bounds; search/points.json has the reason of each setting"
+    return InputError(
+        problem, file=studied.file, field="search.vary", value=value or None, remedy=remedy
+    )
+
+
+def _point(
+    studied: SearchedStudy, place: Floats, number: int, purpose: Any, trials: Trials | None = None
+) -> SearchPoint:
+    values = studied.values_at(place)
+    said: dict[str, float] = {}
+    if trials is not None:
+        mean, error = Responses(trials).predict(studied.place(values)[None])
+        said = {"predicted": float(mean[0, 0]), "predicted_se": float(error[0, 0])}
+    return SearchPoint(
+        values=values, round=number, purpose=purpose, refused=studied.refusal(values), **said
+    )
+
+
+def _confirmation(found: SearchFindings, number: int) -> list[SearchPoint]:
+    """The best setting by the model at the fidelity of the confirmation, and at the study's own."""
+    studied = found.studied
+
+    gone = [one.values for one in found.points if one.refused]
+
+    def accepted(place: Floats) -> bool:
+        values = studied.values_at(place)
+        return values not in gone and not studied.refusal(values)
+
+    place = best_place(found.trials, accepted)
+    if place is None:
+        raise _stuck(studied, "every setting that the model expects to be good is refused")
+    soft = _point(studied, place, number, "confirmation", found.trials)
+    values = {**soft.values, "fidelity": studied.search.confirm}
+    full = soft.model_copy(update={"values": values, "refused": studied.refusal(values)})
+    known = [one.values for one in found.points]
+    return [one for one in (soft, full) if one.values not in known]

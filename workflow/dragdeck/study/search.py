@@ -1,0 +1,184 @@
+"""A search for a setting of the machine: what may vary, what is wanted, and the points so far.
+
+A search is like a `sweep` whose points are not known beforehand: `SearchRecord` keeps those that
+were chosen, and each of them is a case of the study.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from dragdeck.documents import Document, Part
+from dragdeck.study.base import Model, Name, Number, Whole
+
+RECORD = Path("search") / "points.json"
+"""The record of a search in the results of its study."""
+
+_OF_TARGET = ("minutes", "minutes_slowest")
+_OF_REMOVAL = ("removal_depth", "removal_variation", *_OF_TARGET)
+_OF_TOUCH = ("peak_pressure",)
+
+SearchedQuantity = Literal[
+    "removal_depth",
+    "removal_variation",
+    "minutes",
+    "minutes_slowest",
+    "peak_pressure",
+    "drag_mean",
+    "vertical_mean",
+    "workpiece_contacts",
+    "contact_force_mean",
+    "contact_force_p90",
+    "normal_load",
+    "force_slide",
+    "friction_work",
+    "workpiece_work",
+]
+
+
+class SearchedMeasure(Model):
+    """A quantity of a process, of the whole workpiece or of a part of its surface."""
+
+    quantity: SearchedQuantity = Field(
+        description="`removal_depth` (mean over the immersed surface, um/h), `removal_variation` "
+        "(coefficient of variation of it), `minutes` (to `removal.target_depth_m` on average) or "
+        "`minutes_slowest` (on 95 % of the surface), `peak_pressure` (95th percentile over first "
+        "touches, Pa), or a quantity of the report, in its unit"
+    )
+    heights_m: tuple[Number, Number] | None = Field(
+        default=None,
+        description="of `removal_*`: part of the surface between two heights above the tip, m; "
+        "none: all of it",
+    )
+
+    @model_validator(mode="after")
+    def _part(self) -> "SearchedMeasure":
+        if self.heights_m and self.quantity not in ("removal_depth", "removal_variation"):
+            raise ValueError(f"heights_m has no meaning for {self.quantity}: remove it")
+        if self.heights_m and self.heights_m[0] >= self.heights_m[1]:
+            raise ValueError("heights_m must increase: give the lower height first")
+        return self
+
+    def lacks(self, removal: bool, target: bool, touches: bool) -> str:
+        """The field without which no run has this quantity, empty if there is none."""
+        found = {
+            "removal": self.quantity in _OF_REMOVAL and not removal,
+            "removal.target_depth_m": self.quantity in _OF_TARGET and not target,
+            "outputs.first_touch_fraction": self.quantity in _OF_TOUCH and not touches,
+        }
+        return next((name for name, missing in found.items() if missing), "")
+
+
+class Objective(SearchedMeasure):
+    """What is to be as small or large as possible, or near a value."""
+
+    goal: Literal["minimise", "maximise", "target"] = Field(
+        default="minimise", description="what is wanted of it: minimise, maximise or target"
+    )
+    value: Number | None = Field(default=None, description="of the goal `target`: the value")
+
+    @model_validator(mode="after")
+    def _wanted(self) -> "Objective":
+        if (self.value is None) == (self.goal == "target"):
+            raise ValueError("value belongs to the goal target, and to no other")
+        return self
+
+
+class SearchLimit(SearchedMeasure):
+    """What must hold."""
+
+    at_least: Number | None = Field(default=None, description="smallest accepted value")
+    at_most: Number | None = Field(default=None, description="largest accepted value")
+
+    @model_validator(mode="after")
+    def _any(self) -> "SearchLimit":
+        low, high = self.at_least, self.at_most
+        if low is None and high is None:
+            raise ValueError("a limit has at_least, at_most or both")
+        if low is not None and high is not None and low >= high:
+            raise ValueError(f"at_least {low:g} is not below at_most {high:g}")
+        return self
+
+
+class Search(Model):
+    """Which setting of the machine is best: Bayesian optimisation over some fields."""
+
+    vary: dict[str, tuple[Number, Number]] = Field(
+        min_length=1,
+        max_length=8,
+        description="dotted field name: its lowest and highest value, in the unit of the field",
+    )
+    objective: Objective
+    limits: list[SearchLimit] = Field(default_factory=list, description="limits on quantities")
+    runs: Annotated[Whole, Field(ge=4, le=200)] = Field(
+        default=20, description="number of settings that are tried before the confirmation"
+    )
+    start: Annotated[Whole, Field(ge=3, le=100)] = Field(
+        default=6, description="those of the first round, spread evenly"
+    )
+    at_once: Annotated[Whole, Field(ge=1, le=16)] = Field(
+        default=1, description="settings per further round"
+    )
+    confirm: Name = Field(
+        default="full", description="fidelity at which the best setting is run again"
+    )
+    seed: Annotated[Whole, Field(ge=0, lt=2**31)] = Field(
+        default=1, description="random seed of the search"
+    )
+
+    @model_validator(mode="after")
+    def _order(self) -> "Search":
+        for field, (low, high) in self.vary.items():
+            if low >= high:
+                raise ValueError(
+                    f"the bounds of {field} must increase, but go from {low:g} to {high:g}"
+                )
+        if self.runs < self.start:
+            raise ValueError(f"runs {self.runs} is fewer than the {self.start} of the first round")
+        return self
+
+
+Purpose = Literal["start", "model", "confirmation"]
+
+
+class SearchPoint(Part):
+    """A setting that was chosen.
+
+    Attributes
+    ----------
+    values : mapping
+        Dotted field: value.
+    round : int
+        In which it was chosen, from 1.
+    purpose : Purpose
+    predicted, predicted_se : float or None
+        Objective and its standard error by the model before the run.
+    refused : str
+        Why no run of it counts; empty if there is no reason.
+    """
+
+    values: Mapping[str, Any]
+    round: int
+    purpose: Purpose
+    predicted: float | None = None
+    predicted_se: float | None = None
+    refused: str = ""
+
+
+class SearchRecord(Document):
+    """The content of ``points.json``.
+
+    Attributes
+    ----------
+    asked : str
+        Hash of what the points were chosen for.
+    points : tuple of SearchPoint
+        In the order in which they were chosen.
+    """
+
+    remedy = "remove it, and search again: runs that are there are not repeated"
+
+    asked: str
+    points: tuple[SearchPoint, ...] = ()
