@@ -8,6 +8,7 @@ import argparse
 import sys
 
 import nbformat
+from examples import EXAMPLES, run_example
 from figures import draw_all
 from nbclient import NotebookClient
 from page_parts import PageError, stale_files
@@ -20,7 +21,10 @@ def main() -> int:
     parser.add_argument("--check", action="store_true", help="change nothing, list stale files")
     parser.add_argument("--figures", action="store_true", help="draw the figures, too")
     parser.add_argument("--notebooks", action="store_true", help="run examples/, keep their output")
+    parser.add_argument("--example", choices=EXAMPLES, help="run its study, renew what it shows")
     options = parser.parse_args()
+    if options.example:
+        run_example(options.example)
     try:
         stale = list(stale_files())
     except PageError as error:

@@ -4,10 +4,12 @@ import argparse
 import re
 import types
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 import pandas as pd
 from annotated_types import Ge, Gt, Le, Lt, MaxLen, MinLen
+from examples import EXAMPLES, study_text
 from pybtex.database import parse_file
 from pybtex.plugin import find_plugin
 from pydantic import BaseModel
@@ -213,5 +215,6 @@ TEXTS: dict[str, Callable[[], str]] = {
     "dragchain": lambda: command_sections(DRAGCHAIN.parser()),
     "columns": columns,
     "bibliography": bibliography,
+    **{f"study_{name}": partial(study_text, name) for name in EXAMPLES},
 }
 """What a page can enclose by two comments."""
