@@ -8,11 +8,11 @@ import argparse
 import sys
 
 import nbformat
-from examples import EXAMPLES, run_example
 from figures import draw_all
 from nbclient import NotebookClient
 from page_parts import PageError, stale_files
 from records import ROOT
+from worked_examples import EXAMPLES, run_example
 
 
 def main() -> int:

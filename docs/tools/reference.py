@@ -9,13 +9,13 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 import pandas as pd
 from annotated_types import Ge, Gt, Le, Lt, MaxLen, MinLen
-from examples import EXAMPLES, study_text
 from pybtex.database import parse_file
 from pybtex.plugin import find_plugin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 from records import ROOT
+from worked_examples import EXAMPLES, study_text
 
 from dragchain.cli import PROGRAM as DRAGCHAIN
 from dragchain.tables.columns import _UNITS as UNITS
