@@ -384,7 +384,7 @@ class Fidelity(Model):
     ranks: Ranks = Field(
         default=2,
         description="number of MPI ranks; auto: chosen from particles, cases and cores "
-        "(docs/howto/scale_up.md)",
+        "(docs/howto/running.md)",
     )
 
     windows: Windows | None = Field(
