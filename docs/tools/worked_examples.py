@@ -8,7 +8,6 @@ import re
 import subprocess
 import sys
 from pathlib import Path
-from time import monotonic
 
 import pandas as pd
 import run_records
@@ -51,16 +50,13 @@ def study_text(name: str) -> str:
 
 def run_example(study: str) -> None:
     """Run a study and renew what its page shows; Snakemake's error if a run fails."""
-    began, results = monotonic(), ROOT / "results" / study
+    results = ROOT / "results" / study
     words = ["-m", "snakemake", "all", "--config", f"study={study}"]
     subprocess.run([sys.executable, *words], cwd=ROOT, check=True)
-    call_s, record = monotonic() - began, DATA / "examples" / f"{study}.csv"
     program = Path(sys.executable).with_name("dragdeck")
     subprocess.run([program, "preview", study], cwd=ROOT, check=True)
     summary = pd.read_csv(results / "report/summary.csv").drop(columns=["headline", "settings"])
-    if call_s < summary["wall_time_s"].max() and record.exists():  # nothing was repeated
-        call_s = pd.read_csv(record)["call_s"].iloc[0]
-    summary.assign(call_s=call_s).to_csv(record, index=False, float_format="%.6g")
+    summary.to_csv(DATA / "examples" / f"{study}.csv", index=False, float_format="%.6g")
     for name, place in EXAMPLES[study].items():
         (file,) = results.glob(place)
         out = ROOT / "docs/examples/images" / f"{study}_{name}.png"
