@@ -27,8 +27,8 @@ EXAMPLES: dict[str, dict[str, str]] = {
     },
     "tilted_stream": {
         "preview": "preview.png",
-        "upright": "process/*tilt_deg-0_rpm-0-*/figures/workpiece.png",
-        "tilted": "process/*tilt_deg-10_rpm-60-*/figures/workpiece.png",
+        "upright": "process/*tilt_deg-0-*/figures/workpiece.png",
+        "tilted": "process/*tilt_deg-10-*/figures/workpiece.png",
     },
     "mixture": {
         "network": "process/*/figures/network_xz.png",
