@@ -20,7 +20,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--check", action="store_true", help="change nothing, list stale files")
     parser.add_argument("--figures", action="store_true", help="draw the figures, too")
-    parser.add_argument("--notebooks", action="store_true", help="run the notebooks, keep their output")
+    parser.add_argument("--notebooks", action="store_true", help="run notebooks, keep their output")
     parser.add_argument("--example", choices=EXAMPLES, help="run its study, renew what it shows")
     options = parser.parse_args()
     if options.example:

@@ -16,8 +16,8 @@ class NotebookParser(MystParser):
 
     def parse(self, inputstring: str, document: nodes.document) -> None:
         """Fill the document."""
-        notebook = nbformat.reads(inputstring, as_version=4)
-        super().parse("\n\n".join(part for cell in notebook.cells for part in _parts(cell)), document)
+        cells = nbformat.reads(inputstring, as_version=4).cells
+        super().parse("\n\n".join(part for cell in cells for part in _parts(cell)), document)
 
 
 def _parts(cell: NotebookNode) -> Iterator[str]:
