@@ -30,7 +30,9 @@ def _parts(cell: NotebookNode) -> Iterator[str]:
         if "image/png" in data:
             yield f"![plot](data:image/png;base64,{''.join(data['image/png'].split())})"
         elif "text/html" in data:
-            yield f"```{{raw}} html\n{data['text/html']}\n```"
+            table = data["text/html"].replace('border="1" class="dataframe"', 'class="table"')
+            scrolled = f'<div class="pst-scrollable-table-container">{table}</div>'
+            yield f"```{{raw}} html\n{scrolled}\n```"
         else:
             yield f"```text\n{data['text/plain']}\n```"
 
