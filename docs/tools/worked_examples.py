@@ -31,6 +31,7 @@ EXAMPLES: dict[str, dict[str, str]] = {
         "tilted": "process/*tilt_deg-10-*/figures/workpiece.png",
     },
     "mixture": {
+        "preview": "preview.png",
         "network": "process/*/figures/network_xz.png",
         "depth": "process/*/figures/force_depth.png",
     },
