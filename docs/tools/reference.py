@@ -253,8 +253,8 @@ def _usual(path: str, limits: str) -> tuple[str, str]:
         below = "below " if high == bounds.get("below") else ""
         accepted.append(f"{above}{low:.10g} to {below}{high:.10g}")
         usual.append(f"{max(low, one.low):.10g} to {min(high, one.high):.10g}")
-        if (low, high) == (max(low, one.low), min(high, one.high)):
-            usual = []
+    if usual == [re.sub("above |below ", "", one) for one in accepted]:
+        usual = []
     text = "; ".join([*filter(None, [rest.strip()]), *accepted])
     return text.replace("or; ", "or "), "; ".join(usual)
 
