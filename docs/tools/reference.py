@@ -7,7 +7,7 @@ import types
 from collections.abc import Callable, Iterator, Sequence
 from fnmatch import fnmatch
 from functools import partial
-from os.path import commonprefix
+from itertools import takewhile
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 import pandas as pd
@@ -47,7 +47,7 @@ def command_sections(parser: argparse.ArgumentParser) -> str:
     arguments: dict[tuple[str, str], list[str]] = {}
     for command in _commands(parser):
         name = command.prog.partition(" ")[2]
-        usage = " ".join(command.format_usage().split()[2:]).replace("[-h] ", "").replace("|", "\\|")
+        usage = _cell(" ".join(command.format_usage().split()[2:]).replace("[-h] ", ""))
         about = command.description or ""
         rows.append([f"`{usage}`", about[:1].upper() + about[1:].removesuffix(".") + "."])
         for action in command._actions:
@@ -71,7 +71,12 @@ def _commands(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentPars
 
 
 def _help(action: argparse.Action) -> str:
-    return (action.help or "").replace("%(default)s", str(action.default)).replace("%%", "%").replace("|", "\\|")
+    text = (action.help or "").replace("%(default)s", str(action.default))
+    return _cell(text.replace("%%", "%"))
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|")
 
 
 def _names(action: argparse.Action) -> str:
@@ -114,19 +119,22 @@ def columns() -> str:
             parts["In several tables"].append([*cells, listed])
         else:
             parts.setdefault(listed, []).append(cells)
-    return "\n\n".join(
-        f"### {name}\n\n{markdown_table(heads[: len(rows[0])], rows)}" for name, rows in parts.items()
-    )
+    found = ((name, markdown_table(heads[: len(own[0])], own)) for name, own in parts.items())
+    return "\n\n".join(f"### {name}\n\n{table}" for name, table in found)
 
 
 def _braced(names: Sequence[str]) -> str:
     """Names that differ in one part, as one: ``force_{x,y,z}_n``."""
     if len(names) == 1:
         return names[0]
-    start = len(commonprefix(names))
-    end = len(commonprefix([name[start:][::-1] for name in names]))
+    start, end = _common(names), _common([name[::-1] for name in names])
     parts = ",".join(name[start : len(name) - end] for name in names)
     return f"{names[0][:start]}{{{parts}}}{names[0][len(names[0]) - end :]}"
+
+
+def _common(names: Sequence[str]) -> int:
+    """Number of characters with which all names start."""
+    return len(list(takewhile(lambda found: len(set(found)) == 1, zip(*names, strict=False))))
 
 
 # --- study file --------------------------------------------------------------------------
@@ -169,7 +177,8 @@ def _fields(
         known = [seen[part] for part, _ in inner if part in seen]
         if known:
             place = f"{path}.*" if inner[0][1] else path
-            yield place, "", "", "", f"as `{known[0] if len(inner) == 1 else known[0].partition('[')[0]}`"
+            same = known[0] if len(inner) == 1 else known[0].partition("[")[0]
+            yield place, "", "", "", f"as `{same}`"
             continue
         for part, many in inner:
             kind = f"[{_kind(part)}]" if len(inner) > 1 else ""
@@ -233,7 +242,7 @@ def _usual(path: str, limits: str) -> tuple[str, str]:
     name, rest = re.sub(r"\[\w+\]", "", path), _BOUND.sub("", limits)
     bounds = {word: float(value) for word, value in _BOUND.findall(limits)}
     places = ((name, f"{name}.0"), [f"{name}.0.{index}" for index in range(7)])
-    keys = [[next((key for key in RANGES if fnmatch(at, key)), "") for at in some] for some in places]
+    keys = ([next((key for key in RANGES if fnmatch(at, key)), "") for at in of] for of in places)
     single, several = (list(dict.fromkeys(filter(None, some))) for some in keys)
     first = [RANGES[key] for key in single[:1] or several]
     if not first or ("`" in rest and not bounds):
@@ -246,8 +255,8 @@ def _usual(path: str, limits: str) -> tuple[str, str]:
         below = "below " if high == bounds.get("below") else ""
         accepted.append(f"{above}{low:.10g} to {below}{high:.10g}")
         usual.append(f"{max(low, one.low):.10g} to {min(high, one.high):.10g}")
-        if (low, high) == (max(low, one.low), min(high, one.high)):
-            usual = []
+    if usual == [re.sub("above |below ", "", one) for one in accepted]:
+        usual = []
     text = "; ".join([*filter(None, [rest.strip()]), *accepted])
     return text.replace("or; ", "or "), "; ".join(usual)
 

@@ -29,7 +29,7 @@ INK, LIGHT = "#1d2733", "#c8ced6"
 COLOURS: Mapping[str, str] = json.loads(
     resources.files("dragdeck").joinpath("data/colours.json").read_text(encoding="utf-8")
 )
-"""One colour for each thing, in every figure, preview and page; `simulation` is that of a source."""
+"""One colour for each thing, in all figures and pages; `simulation` is that of a source."""
 
 SERIES = (BLUE, ORANGE, GREEN, RED, "#7a4fa3", "#5b8a99")
 """Colours of series that stand side by side."""

@@ -82,8 +82,8 @@ class WaypointsPath(WorkpiecePath):
     )
     points: Annotated[list[Waypoint], Field(min_length=2, max_length=MOST_POINTS)] = Field(
         default_factory=list,
-        description="rows [time, x, y, z, turn, pitch, roll] in s, m and degrees, as the columns of "
-        "the file; the last four may be left out (0)",
+        description="rows [time, x, y, z, turn, pitch, roll] in s, m and degrees, as the columns "
+        "of the file; the last four may be left out (0)",
     )
     fraction: Annotated[Number, Field(gt=0, le=1)] = Field(
         default=1.0, description="fraction of the recorded time that is simulated, from its start"
