@@ -9,59 +9,34 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from dragchain import plot
-    from dragchain.errors import (
-        SeriesError,
-        TableError,
-        UnknownNameError,
-    )
-    from dragchain.results import FinishedRun, Study, load
-    from dragchain.run.run_parts import iter_frames, iter_prints
-    from dragchain.statistics.correlated import MeanEstimate, estimate_mean
-    from dragchain.tables.parquet import dump_to_parquet
-    from dragchain.tables.write import write_tables
-    from dragdeck.decks.outputs import OutputOfRun, load_outputs
-    from dragdeck.dumps.frame import Frame
-    from dragdeck.dumps.reader import read_dump
-    from dragdeck.errors import (
-        DocumentError,
-        DragdeckError,
-        DumpError,
-        RecordError,
-        RejectedRunError,
-        TruncatedDumpError,
-    )
-    from dragdeck.records.case import CaseOfRun, load_case
-
-__all__ = [
-    "CaseOfRun",
-    "DocumentError",
-    "DragdeckError",
-    "DumpError",
-    "FinishedRun",
-    "Frame",
-    "MeanEstimate",
-    "OutputOfRun",
-    "RecordError",
-    "RejectedRunError",
-    "SeriesError",
-    "Study",
-    "TableError",
-    "TruncatedDumpError",
-    "UnknownNameError",
-    "dump_to_parquet",
-    "estimate_mean",
-    "iter_frames",
-    "iter_prints",
-    "load",
-    "load_case",
-    "load_outputs",
-    "plot",
-    "read_dump",
-    "write_tables",
-]
+    from dragchain import plot as plot
+    from dragchain.errors import SeriesError as SeriesError
+    from dragchain.errors import TableError as TableError
+    from dragchain.errors import UnknownNameError as UnknownNameError
+    from dragchain.results import FinishedRun as FinishedRun
+    from dragchain.results import Study as Study
+    from dragchain.results import load as load
+    from dragchain.run.run_parts import iter_frames as iter_frames
+    from dragchain.run.run_parts import iter_prints as iter_prints
+    from dragchain.statistics.correlated import MeanEstimate as MeanEstimate
+    from dragchain.statistics.correlated import estimate_mean as estimate_mean
+    from dragchain.tables.parquet import dump_to_parquet as dump_to_parquet
+    from dragchain.tables.write import write_tables as write_tables
+    from dragdeck.decks.outputs import OutputOfRun as OutputOfRun
+    from dragdeck.decks.outputs import load_outputs as load_outputs
+    from dragdeck.dumps.frame import Frame as Frame
+    from dragdeck.dumps.reader import read_dump as read_dump
+    from dragdeck.errors import DocumentError as DocumentError
+    from dragdeck.errors import DragdeckError as DragdeckError
+    from dragdeck.errors import DumpError as DumpError
+    from dragdeck.errors import RecordError as RecordError
+    from dragdeck.errors import RejectedRunError as RejectedRunError
+    from dragdeck.errors import TruncatedDumpError as TruncatedDumpError
+    from dragdeck.records.case import CaseOfRun as CaseOfRun
+    from dragdeck.records.case import load_case as load_case
 
 _MODULES = {
+    "dragchain.errors": ("SeriesError", "TableError", "UnknownNameError"),
     "dragchain.results": ("FinishedRun", "Study", "load"),
     "dragchain.run.run_parts": ("iter_frames", "iter_prints"),
     "dragchain.statistics.correlated": ("MeanEstimate", "estimate_mean"),
@@ -77,6 +52,7 @@ _MODULES = {
     "dragdeck.records.case": ("CaseOfRun", "load_case"),
 }
 _HOMES = {name: module for module, names in _MODULES.items() for name in names}
+__all__ = sorted([*_HOMES, "plot"])
 
 
 def __getattr__(name: str) -> Any:
@@ -84,7 +60,7 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     if name == "plot":
         return import_module(f"{__name__}.plot")
-    return getattr(import_module(_HOMES.get(name, "dragchain.errors")), name)
+    return getattr(import_module(_HOMES[name]), name)
 
 
 def __dir__() -> list[str]:

@@ -9,6 +9,7 @@ import pytest
 import reference
 import yaml
 from doc_pages import PAGES, template_examples
+from made_scenes import own_template
 from paths import ROOT
 from pybtex.database import parse_file
 from records import chosen
@@ -89,9 +90,7 @@ def test_every_value_and_block_of_the_templates_is_on_the_page() -> None:
 def test_a_template_of_the_how_to_passes_the_check(
     name: str, case: Case, project: Project, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    file = case.file.parent / "templates" / name
-    file.parent.mkdir()
-    file.write_text(template_examples()[name])
+    own_template(case, template_examples()[name], name)
     monkeypatch.chdir(project.root)
     assert main(["check", "small"]) == 0
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 import yaml
+from made_scenes import own_template
 
 from dragdeck.cases.case import Case
 from dragdeck.cases.ranks import CORES_VARIABLE
@@ -130,13 +131,6 @@ def test_more_ranks_than_cores_are_refused(
     assert "at most 3 here" in capsys.readouterr().err
     monkeypatch.setenv(CORES_VARIABLE, "4")
     assert main(["check", "small"]) == 0
-
-
-def own_template(case: Case, text: str, name: str) -> Path:
-    file = case.file.parent / "templates" / name
-    file.parent.mkdir(exist_ok=True)
-    file.write_text(text)
-    return file
 
 
 IDLE = '{% extends "base/base.in.j2" %}{% block end %}{{ super() }}{% endblock %}'

@@ -15,6 +15,7 @@ import numpy as np
 import pandas as pd
 from run_files import OF_EVERY_RUN
 
+from dragdeck.decks.outputs import OutputOfRun
 from dragdeck.study.base import flat
 from dragdeck.study.driven import DrivenMotion
 from dragdeck.study.model import Motion
@@ -151,6 +152,12 @@ def output(kind: str, columns: Sequence[str], period: int, first: int, last: int
     return {"kind": kind, "binary": False, "pattern": pattern, "columns": list(columns),
             "engine_columns": None, "period_steps": period, "first_step": first,
             "last_step": last} | more  # fmt: skip
+
+
+def output_of_run(name: str, *entry: Any, **more: Any) -> OutputOfRun:
+    """The same as it is read, in files of its name."""
+    made = output(*entry, **{"pattern": f"{name}.{{part}}", **more})
+    return OutputOfRun.model_validate({"name": name, **made})
 
 
 def run_json(**more: Any) -> dict[str, Any]:

@@ -1,7 +1,7 @@
 """Errors and warnings before, during and after a run."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Literal
@@ -17,6 +17,7 @@ def rendered(problem: str, **details: object) -> str:
     return "\n".join([problem, *(f"  {name:<7} {detail}" for name, detail in known.items())])
 
 
+@dataclass(eq=False, repr=False)
 class InputError(DragdeckError):
     """A study, mesh or template that cannot be used.
 
@@ -43,25 +44,17 @@ class InputError(DragdeckError):
         Further problems of the same input; the message contains them all.
     """
 
-    def __init__(
-        self,
-        problem: str,
-        *,
-        file: Path | str | None = None,
-        field: str | None = None,
-        value: object = None,
-        limit: str | None = None,
-        remedy: str | None = None,
-    ) -> None:
-        self.problem = problem
-        self.file = file
-        self.field = field
-        self.value = value
-        self.limit = limit
-        self.remedy = remedy
+    problem: str
+    _: KW_ONLY
+    file: Path | str | None = None
+    field: str | None = None
+    value: object = None
+    limit: str | None = None
+    remedy: str | None = None
+
+    def __post_init__(self) -> None:
         self.line: int | None = None
         self.more: Sequence[InputError] = ()
-        super().__init__(problem)
 
     def __str__(self) -> str:
         return "\n".join([self._message(), *map(str, self.more)])
@@ -98,6 +91,7 @@ def choices(word: str, known: Iterable[str]) -> str:
     return f"{near(word, names)}one of: {', '.join(names) or 'none here'}"
 
 
+@dataclass(eq=False, repr=False)
 class RecordError(DragdeckError):
     """A measured record that cannot be used.
 
@@ -111,22 +105,16 @@ class RecordError(DragdeckError):
         What was found, what is accepted, what the user can do.
     """
 
-    def __init__(
-        self,
-        reason: str,
-        problem: str,
-        *,
-        value: str | None = None,
-        limit: str | None = None,
-        remedy: str | None = None,
-    ) -> None:
-        self.reason = reason
-        self.problem = problem
-        self.value = value
-        self.limit = limit
-        self.remedy = remedy
-        said = f"the record cannot be used ({reason}): {problem}"
-        super().__init__(rendered(said, value=value, limit=limit, remedy=remedy))
+    reason: str
+    problem: str
+    _: KW_ONLY
+    value: str | None = None
+    limit: str | None = None
+    remedy: str | None = None
+
+    def __str__(self) -> str:
+        said = f"the record cannot be used ({self.reason}): {self.problem}"
+        return rendered(said, value=self.value, limit=self.limit, remedy=self.remedy)
 
 
 class EngineError(DragdeckError):
@@ -137,6 +125,7 @@ class RejectedRunError(DragdeckError):
     """A run that did not pass the acceptance checks, or is not complete."""
 
 
+@dataclass(eq=False, repr=False)
 class DumpError(DragdeckError):
     """A raw output whose content is not that announced in ``columns.json``.
 
@@ -158,25 +147,14 @@ class DumpError(DragdeckError):
         What the user can do.
     """
 
-    def __init__(
-        self,
-        file: Path,
-        problem: str,
-        *,
-        frame: int | None = None,
-        offset: int | None = None,
-        expected: str | None = None,
-        kept: str | None = None,
-        remedy: str | None = None,
-    ) -> None:
-        self.file = file
-        self.problem = problem
-        self.frame = frame
-        self.offset = offset
-        self.expected = expected
-        self.kept = kept
-        self.remedy = remedy
-        super().__init__()
+    file: Path
+    problem: str
+    _: KW_ONLY
+    frame: int | None = None
+    offset: int | None = None
+    expected: str | None = None
+    kept: str | None = None
+    remedy: str | None = None
 
     def __str__(self) -> str:
         """Problem with its place, what was expected, and what is intact."""

@@ -110,11 +110,11 @@ rule write_calibration_report:
     output:
         WORK.if_measured("record", "figures/impacts.png"),
         WORK.if_measured("angles", "figures/angles.png"),
-        page=report(
+        page=shown(
             WORK.of_study("calibration", "report.html"),
-            caption="../report/calibration.rst",
-            category="Calibration",
-            labels={"run": "calibration", "figure": "report"},
+            "calibration",
+            "Calibration",
+            run="calibration",
         ),
     resources:
         prints=1,

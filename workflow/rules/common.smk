@@ -65,6 +65,12 @@ def judged(study, run, number):
     return checkpoints.judge_windows.get(study=study, run=run, round=number).output[0]
 
 
+def shown(file, caption, category, figure="report", run="all"):
+    """A result for the report of Snakemake, with a caption and under a category."""
+    labels = {"run": run, "figure": figure}
+    return report(file, caption=f"../report/{caption}.rst", category=category, labels=labels)
+
+
 PROJECT = Project(Path(workflow.basedir))
 WORK = Workflow(PROJECT, STUDY, FIDELITY, PLAN, VALIDATION, judged)
 CASES = WORK.cases

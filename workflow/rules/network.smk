@@ -8,12 +8,7 @@ rule write_network_page:
         WORK.files("analysis/dragchain/network_page/network.*"),
         run=of_run("process", "run.json"),
     output:
-        report(
-            of_run("process", "network.html"),
-            caption="../report/network.rst",
-            category="Process",
-            labels={"run": "{run}", "figure": "network"},
-        ),
+        shown(of_run("process", "network.html"), "network", "Process", "network", run="{run}"),
     params:
         source=source_hash("dragchain.network_page.page"),
     shell:

@@ -32,12 +32,7 @@ rule write_report:
         parquet=WORK.of_study("report", "summary.parquet"),
         xlsx=WORK.of_study("report", "summary.xlsx"),
         complete=touch(WORK.of_study("report", "complete")),
-        page=report(
-            WORK.of_study("report", "report.html"),
-            caption="../report/report.rst",
-            category="Report",
-            labels={"run": "all", "figure": "report"},
-        ),
+        page=shown(WORK.of_study("report", "report.html"), "report", "Report"),
     params:
         runs=lambda wildcards: WORK.every_folder("process"),
         advice=WORK.advice_option,

@@ -106,11 +106,12 @@ for PLACE, SCENE in SCENES.items():
             run=of_run(PLACE, "run.json"),
         output:
             [
-                report(
+                shown(
                     of_run(PLACE, f"figures/{name}.png"),
-                    caption=f"../report/{name}.rst",
-                    category=PLACE.replace("_", " ").capitalize(),
-                    labels={"run": "{run}", "figure": name},
+                    name,
+                    PLACE.replace("_", " ").capitalize(),
+                    name,
+                    run="{run}",
                 )
                 for name in SCENE.figures
             ],
@@ -219,11 +220,12 @@ for PLACE, SCENE in {**SCENES, POINTS: SCENES["process"]}.items():
                 record=of_run(PLACE, RECORD[PLACE]),
             output:
                 tables_of(PLACE, SCENE.loading),
-                report(
+                shown(
                     of_run(PLACE, "figures/workpiece.png"),
-                    caption="../report/workpiece.rst",
-                    category=PLACE.capitalize(),
-                    labels={"run": "{run}", "figure": "workpiece"},
+                    "workpiece",
+                    PLACE.capitalize(),
+                    "workpiece",
+                    run="{run}",
                 ),
             params:
                 source=source_hash("dragchain.loading.summary", "dragchain.loading.figure"),

@@ -6,12 +6,7 @@ rule write_scaling:
         WORK.every("process", "tables/workpiece_force.parquet"),
     output:
         multiext(WORK.of_study("scaling", "scaling."), "csv", "json"),
-        figure=report(
-            WORK.of_study("scaling", "scaling.png"),
-            caption="../report/scaling.rst",
-            category="Scaling",
-            labels={"run": "all", "figure": "scaling"},
-        ),
+        figure=shown(WORK.of_study("scaling", "scaling.png"), "scaling", "Scaling", "scaling"),
     resources:
         prints=1,
     params:

@@ -61,12 +61,7 @@ rule write_stability:
         ),
         templates=WORK.page_templates("stability/stability.html.j2", package="evidence"),
     output:
-        page=report(
-            "results/stability/report.html",
-            caption="../report/stability.rst",
-            category="Stability",
-            labels={"run": "all", "figure": "stability"},
-        ),
+        page=shown("results/stability/report.html", "stability", "Stability", "stability"),
         tables=multiext("results/stability/", "points.csv", "points.parquet"),
         conditions=multiext("results/stability/", "conditions.csv", "conditions.parquet"),
         measured="results/stability/stability.json",

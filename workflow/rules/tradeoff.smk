@@ -32,12 +32,7 @@ rule write_tradeoff:
         ),
         templates=WORK.page_templates("tradeoff/tradeoff.html.j2"),
     output:
-        page=report(
-            WORK.of_tradeoff("report.html"),
-            caption="../report/tradeoff.rst",
-            category="Tradeoff",
-            labels={"run": "all", "figure": "report"},
-        ),
+        page=shown(WORK.of_tradeoff("report.html"), "tradeoff", "Tradeoff"),
         measured=WORK.of_tradeoff("tradeoff.json"),
         runs=multiext(WORK.of_tradeoff(""), "runs.csv", "runs.parquet"),
         errors=multiext(WORK.of_tradeoff(""), "errors.csv", "errors.parquet"),

@@ -9,12 +9,7 @@ rule write_validation:
             "validation/validation.html.j2", "validation/load.html.j2", package="evidence"
         ),
     output:
-        page=report(
-            WORK.of_study("validation", "report.html"),
-            caption="../report/validation.rst",
-            category="Validation",
-            labels={"run": "all", "figure": "report"},
-        ),
+        page=shown(WORK.of_study("validation", "report.html"), "validation", "Validation"),
         found=WORK.of_study("validation", "validation.json"),
         tables=multiext(
             WORK.of_study("validation", ""),

@@ -15,12 +15,7 @@ rule judge_verification:
             "verification.csv",
             "verification.parquet",
         ),
-        page=report(
-            "results/verification/report/verification.html",
-            caption="../report/verification.rst",
-            category="Verification",
-            labels={"run": "all", "figure": "report"},
-        ),
+        page=shown("results/verification/report/verification.html", "verification", "Verification"),
     threads: 4
     resources:
         prints=1,

@@ -183,11 +183,7 @@ def cut_words(case: CaseOfRun, view: View) -> str:
 
 
 def render_view(
-    run_dir: Path,
-    case: CaseOfRun,
-    scene: NetworkScene,
-    view: View,
-    pixels_per_mm: float = _PIXELS_PER_MM,
+    run_dir: Path, case: CaseOfRun, scene: NetworkScene, view: View
 ) -> tuple[Image, Floats]:
     """Render one view in parallel projection.
 
@@ -203,7 +199,7 @@ def render_view(
     part = window(case, scene, view)
     low, high = part.low, part.high
     size_mm = (high - low) * 1e3
-    pixels_per_mm = min(pixels_per_mm, _MOST_PIXELS / float(size_mm.max()))
+    pixels_per_mm = min(_PIXELS_PER_MM, _MOST_PIXELS / float(size_mm.max()))
     plotter = new_plotter(*np.ceil(size_mm * pixels_per_mm).astype(int).tolist())
     plotter.enable_depth_peeling(number_of_peels=8)
     _add_bowl(plotter, case, view)

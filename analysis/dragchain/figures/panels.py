@@ -90,10 +90,10 @@ def depth_bars(
     axes.set_ylim(edges[-1], edges[0])
 
 
-def band(axes: Axes, x: ArrayLike, interval: _Interval, colour: str, label: str = "") -> None:
+def band(axes: Axes, x: ArrayLike, interval: _Interval, colour: str) -> None:
     """Fill the interval about a curve."""
     low, high = interval.ci95_low, interval.ci95_high
-    axes.fill_between(x, low, high, color=colour, alpha=0.17, lw=0, label=label)
+    axes.fill_between(x, low, high, color=colour, alpha=0.17, lw=0)
 
 
 def compass(figure: Figure, *place: int) -> Any:

@@ -166,9 +166,7 @@ def _candidates(
 # --- paths from the workpiece to the bowl ----------------------------------------------------
 
 
-def widest_paths(
-    frame: NetworkFrame, threshold: float = THRESHOLD, *, with_workpiece: bool = True
-) -> list[WidestPath]:
+def widest_paths(frame: NetworkFrame, threshold: float = THRESHOLD) -> list[WidestPath]:
     """Return one path for each strong workpiece contact, by falling force of that contact.
 
     Contacts whose normal force is above `threshold` times the mean of all the frame's contacts are
@@ -179,12 +177,8 @@ def widest_paths(
     found first from the workpiece on, level by level, where contacts are taken in the order of the
     frame. The widest path of a graph runs along its maximum spanning tree (Hu 1961, Oper. Res. 9,
     898-900); the tie rule is ours.
-
-    With `with_workpiece` false the forces of workpiece contacts play no part, not even in the
-    mean: a path leads from every particle that the workpiece pushes, and its bottleneck is that of
-    the contacts behind that particle.
     """
-    rows = path_rows(frame, threshold, with_workpiece=with_workpiece)
+    rows = path_rows(frame, threshold)
     pairs = zip(
         rows.particle_lists(), split_chains(rows.contacts, rows.contact_starts), strict=True
     )
@@ -197,21 +191,18 @@ def _end(frame: NetworkFrame, contacts: list[int]) -> int | None:
     return int(frame.other[contacts[-1]]) if len(contacts) > 1 else None
 
 
-def path_rows(
-    frame: NetworkFrame, threshold: float = THRESHOLD, *, with_workpiece: bool = True
-) -> ChainRows:
+def path_rows(frame: NetworkFrame, threshold: float = THRESHOLD) -> ChainRows:
     """The paths of `widest_paths`; one that leads nowhere has the workpiece contact alone."""
     force = frame.normal_force
-    strong = np.flatnonzero(force > threshold * frame.mean_force_n(with_workpiece=with_workpiece))
-    pushed = strong if with_workpiece else np.flatnonzero(force > 0.0)
-    workpieces = pushed[frame.other[pushed] == WORKPIECE]
+    strong = np.flatnonzero(force > threshold * frame.mean_force_n())
+    workpieces = strong[frame.other[strong] == WORKPIECE]
     workpieces = workpieces[np.argsort(-force[workpieces], kind="stable")]
     links = strong[frame.other[strong] != WORKPIECE]
     bowl = frame.particle_id.size
     ends = frame.a[links], np.where(frame.between_particles()[links], frame.b[links], bowl)
     strength, start = force[links], frame.a[workpieces]
     width = kernels.widths(*ends, strength, np.argsort(-strength), bowl + 1, bowl)[start]
-    least = np.minimum(width, force[workpieces]) if with_workpiece else width
+    least = np.minimum(width, force[workpieces])
     net, space = adjacency(*ends, bowl + 1), kernels.search_space(bowl + 1)
     particles, contacts = [], []
     for number in range(len(workpieces)):
@@ -256,16 +247,11 @@ def _starts(parts: list[Ints]) -> Ints:
     return np.cumsum([0, *map(len, parts)])
 
 
-def dominant_path(
-    frame: NetworkFrame, paths: Iterable[WidestPath], *, with_workpiece: bool = True
-) -> WidestPath | None:
-    """The path to the bowl with the largest bottleneck, or None if no path leads there.
-
-    With `with_workpiece` false the workpiece contacts' forces do not count.
-    """
+def dominant_path(frame: NetworkFrame, paths: Iterable[WidestPath]) -> WidestPath | None:
+    """The path to the bowl with the largest bottleneck, or None if no path leads there."""
 
     def strength(path: WidestPath) -> tuple[float, float]:
-        forces = frame.normal_force[list(path.contacts[0 if with_workpiece else 1 :])]
+        forces = frame.normal_force[list(path.contacts)]
         return float(forces.min()), float(forces.mean())
 
     whole = [path for path in paths if path.end is not None]

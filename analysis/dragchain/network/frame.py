@@ -62,13 +62,9 @@ class NetworkFrame:
         """Which contacts are between two particles, (M,) bool."""
         return np.equal(self.other, PARTICLE)
 
-    def mean_force_n(self, *, with_workpiece: bool = True) -> float:
-        """The mean normal force of all contacts in N, 0 for a frame without contacts.
-
-        With `with_workpiece` false the contacts of the workpiece do not count.
-        """
-        forces = self.normal_force if with_workpiece else self.normal_force[self.other != WORKPIECE]
-        return float(forces.mean()) if forces.size else 0.0
+    def mean_force_n(self) -> float:
+        """The mean normal force of all contacts in N, 0 for a frame without contacts."""
+        return float(self.normal_force.mean()) if self.normal_force.size else 0.0
 
 
 def frame_of(

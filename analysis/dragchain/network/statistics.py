@@ -171,16 +171,15 @@ def contact_counts(frame: NetworkFrame) -> Ints:
     )
 
 
-def mechanical_coordination_number(
-    counts: NDArray[np.integer[Any]], least: int = _LEAST_CONTACTS
-) -> float:
+def mechanical_coordination_number(counts: NDArray[np.integer[Any]]) -> float:
     """The mean number of contacts of the particles that carry load.
 
-    After Thornton (2000, Geotechnique 50, 43-53), whose (2 M - N1) / (N - N0 - N1) is the case
-    ``least=2``: particles with fewer than `least` contacts are left out as carriers, while their
-    contacts still count for the carriers that they touch. NaN where no particle is left.
+    Particles with fewer than `_LEAST_CONTACTS` contacts are left out as carriers, while their
+    contacts still count for the carriers that they touch, as in the (2 M - N1) / (N - N0 - N1) of
+    Thornton (2000, Geotechnique 50, 43-53), who leaves out those with fewer than two. NaN where no
+    particle is left.
     """
-    return _mean(counts[counts >= least])
+    return _mean(counts[counts >= _LEAST_CONTACTS])
 
 
 def frame_statistics(frame: NetworkFrame, clusters: Clusters | None = None) -> dict[str, float]:

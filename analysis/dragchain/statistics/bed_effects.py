@@ -165,9 +165,7 @@ class EffectsFit(Effects):
     bed_fraction: float
 
 
-def fit_effects(
-    design: Floats, values: Floats, beds: Sequence[Hashable], bed_fraction: float | None = None
-) -> EffectsFit:
+def fit_effects(design: Floats, values: Floats, beds: Sequence[Hashable]) -> EffectsFit:
     """Generalised least squares with a random effect of the bed.
 
     The covariance of two runs is ``s^2`` for a run with itself, ``r s^2`` for
@@ -181,8 +179,6 @@ def fit_effects(
         Of full column rank.
     values : (N,) ndarray
     beds : sequence of N labels
-    bed_fraction : float, optional
-        ``r``, if it is known.
 
     Raises
     ------
@@ -194,11 +190,10 @@ def fit_effects(
         raise SeriesError(f"{runs} runs are too few to estimate {number} effects: run more seeds")
     if np.linalg.matrix_rank(design) < number:
         raise SeriesError("the effects are confounded: vary one setting at a time as well")
-    same_bed, degrees = same(beds), runs - number
-    if bed_fraction is None:
-        bed_fraction, left = 0.0, free_degrees(beds, number)
-        if shares_beds(beds) and left >= 1:
-            bed_fraction, degrees = _best_fraction(design, values, same_bed), left
+    same_bed, bed_fraction, degrees = same(beds), 0.0, runs - number
+    left = free_degrees(beds, number)
+    if shares_beds(beds) and left >= 1:
+        bed_fraction, degrees = _best_fraction(design, values, same_bed), left
     model = Whitened.of(design, values, correlation(same_bed, bed_fraction))
     variance = model.square / model.degrees
     covariance = np.asarray(variance * model.covariance)

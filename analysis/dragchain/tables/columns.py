@@ -86,11 +86,6 @@ def _rows() -> list[tuple[str, tuple[str, ...], str]]:
         return [(row["column"], tuple(row["tables"].split()), row["description"]) for row in rows]
 
 
-def columns_of(table: str) -> list[str]:
-    """The columns that a table may have, as ``columns.csv`` lists them."""
-    return [column for column, tables, _ in _rows() if table in tables]
-
-
 def descriptions(column: str) -> dict[str, str]:
     """What a column means in each table that may have it, by the table's name."""
     found: dict[str, str] = {}

@@ -78,9 +78,7 @@ def write_parquet(table: pd.DataFrame, path: Path) -> None:
 
 
 @contextmanager
-def table_writer(
-    file: Path, columns: Sequence[str] = (), *, group_rows: int = GROUP_ROWS
-) -> "Iterator[TableWriter]":
+def table_writer(file: Path, columns: Sequence[str] = ()) -> "Iterator[TableWriter]":
     """A table that is written part by part and appears under its name only once it is whole.
 
     The metadata of the columns that ``columns.csv`` describes have their unit and description.
@@ -95,12 +93,10 @@ def table_writer(
     columns : sequence of str, optional
         Its columns in order; `column_type` gives their types. A table of data frames has the
         columns and types of its first row group.
-    group_rows : int
-        Least rows of a row group but the last.
     """
     schema = _schema(columns) if columns else None
     with draft_of(file) as draft, ThreadPoolExecutor(1) as thread:
-        writer = TableWriter(draft, file.stem, schema, thread, group_rows)
+        writer = TableWriter(draft, file.stem, schema, thread)
         try:
             yield writer
             writer.finish()
@@ -115,16 +111,10 @@ class TableWriter:
     """
 
     def __init__(
-        self,
-        draft: Path,
-        name: str,
-        schema: pa.Schema | None,
-        thread: ThreadPoolExecutor,
-        group_rows: int,
+        self, draft: Path, name: str, schema: pa.Schema | None, thread: ThreadPoolExecutor
     ) -> None:
         self.rows = 0
         self._draft, self._name, self._schema, self._thread = draft, name, schema, thread
-        self._group_rows = group_rows
         self._parts: list[pa.Table | pd.DataFrame] = []
         self._held = 0
         self._writer: pq.ParquetWriter | None = None
@@ -134,7 +124,7 @@ class TableWriter:
         """Append rows: data frames always, or always columns."""
         self._parts.append(rows if isinstance(rows, pd.DataFrame) else self._table(rows))
         self._held += len(self._parts[-1])
-        if self._held >= self._group_rows:
+        if self._held >= GROUP_ROWS:
             self._flush()
 
     def finish(self) -> None:

@@ -23,7 +23,7 @@ from pydantic import AllowInfNan, BeforeValidator
 from scipy.special import erf
 
 from dragchain.arrays import Floats
-from dragchain.report.values import LoadMap, Need
+from dragchain.report.values import Extrapolated, LoadMap, Need, Reached
 from dragchain.statistics.correlated import MIN_SAMPLES, estimate_mean
 from dragchain.statistics.estimate import (
     NORMAL_QUANTILE,
@@ -71,7 +71,7 @@ class WindowsRecord(Document):
     quantities : mapping
     """
 
-    remedy = "make it with: benchmarks/windows.py"
+    remedy = "make it with: python benchmarks/windows_record.py"
 
     measured: str
     source: str
@@ -103,66 +103,24 @@ class WindowOfRun(Part):
     cpu_time_s: float
 
 
-class WindowedQuantity(Part):
-    """A quantity of a run, and its value at physical stiffness from the windows.
+class Round(Extrapolated):
+    """The content of ``round-<number>.json``: what the windows so far say, and what comes next.
 
     Attributes
     ----------
-    name, label, unit : str
-    asked : bool
-        Whether the tolerance applies to it.
-    soft : float
-        Value of the run with reduced moduli.
-    value : Estimate
-        At physical stiffness; NaN if too few windows have it.
-    """
-
-    name: str
-    label: str
-    unit: str
-    asked: bool
-    soft: float
-    value: Estimate
-
-
-class Round(Document):
-    """The content of ``round-<number>.json``.
-
-    Attributes
-    ----------
-    tolerance : float
-    asked : sequence of str
-        Quantities to which it applies, whether the run has them or not.
     windows : sequence of WindowOfRun
         So far, in the order in which they were run.
     wanted : int
         How many windows to run in all; as many as there were if this round is the last.
     last : bool
-    reached : bool
-        Whether every asked quantity is inside the tolerance.
-    needed : Need
-        Windows of this run, and packings, that are expected to do.
-    quantities : sequence of WindowedQuantity
-    load_map : LoadMap or None
-        At physical stiffness; None if fewer than two windows have one.
     """
 
     remedy = "make it with: dragchain step windows"
 
-    tolerance: float
-    asked: tuple[str, ...]
+    tolerance: Reached
     windows: tuple[WindowOfRun, ...]
     wanted: int
     last: bool
-    reached: bool
-    needed: Need
-    quantities: tuple[WindowedQuantity, ...]
-    load_map: LoadMap | None = None
-
-    @property
-    def entering(self) -> list[WindowOfRun]:
-        """The windows that were not refused."""
-        return [one for one in self.windows if not one.refused]
 
 
 # --- estimate ------------------------------------------------------------------------------------

@@ -11,7 +11,6 @@ from dragchain.report.values import (
     Need,
     Reached,
 )
-from dragchain.statistics.estimate import Estimate
 from dragchain.tradeoff.measure_run import quantities_along
 from dragchain.tradeoff.measures import QUANTITIES
 from dragchain.windows.estimate import UNKNOWN, Round, WindowsRecord, of_one_run
@@ -38,7 +37,8 @@ def extrapolate_run(run_dir: Path, record: Path, round_file: Path | None = None)
         If a table is missing.
     """
     if round_file is not None:
-        found = _windowed(Round.read(round_file))
+        last = Round.read(round_file)
+        found = Extrapolated(**{name: getattr(last, name) for name in Extrapolated.model_fields})
     else:
         found = _alone(run_dir, load_case(run_dir), WindowsRecord.read(record))
     found.write(run_dir / EXTRAPOLATED)
@@ -78,28 +78,3 @@ def _quantities(
             yield ExtrapolatedQuantity(
                 name=one.name, label=one.label, unit=one.unit, measured=found, value=physical
             )
-
-
-def _windowed(found: Round) -> Extrapolated:
-    """The quantities of a run as its windows have them at physical stiffness."""
-    return Extrapolated(
-        tolerance=Reached(
-            tolerance=found.tolerance,
-            asked=found.asked,
-            reached=found.reached,
-            needed=found.needed,
-            runs=tuple(one.run for one in found.entering),
-            refused={one.run: one.refused for one in found.windows if one.refused},
-        ),
-        quantities=tuple(
-            ExtrapolatedQuantity(
-                name=one.name,
-                label=one.label,
-                unit=one.unit,
-                measured=Estimate(one.soft, math.nan, math.nan),
-                value=one.value if one.value.known else None,
-            )
-            for one in found.quantities
-        ),
-        load_map=found.load_map,
-    )

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from dragchain.arrays import Floats
-from dragchain.report.values import LoadMap, Need
+from dragchain.report.values import ExtrapolatedQuantity, LoadMap, Need, Reached
 from dragchain.statistics.estimate import Estimate
 from dragchain.tables.by_step import read_table
 from dragchain.tradeoff.measure_run import (
@@ -20,7 +20,6 @@ from dragchain.windows.estimate import (
     UNKNOWN,
     Joined,
     Round,
-    WindowedQuantity,
     WindowOfRun,
     WindowsRecord,
     corrected_map,
@@ -97,18 +96,19 @@ def judged(
     rows, needs = [], [Need(_FEWEST, 1)]
     values = soft.values()
     for quantity, found in _joined(soft, values, good, record):
-        row = WindowedQuantity(
-            name=quantity.name,
-            label=quantity.label,
-            unit=quantity.unit,
-            asked=quantity.name in asked,
-            soft=values[quantity.name],
-            value=found.estimate(len(good)) if found else _NONE,
+        value = found.estimate(len(good)) if found else _NONE
+        rows.append(
+            ExtrapolatedQuantity(
+                name=quantity.name,
+                label=quantity.label,
+                unit=quantity.unit,
+                measured=Estimate(values[quantity.name], math.nan, math.nan),
+                value=value if value.known else None,
+            )
         )
-        rows.append(row)
-        if row.asked and found:
+        if quantity.name in asked and found:
             needs.append(windows_needed(found, len(good), tolerance, most))
-    widths = {one.name: one.value.relative_half_width for one in rows}
+    widths = {one.name: one.value.relative_half_width for one in rows if one.value}
     reached = len(good) >= _FEWEST and all(
         widths.get(name, math.inf) <= tolerance for name in asked
     )
@@ -117,22 +117,26 @@ def judged(
     wanted = len(windows) + max(1, need.windows - len(good))
     wanted = min(wanted, math.ceil(_MOST_MORE * len(windows)), most)
     return Round(
-        tolerance=tolerance,
-        asked=tuple(asked),
+        quantities=tuple(rows),
+        tolerance=Reached(
+            tolerance=tolerance,
+            asked=tuple(asked),
+            reached=reached,
+            needed=need,
+            runs=tuple(one.run for one in good),
+            refused={one.run: one.refused for one in windows if one.refused},
+        ),
+        load_map=_load_map(soft, good, rows),
         windows=tuple(windows),
         wanted=len(windows) if last else wanted,
         last=last,
-        reached=reached,
-        needed=need,
-        quantities=tuple(rows),
-        load_map=_load_map(soft, good, rows),
     )
 
 
 def _load_map(
-    soft: PathQuantities, windows: Sequence[WindowOfRun], rows: Sequence[WindowedQuantity]
+    soft: PathQuantities, windows: Sequence[WindowOfRun], rows: Sequence[ExtrapolatedQuantity]
 ) -> LoadMap | None:
-    total = next((one.value for one in rows if one.name == "normal_load"), _NONE)
+    total = next((one.value for one in rows if one.name == "normal_load"), None) or _NONE
     runs = soft.arc_m / windows[0].arc_m if windows else math.nan
     return corrected_map(soft.load_map, [one.load_map for one in windows], total, runs)
 

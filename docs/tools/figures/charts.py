@@ -1,5 +1,7 @@
 """Figures of numbers: each is a function that draws it from records."""
 
+from typing import Any
+
 import matplotlib
 import numpy as np
 import pandas as pd
@@ -23,8 +25,10 @@ from dragchain.scaling.fit import draw_scalings, read_scalings
 from evidence.stability.report import draw_regime
 
 
-def _figure(width: float, height: float) -> Figure:
-    return Figure(figsize=(width, height), layout="constrained")
+def _panels(width: float, height: float, count: int = 1, **options: bool) -> tuple[Figure, Any]:
+    """A figure, in inches, with its axes: several of them side by side."""
+    figure = Figure(figsize=(width, height), layout="constrained")
+    return figure, figure.subplots(1, count, **options)
 
 
 def _draw_calibration() -> Figure:
@@ -34,8 +38,8 @@ def _draw_calibration() -> Figure:
         "draft": ("production", "draft", ORANGE),
         "physical modulus, small step": ("reference", "standard", GREY),
     }
-    figure = _figure(7.6, 3.1)
-    for axes, limited in zip(figure.subplots(1, 2, sharey=True), (True, False), strict=True):
+    figure, panels = _panels(7.6, 3.1, 2, sharey=True)
+    for axes, limited in zip(panels, (True, False), strict=True):
         for label, (purpose, fidelity, colour) in kinds.items():
             rows = f"limit_force == {limited} and purpose == {purpose!r} and fidelity == "
             part = chosen("calibration/bias", f"{rows}{fidelity!r}")
@@ -48,8 +52,8 @@ def _draw_calibration() -> Figure:
             )  # fmt: skip
         axes.axhline(0, color="black", lw=0.7)
         axes.set(xlabel="entered restitution", title=f"limitForce {'on' if limited else 'off'}")
-    figure.axes[0].set_ylabel("effective minus entered restitution")
-    figure.axes[0].legend()
+    panels[0].set_ylabel("effective minus entered restitution")
+    panels[0].legend()
     return figure
 
 
@@ -58,8 +62,7 @@ def _draw_forces() -> Figure:
     force, run = record_table("validation/run_force"), record_table("validation/run").iloc[0]
     paper, colour = record_table("study/uhlmann2015").iloc[0], COLOURS["experiment"]
     mean, std = paper["reference_experiment_drag_mean_n"], paper["reference_experiment_drag_std_n"]
-    figure = _figure(7.6, 3.2)
-    axes = figure.subplots()
+    figure, axes = _panels(7.6, 3.2)
     label = "experiment, mean ± standard deviation"
     axes.axhspan(mean - std, mean + std, color=colour, alpha=0.15, lw=0, label=label)
     axes.axhline(mean, color=colour, ls="--", lw=1.6, zorder=3)
@@ -92,8 +95,7 @@ def _draw_load_map() -> Figure:
         np.histogram2d(turn, depth_m - side["centre_z_m"], edges, weights=weights)[0]
         for weights in (side["force_slide_pa"] * side["area_m2"], side["area_m2"])
     )
-    figure = _figure(7.6, 3.4)
-    axes = figure.subplots()
+    figure, axes = _panels(7.6, 3.4)
     values = np.divide(load, area, out=np.zeros_like(load), where=area > 0)
     shown = axes.pcolormesh(edges[0], 1e3 * edges[1], values.T, cmap=force_map())
     axes.axhline(0, color="black", lw=0.8, ls="--")
@@ -118,8 +120,7 @@ def _draw_simplifications() -> Figure:
     """Confidence intervals of the change of the mean drag in simpler scenes."""
     rows = record_table("scenes/simplifications")
     places = range(len(rows), 0, -1)
-    figure = _figure(7.6, 2.8)
-    axes = figure.subplots()
+    figure, axes = _panels(7.6, 2.8)
     low, high = (100 * rows[f"drag_mean_{end}"] for end in _CI)
     axes.hlines(places, low, high, color=COLOURS["drag"], lw=4)
     axes.axvline(0, color="black", lw=0.7)
@@ -132,12 +133,12 @@ def _draw_simplifications() -> Figure:
 def _draw_spin() -> Figure:
     """Mean drag and torque over the spin ratio, with 95 % confidence intervals."""
     rows = record_table("motion/spin")
-    figure = _figure(7.6, 2.8)
-    panels = (
+    figure, panels = _panels(7.6, 2.8, 2)
+    shown = (
         ("drag_n", "drag_half_n", "mean drag (N)", COLOURS["drag"]),
         ("torque_mn_m", "torque_half_mn_m", "mean torque (mN m)", GREEN),
     )
-    for axes, (name, half, label, colour) in zip(figure.subplots(1, 2), panels, strict=True):
+    for axes, (name, half, label, colour) in zip(panels, shown, strict=True):
         axes.errorbar(rows["spin_ratio"], rows[name], rows[half], fmt="o-", color=colour, capsize=3)
         axes.set(xlabel="surface speed of the spin / speed along the path", ylabel=label)
         axes.set_xscale("symlog", linthresh=1)
@@ -166,8 +167,7 @@ def _draw_tradeoff(tolerance: float = 0.1) -> Figure:
     """Signed error of the mean drag against CPU time; Pareto-optimal settings are numbered."""
     rows = chosen("tradeoff/settings/errors", "name == 'drag_mean' and not breaks")
     rows = rows[(rows["failed"] == 0) & (rows["runs"] > 1)].sort_values("relative_cost")
-    figure = _figure(7.2, 4.2)
-    axes = figure.subplots()
+    figure, axes = _panels(7.2, 4.2)
     axes.axhspan(-100 * tolerance, 100 * tolerance, color=LIGHT, alpha=0.35, lw=0)
     axes.axhline(0, color="black", lw=0.7)
     levels = sorted(rows["youngs_modulus_scale"].unique(), reverse=True)
@@ -220,8 +220,7 @@ def _draw_validation() -> Figure:
             name, colour = f"{words.replace('.', ' ')} {1e3 * row.value:g} mm", GREY
         values = [mean * (1 + x) for x in (row.change, row.ci95_high, row.ci95_low)]
         rows.append((name, *values, colour))
-    figure = _figure(7.6, 0.26 * len(rows) + 1.1)
-    axes = figure.subplots()
+    figure, axes = _panels(7.6, 0.26 * len(rows) + 1.1)
     compared = record_table("validation/comparison").set_index("label")["mean_n"]
     for label, style in (("experiment", "--"), ("simulation", ":")):
         source = f"Uhlmann et al. (2015), {label}"
@@ -246,8 +245,7 @@ def _draw_verification(smallest: float = 1e-12) -> Figure:
     rows = rows.dropna(subset=["tolerance"])
     ratio = (rows["largest_error"] / rows["tolerance"]).clip(lower=smallest)
     names = [f"{row.test} {row.subject}: {row.quantity}" for row in rows.itertuples()]
-    figure = _figure(8.6, 0.21 * len(rows) + 0.9)
-    axes = figure.subplots()
+    figure, axes = _panels(8.6, 0.21 * len(rows) + 0.9)
     places = range(len(rows), 0, -1)
     axes.hlines(places, smallest, ratio, color=BLUE, lw=1)
     axes.plot(ratio, places, "o", color=BLUE)
@@ -262,8 +260,7 @@ def _draw_windows() -> Figure:
     """Soft run and windows in the scene of the paper, relative to a run with the physical E."""
     rows = record_table("windows/paper").dropna(subset=["stiff"])
     places = np.arange(len(rows), 0, -1)
-    figure = _figure(7.6, 3.0)
-    axes = figure.subplots()
+    figure, axes = _panels(7.6, 3.0)
     widths = 100 * rows["stiff_half_width"]
     axes.barh(places, 2 * widths, left=-widths, color=LIGHT, label="reference, 95 % CI")
     ratios = {one: 100 * (rows[one] / rows["stiff"] - 1) for one in ("soft", "value", *_CI)}

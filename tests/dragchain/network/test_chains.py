@@ -174,14 +174,12 @@ def joined(frame: NetworkFrame, contact: int) -> set[int]:
     return {int(frame.a[contact]), int(frame.b[contact])}
 
 
-@given(frames, st.sampled_from([0.3, 1.0, 2.0]), st.booleans())
+@given(frames, st.sampled_from([0.3, 1.0, 2.0]))
 @settings(max_examples=30)
-def test_a_path_is_the_shortest_of_the_widest(
-    frame: NetworkFrame, threshold: float, with_workpiece: bool
-) -> None:
+def test_a_path_is_the_shortest_of_the_widest(frame: NetworkFrame, threshold: float) -> None:
     """Against the search of scipy, where a link is shorter the stronger it is."""
     force, bowl, long = frame.normal_force, frame.particle_id.size, 1e6
-    strong = force > threshold * frame.mean_force_n(with_workpiece=with_workpiece)
+    strong = force > threshold * frame.mean_force_n()
 
     def distance(start: int, least: float) -> float:
         used = np.flatnonzero(strong & (frame.other != WORKPIECE) & (force >= least))
@@ -191,9 +189,8 @@ def test_a_path_is_the_shortest_of_the_widest(
         graph = csgraph_from_dense(np.minimum(lengths, lengths.T), null_value=np.inf)
         return float(dijkstra(graph, indices=start)[bowl])
 
-    paths = widest_paths(frame, threshold, with_workpiece=with_workpiece)
-    pushed = strong if with_workpiece else force > 0.0
-    assert len(paths) == (pushed & (frame.other == WORKPIECE)).sum()
+    paths = widest_paths(frame, threshold)
+    assert len(paths) == (strong & (frame.other == WORKPIECE)).sum()
     for path in paths:
         (first, *links), start = path.contacts, path.particles[0]
         assert (frame.other[first], frame.a[first]) == (WORKPIECE, start)
@@ -201,9 +198,9 @@ def test_a_path_is_the_shortest_of_the_widest(
             assert not links and distance(start, 0.0) == np.inf
             continue
         weakest = force[links].min()
-        least = min(weakest, force[first]) if with_workpiece else weakest
+        least = min(weakest, force[first])
         assert distance(start, least) == pytest.approx((long - force[links]).sum(), rel=1e-12)
-        if weakest < force[first] or not with_workpiece:
+        if weakest < force[first]:
             assert distance(start, np.nextafter(least, np.inf)) == np.inf
         for pair, link in zip(pairwise(path.particles), links[:-1], strict=True):
             assert set(pair) == joined(frame, link)

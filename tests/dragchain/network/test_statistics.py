@@ -25,7 +25,6 @@ from dragchain.network.statistics import (
     FORCE_FACTORS,
     SPANS,
     cluster_rows,
-    contact_counts,
     find_clusters,
     frame_clusters,
     frame_statistics,
@@ -80,10 +79,8 @@ def test_statistics_of_a_star() -> None:
     assert found["above_mean_fraction"] == pytest.approx(3 / 7)
 
 
-def test_least_of_two_is_the_formula_of_thornton() -> None:
-    # N = 6, N0 = 1 and N1 = 2 by hand; 11 ends of contacts
-    counts = contact_counts(a_frame(STAR, STAR_IDS))
-    assert mechanical_coordination_number(counts, least=2) == pytest.approx((11 - 2) / (6 - 1 - 2))
+def test_a_particle_with_four_contacts_carries_load() -> None:
+    assert mechanical_coordination_number(np.array([0, 3, 4, 6])) == 5.0
 
 
 def test_a_frame_without_contacts_is_not_zero_but_unknown() -> None:

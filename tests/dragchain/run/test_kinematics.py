@@ -171,25 +171,6 @@ def test_the_workpiece_does_not_turn_on_waypoints(on_waypoints: CaseOfRun) -> No
     assert not motion_of(on_waypoints).keeps_direction
 
 
-@pytest.mark.parametrize("superposed", [False, True])
-def test_on_waypoints_the_velocity_is_that_of_the_stage(
-    on_waypoints: CaseOfRun, superposed: bool
-) -> None:
-    steps = np.arange(21, 41)
-    path = on_waypoints.inputs["motion.path.points"]
-    spin = {"spin": SPIN} if superposed else {}
-    case = moving(on_waypoints, {"kind": "waypoints", "points": path}, None, **spin)
-    reference = np.ones((20, 3))
-    point = reference + np.array([0.01, 0.0, 0.005])
-    wanted = np.repeat([v for _, v in STAGES], [n for n, _ in STAGES], axis=0)
-    if superposed:
-        wanted[:, 1] += 0.01 * np.repeat([30.0, -60.0], [8, 12])
-    found = workpiece_velocity(steps, point, reference, case)
-    np.testing.assert_allclose(found, wanted, atol=1e-15)
-    outside = workpiece_velocity(np.array([20, 41]), point[:2], reference[:2], case)
-    assert np.isnan(outside).all()
-
-
 # --- superposed on the path ----------------------------------------------------------------------
 
 SPIN = {
@@ -213,26 +194,3 @@ def test_the_turn_adds_up_the_stages(circling: CaseOfRun) -> None:
     np.testing.assert_allclose(turn, [0, 0, 120, 240, 120, -480, -480], atol=1e-9)
     assert spins(with_all(circling))
     assert not spins(circling)
-
-
-def place(case: CaseOfRun, steps: np.ndarray, own_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A point that is fixed to the workpiece and the reference point, from angles alone."""
-    time = (steps - 20) * case.timestep_s
-    angle = 0.01 / 0.02 * time
-    height = 1e-3 * np.sin(40.0 * time)
-    reference = np.column_stack([0.02 * np.cos(angle), 0.02 * np.sin(angle), height])
-    rotation = workpiece_rotation(steps, directions(steps, reference[:, :2], case), case)
-    return reference + rotation.out_of(np.tile(own_m, (len(steps), 1))), reference
-
-
-@pytest.mark.parametrize("orientation", ["follow_path", "fixed"])
-def test_the_velocity_is_the_change_of_the_place(circling: CaseOfRun, orientation: str) -> None:
-    """Of a point beside and above the reference point, apart from steps where the spin changes."""
-    case = with_all(changed(circling, timestep_s=1e-5), orientation=orientation)
-    steps = np.array([22, 25, 31, 38])
-    own = np.array([0.004, -0.003, 0.01])
-    point, reference = place(case, steps, own)
-    (after, _), (before, _) = (place(case, steps + shift, own) for shift in (1, -1))
-    np.testing.assert_allclose(
-        workpiece_velocity(steps, point, reference, case), (after - before) / 2e-5, atol=1e-6
-    )

@@ -1,6 +1,5 @@
 import struct
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -8,19 +7,11 @@ from changed import changed
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
-from made_run import output
+from made_run import output_of_run
 
 from dragchain.run.run_parts import iter_frames, iter_prints, output_files
-from dragdeck.decks.outputs import OutputOfRun
 from dragdeck.dumps.reader import read_frames, read_prints
 from dragdeck.errors import DumpError, TruncatedDumpError
-
-
-def output_of_run(name: str, kind: str, columns: tuple[str, ...], *schedule: Any, **more: Any):
-    """An output whose period, first and last step are these."""
-    entry = output(kind, columns, *schedule, pattern=f"{name}.{{part}}", **more)
-    return OutputOfRun.model_validate({"name": name, **entry})
-
 
 PARTICLES = output_of_run("particles", "custom", ("particle_id", "x_m"), 10, 0, 20, binary=True)
 FORCE = output_of_run("force", "print", ("step", "force_x_n"), 2, 2, 10)

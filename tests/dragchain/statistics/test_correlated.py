@@ -12,7 +12,6 @@ from dragchain.statistics.correlated import (
     autocovariance,
     estimate_mean,
     estimates,
-    frame_sums,
     slow_error,
 )
 from dragchain.statistics.estimate import Estimate
@@ -187,11 +186,6 @@ def test_what_never_changes_and_what_is_short_are_not_reliable() -> None:
 def test_too_few_frames_have_no_interval() -> None:
     with pytest.raises(SeriesError, match="at least 8 frames; there are 7"):
         interval_of_mean(np.arange(7.0))
-
-
-def test_frame_sums_keep_frames_without_contacts() -> None:
-    sums = frame_sums(np.array([0, 2, 2]), 4, np.array([[1.0], [2.0], [3.0]]))
-    assert sums.tolist() == [[1.0], [0.0], [5.0], [0.0]]
 
 
 def steady(frames: int, azimuths: list[float], forces: list[float]) -> tuple[np.ndarray, ...]:

@@ -6,16 +6,12 @@ import pytest
 from changed import changed
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from made_frames import frame
 
-from dragchain import Frame, TableError, load_case
+from dragchain import TableError, load_case
 from dragchain.tables.bed import describe_bed, probed_height, segregation
 
 NAMES = ("x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s", "radius_m")
-
-
-def frame(rows):
-    table = np.array(rows, dtype=float).reshape(-1, len(NAMES))
-    return Frame(0, {name: table[:, i] for i, name in enumerate(NAMES)})
 
 
 def test_a_bed_of_nothing_has_no_height() -> None:
@@ -53,27 +49,27 @@ def test_a_bowl_narrower_than_a_particle_is_an_error() -> None:
 def test_describes_a_bed_of_one_particle_by_hand(tiny_run: Path) -> None:
     """Radius 0.03 in a bowl of 0.04: height 0.06, 4/3 r^3 / (R^2 h); v^2 / 2 over g d."""
     case = changed(load_case(tiny_run), gravity_m_s2=10.0)
-    bed = describe_bed(frame([[0, 0, 0.03, 0.1, 0, 0.2, 0.03]]), case)
+    bed = describe_bed(frame(NAMES, [[0, 0, 0.03, 0.1, 0, 0.2, 0.03]]), case)
     assert bed.bed_height_m == pytest.approx(0.06)
     assert bed.solid_fraction == pytest.approx(4 / 3 * 0.03**3 / (0.04**2 * 0.06))
     assert bed.kinetic_energy_ratio == pytest.approx(0.5 * 0.05 / (10 * 0.06))
     assert (bed.n_particles, bed.radius_mean_m, bed.radius_std_m) == (1, 0.03, 0.0)
     floating = case.media.density_kg_m3 / 4
     media = case.media.model_copy(update={"buoyancy_kg_m3": floating})
-    wet = describe_bed(frame([[0, 0, 0.03, 0.1, 0, 0.2, 0.03]]), changed(case, media=media))
+    wet = describe_bed(frame(NAMES, [[0, 0, 0.03, 0.1, 0, 0.2, 0.03]]), changed(case, media=media))
     assert wet.kinetic_energy_ratio == pytest.approx(bed.kinetic_energy_ratio / 0.75)
 
 
 def test_the_spread_of_radii_is_that_of_the_bed(tiny_run: Path) -> None:
     rows = [[0, 0, 0.01, 0, 0, 0, r] for r in (0.009, 0.010, 0.011)]
-    bed = describe_bed(frame(rows), load_case(tiny_run))
+    bed = describe_bed(frame(NAMES, rows), load_case(tiny_run))
     assert bed.radius_std_m == pytest.approx(0.001 * (2 / 3) ** 0.5)
     assert bed.kinetic_energy_ratio == 0.0
 
 
 def test_an_empty_bowl_is_an_error(tiny_run: Path) -> None:
     with pytest.raises(TableError, match="there is no packing"):
-        describe_bed(frame([]), load_case(tiny_run))
+        describe_bed(frame(NAMES, []), load_case(tiny_run))
 
 
 @pytest.mark.parametrize(

@@ -1,32 +1,16 @@
 import numpy as np
 import pytest
+from made_frames import wall
 
 from dragchain.tables.closure import Closure
-from dragchain.tables.workpiece_contacts import WallContacts, WorkpieceFrames
-
-
-def contacts(forces, evaluated=None, silent=None):
-    force = np.array(forces, dtype=float).reshape(-1, 3)
-    count = len(force)
-    return WallContacts(
-        particle_id=np.arange(count),
-        facet_id=np.arange(count),
-        point_m=np.zeros((count, 3)),
-        force_n=force,
-        evaluated_n=force if evaluated is None else np.array(evaluated, dtype=float),
-        normal=np.zeros((count, 3)),
-        surface_m_s=np.zeros((count, 3)),
-        overlap_m=np.zeros(count),
-        attraction_n=np.zeros(count),
-        silent=np.zeros(count, dtype=bool) if silent is None else np.array(silent),
-    )
+from dragchain.tables.workpiece_contacts import WorkpieceFrames
 
 
 def frame(workpiece, unplaced=(), step=10, opening=False):
     lost = np.array(unplaced, dtype=float).reshape(-1, 3)
     at = np.zeros(len(workpiece), dtype=int), np.zeros(len(lost), dtype=int)
     return WorkpieceFrames(
-        np.array([step]), np.array([opening]), workpiece, contacts([]), at[0], lost, at[1]
+        np.array([step]), np.array([opening]), workpiece, wall(), at[0], lost, at[1]
     )
 
 
@@ -37,15 +21,15 @@ def add(check, one, force, *, counted):
 
 def test_forces_that_add_up_pass() -> None:
     check = Closure()
-    assert add(check, frame(contacts([[1, 0, 0], [0, 2, 0]])), np.array([-1, -2, 0]), counted=True)
+    assert add(check, frame(wall([[1, 0, 0], [0, 2, 0]])), np.array([-1, -2, 0]), counted=True)
     assert check.problem() is None
     assert (check.record().verdict, check.record().max_n) == ("pass", 0)
 
 
 def test_a_missing_force_fails_and_is_measured() -> None:
     check = Closure()
-    add(check, frame(contacts([[3, 0, 0]]), step=10), np.array([-3, 0, 0]), counted=True)
-    add(check, frame(contacts([[3, 0, 0]]), step=20), np.array([-4, 0, 0]), counted=True)
+    add(check, frame(wall([[3, 0, 0]]), step=10), np.array([-3, 0, 0]), counted=True)
+    add(check, frame(wall([[3, 0, 0]]), step=20), np.array([-4, 0, 0]), counted=True)
     record = check.record()
     assert record.verdict == "fail"
     assert (record.worst_step, record.max_n, record.max_relative) == (20, 1.0, 0.25)
@@ -54,14 +38,14 @@ def test_a_missing_force_fails_and_is_measured() -> None:
 
 def test_small_forces_are_measured_against_the_floor() -> None:
     check = Closure()
-    add(check, frame(contacts([])), np.array([-1e-10, 0, 0]), counted=True)
+    add(check, frame(wall()), np.array([-1e-10, 0, 0]), counted=True)
     assert check.record().max_relative == pytest.approx(1e-7)
     assert check.problem() is None
 
 
 def test_the_engines_second_evaluation_is_measured_apart() -> None:
     check = Closure()
-    workpiece = contacts([[2, 0, 0]], evaluated=[[1.9, 0, 0]])
+    workpiece = wall([[2, 0, 0]], evaluated=[[1.9, 0, 0]])
     add(check, frame(workpiece), np.array([-2, 0, 0]), counted=True)
     add(check, frame(workpiece), np.array([-2, 0, 0]), counted=False)
     record = check.record()
@@ -72,7 +56,9 @@ def test_the_engines_second_evaluation_is_measured_apart() -> None:
 
 def test_silent_contacts_are_counted() -> None:
     check = Closure()
-    workpiece = contacts([[1, 0, 0], [0, 0, 0]], [[1, 0, 0], [0, 0.3, 0.4]], [False, True])
+    workpiece = wall(
+        [[1, 0, 0], [0, 0, 0]], evaluated=[[1, 0, 0], [0, 0.3, 0.4]], silent=[False, True]
+    )
     add(check, frame(workpiece), np.array([-1, 0, 0]), counted=True)
     record = check.record()
     assert (record.contacts, record.silent_contacts) == (2, 1)
@@ -81,17 +67,17 @@ def test_silent_contacts_are_counted() -> None:
 
 def test_a_force_without_a_contact_fails_although_the_sum_is_right() -> None:
     check = Closure()
-    add(check, frame(contacts([]), unplaced=[[0, 0.5, 0]]), np.array([0, -0.5, 0]), counted=True)
+    add(check, frame(wall(), unplaced=[[0, 0.5, 0]]), np.array([0, -0.5, 0]), counted=True)
     assert check.record().max_n == 0
     assert "1 forces on particles have no contact" in str(check.problem())
 
 
 def test_a_frame_that_opens_a_file_is_noted_apart() -> None:
     check = Closure()
-    start = frame(contacts([[3, 0, 0]]), opening=True)
+    start = frame(wall([[3, 0, 0]]), opening=True)
     assert not add(check, start, np.array([-4, 0, 0]), counted=True)
     assert add(check, start, np.array([-3, 0, 0]), counted=True)
-    add(check, frame(contacts([[3, 0, 0]])), np.array([-3, 0, 0]), counted=True)
+    add(check, frame(wall([[3, 0, 0]])), np.array([-3, 0, 0]), counted=True)
     record = check.record()
     assert (record.verdict, record.frames) == ("pass", 1)
     assert (record.opening_frames, record.opening_max_relative) == (2, 0.25)
@@ -99,6 +85,6 @@ def test_a_frame_that_opens_a_file_is_noted_apart() -> None:
 
 def test_nothing_to_compare_fails() -> None:
     check = Closure()
-    assert add(check, frame(contacts([[1, 0, 0]])), [np.nan] * 3, counted=False)
+    assert add(check, frame(wall([[1, 0, 0]])), [np.nan] * 3, counted=False)
     assert "cannot be tested" in str(check.problem())
     assert check.record().worst_step is None

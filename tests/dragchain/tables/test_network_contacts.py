@@ -1,10 +1,9 @@
 import numpy as np
 import pytest
+from made_frames import frame, wall
 
 from dragchain.errors import TableError
 from dragchain.tables.network_contacts import KINDS, Corrections, contact_rows, count_corrections
-from dragchain.tables.workpiece_contacts import WallContacts
-from dragdeck.dumps.frame import Frame
 from dragdeck.physics.coulomb import FrictionLimit
 
 PARTICLES = (
@@ -13,27 +12,6 @@ PARTICLES = (
 )
 CONTACTS = ("particle1_id", "particle2_id", "force_x_n", "force_y_n", "force_z_n", "overlap_m")
 CALM = [0.0] * 6
-
-
-def frame(names, rows, step=100):
-    table = np.array(rows, dtype=float).reshape(-1, len(names))
-    return Frame(step, {name: table[:, i] for i, name in enumerate(names)})
-
-
-def wall(points=(), forces=(), normals=(), silent=()):
-    count = len(points)
-    return WallContacts(
-        particle_id=np.arange(1, count + 1),
-        facet_id=np.zeros(count, dtype=np.int64),
-        point_m=np.array(points, dtype=float).reshape(-1, 3),
-        force_n=np.array(forces, dtype=float).reshape(-1, 3),
-        evaluated_n=np.zeros((count, 3)),
-        normal=np.array(normals, dtype=float).reshape(-1, 3),
-        surface_m_s=np.zeros((count, 3)),
-        overlap_m=np.full(count, 1e-6),
-        attraction_n=np.zeros(count),
-        silent=np.array(silent, dtype=bool),
-    )
 
 
 def rows_of(particles, contacts=(), workpiece=None, bowl=None, radius=10.0, friction=10.0):
@@ -78,7 +56,7 @@ def test_corrections_count_what_was_cut() -> None:
     """Normal forces 3 and 1: the mean is 2; the first is above it and cut, the second neither."""
     particles = [[1, 0, 0, 5, 2, *CALM], [2, 2.9, 0, 5, 1, *CALM], [3, 5.8, 0, 5, 2, *CALM]]
     contacts = [[1, 2, -3, 0, 4, 0.1], [2, 3, -1, 0, 0.5, 0.1]]
-    on_rod = wall([[1, 0, 5]], [[2, 0, 1]], [[1, 0, 0]], [False])
+    on_rod = wall([[2, 0, 1]], [[1, 0, 5]], [[1, 0, 0]])
     rows = rows_of(particles, contacts, workpiece=on_rod, friction=0.5)
     found = Corrections.of(0.5, 2 * count_corrections(rows, 3))
     assert (found.particle_contacts, found.cut) == (4, 2)
@@ -126,7 +104,7 @@ def test_a_particle_in_the_corner_has_two_contacts() -> None:
 
 def test_contacts_with_the_workpiece_that_carry_nothing_are_left_out() -> None:
     workpiece = wall(
-        [[1, 0, 5], [0, 1, 5]], [[2, 0, 1], [0, 0, 0]], [[1, 0, 0], [0, 0, 0]], [False, True]
+        [[2, 0, 1], [0, 0, 0]], [[1, 0, 5], [0, 1, 5]], [[1, 0, 0], [0, 0, 0]], silent=[False, True]
     )
     rows = rows_of([[1, 2, 0, 5, 1, *CALM]], workpiece=workpiece)
     assert (KINDS[rows.kind[0]], rows.a_id.tolist(), rows.b_id.tolist()) == (
@@ -147,7 +125,7 @@ def test_contacts_between_particles_that_carry_nothing_are_left_out() -> None:
 
 
 def test_a_meshed_bowl_is_split_into_floor_and_side() -> None:
-    bowl = wall([[1, 0, 0], [10, 0, 1]], [[0, 0, 3], [-2, 0, 0]], [[0, 0, 1], [-1, 0, 0]], [0, 0])
+    bowl = wall([[0, 0, 3], [-2, 0, 0]], [[1, 0, 0], [10, 0, 1]], [[0, 0, 1], [-1, 0, 0]])
     rows = rows_of([[1, 1, 0, 1, 1, *CALM], [2, 9, 0, 1, 1, *CALM]], bowl=bowl)
     assert [(KINDS[k], f) for k, f in zip(rows.kind, rows.normal_force_n, strict=True)] == [
         ("particle-floor", 3),

@@ -3,6 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
+from made_frames import frame
 
 from dragchain.errors import TableError
 from dragchain.tables.workpiece_contacts import (
@@ -18,15 +19,6 @@ CONTACTS = (
     *("point_x_m", "point_y_m", "point_z_m", "facet_id", "particle_id"),
     *("force_x_n", "force_y_n", "force_z_n", "overlap_m"),
 )
-
-
-def frame(names, rows, step=100):
-    table = np.array(rows, dtype=float).reshape(-1, len(names))
-    columns = {name: table[:, i] for i, name in enumerate(names)}
-    for name in names:
-        if name.endswith("_id"):
-            columns[name] = columns[name].astype(np.int64)
-    return Frame(step, columns)
 
 
 def limits(friction: float) -> tuple[FrictionLimit, FrictionLimit]:

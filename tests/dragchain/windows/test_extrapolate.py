@@ -11,11 +11,17 @@ from figure_files import case_json
 from paths import WINDOWS_RECORD
 from report_files import ASKED
 
-from dragchain.report.values import EXTRAPOLATED, Extrapolated, Need
+from dragchain.report.values import (
+    EXTRAPOLATED,
+    Extrapolated,
+    ExtrapolatedQuantity,
+    Need,
+    Reached,
+)
 from dragchain.statistics.estimate import Estimate
 from dragchain.tradeoff.measures import PathQuantities
 from dragchain.windows import extrapolate
-from dragchain.windows.estimate import Round, WindowedQuantity, WindowOfRun
+from dragchain.windows.estimate import Round, WindowOfRun
 from dragchain.windows.extrapolate import extrapolate_run
 
 
@@ -78,26 +84,24 @@ def test_a_tolerance_of_the_restitution_says_nothing_of_the_process(
 
 def test_windows_give_the_values_they_have_and_say_which_they_are(tmp_path: Path) -> None:
     (tmp_path / "tables").mkdir()
-    refused = WindowOfRun(run="w-3", refused="a particle was lost", cpu_time_s=9.0)
-    none = Estimate(math.nan, math.nan, math.nan)
+    one, none = Estimate(1.8, 1.62, 1.98), Estimate(math.nan, math.nan, math.nan)
     drag, peaks = (
-        WindowedQuantity(name=name, label=name, unit="N", asked=asked, soft=2.0, value=value)
-        for name, asked, value in (
-            ("drag", True, Estimate(1.8, 1.62, 1.98)), ("peaks", False, none),
-        )
+        ExtrapolatedQuantity(name=name, label=name, unit="N", measured=none, value=value)
+        for name, value in (("drag", one), ("peaks", None))
+    )
+    asked = Reached(
+        tolerance=0.05, asked=("drag",), reached=False, needed=Need(8, 2), runs=("w-1", "w-2"),
+        refused={"w-3": "a particle was lost"},
     )  # fmt: skip
-    Round(
-        tolerance=0.05, asked=("drag",), wanted=3, last=True, reached=False, needed=Need(8, 2),
-        windows=(*(WindowOfRun(run=f"w-{n}", cpu_time_s=9.0) for n in (1, 2)), refused),
-        quantities=(drag, peaks),
-    ).write(tmp_path / "round-1.json")  # fmt: skip
+    windows = tuple(WindowOfRun(run=f"w-{n}", cpu_time_s=9.0) for n in (1, 2, 3))
+    Round(tolerance=asked, wanted=3, last=True, windows=windows, quantities=(drag, peaks)).write(
+        tmp_path / "round-1.json"
+    )
     extrapolate_run(tmp_path, WINDOWS_RECORD, tmp_path / "round-1.json")
     found = Extrapolated.read(tmp_path / EXTRAPOLATED)
-    one, other = found.quantities
-    assert one.value == Estimate(1.8, 1.62, 1.98)
-    assert other.value is None and other.measured.value == 2.0
-    assert found.tolerance is not None
-    assert found.tolerance.refused == {"w-3": "a particle was lost"}
+    assert [each.value for each in found.quantities] == [one, None]
+    assert found.tolerance == asked
+    assert "windows" not in json.loads((tmp_path / EXTRAPOLATED).read_text())
     assert found.said == (
         "2 windows at the physical Young's modulus do not give the drag to within 5 %: "
         "about 2 seeds would."

@@ -34,21 +34,27 @@ def judge(values: Sequence[float], tolerance: float, most: int = 16) -> Round:
 
 def test_it_stops_when_the_tolerance_is_reached() -> None:
     found = judge([15.0, 15.5, 14.5], 0.2)
-    assert found.reached and found.last and found.wanted == 3
+    assert found.tolerance.reached and found.last and found.wanted == 3
     (contacts,) = found.quantities
-    assert contacts.value.relative_half_width <= 0.2 and contacts.value.contains(15.0)
+    assert contacts.value and contacts.value.contains(15.0)
+    assert contacts.value.relative_half_width <= 0.2
 
 
 def test_a_round_asks_for_the_windows_that_would_do_but_at_most_twice_as_many() -> None:
     close, far = judge([15.0, 16.5, 13.5], 0.085), judge([15.0, 19.0, 11.0], 0.1)
-    assert not close.reached and not close.last
-    assert 3 < close.wanted == close.needed.windows <= 6
-    assert far.wanted == 6 < far.needed.windows
+    assert not close.tolerance.reached and not close.last
+    assert 3 < close.wanted == close.tolerance.needed.windows <= 6
+    assert far.wanted == 6 < far.tolerance.needed.windows
 
 
 def test_the_last_window_is_the_last() -> None:
     found = judge([15.0, 19.0, 11.0], 0.01, most=3)
-    assert found.last and not found.reached and found.wanted == 3 and found.needed.packings > 1
+    assert (
+        found.last
+        and not found.tolerance.reached
+        and found.wanted == 3
+        and found.tolerance.needed.packings > 1
+    )
 
 
 def test_a_refused_window_does_not_enter_and_is_made_up_for() -> None:
@@ -56,22 +62,26 @@ def test_a_refused_window_does_not_enter_and_is_made_up_for() -> None:
     bad = good[3].model_copy(update={"refused": "lost", "values": {"workpiece_contacts": 99.0}})
     found = judged(SOFT, [*good[:3], bad], 0.05, ["workpiece_contacts"], 16, RECORD)
     (contacts,) = found.quantities
-    assert contacts.value.value == pytest.approx(15.0)
-    assert [one.run for one in found.entering] == ["w-0", "w-1", "w-2"]
-    assert found.wanted == min(8, 4 + max(1, found.needed.windows - 3)) > 4
+    assert contacts.value and contacts.value.value == pytest.approx(15.0)
+    assert found.tolerance.runs == ("w-0", "w-1", "w-2")
+    assert found.tolerance.refused == {"w-3": "lost"}
+    assert found.wanted == min(8, 4 + max(1, found.tolerance.needed.windows - 3)) > 4
 
 
 def test_a_quantity_that_a_window_lacks_is_never_reached() -> None:
     some = windows([15.0, 15.0, 15.0])
     some[1] = some[1].model_copy(update={"values": {}})
     found = judged(SOFT, some, 0.5, ["workpiece_contacts"], 3, RECORD)
-    assert not found.reached and not found.quantities[0].value.known
+    assert not found.tolerance.reached and found.quantities[0].value is None
 
 
 def test_an_asked_quantity_that_the_run_lacks_is_never_reached() -> None:
     every = windows([15.0, 15.0, 15.0])
     found = judged(SOFT, every, 0.5, ["workpiece_contacts", "drag_mean"], 3, RECORD)
-    assert not found.reached and found.asked == ("workpiece_contacts", "drag_mean")
+    assert not found.tolerance.reached and found.tolerance.asked == (
+        "workpiece_contacts",
+        "drag_mean",
+    )
 
 
 @pytest.mark.parametrize(("early", "settled"), [(3.4, True), (0.3, False), (4.5, False)])

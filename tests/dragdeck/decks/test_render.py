@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from made_scenes import BED, script
+from made_scenes import BED, own_template, script
 from made_study import Made
 from paths import ROOT
 
@@ -98,12 +98,6 @@ def test_a_script_changes_with_a_coefficient_if_its_name_does(
             for case in (before, after)
         )
         assert (body != changed) == (scene.run_id(before) != scene.run_id(after))
-
-
-def own_template(case: Case, text: str) -> None:
-    file = case.file.parent / "templates/process.in.j2"
-    file.parent.mkdir()
-    file.write_text(text)
 
 
 def test_a_study_may_change_one_block(case: Case, project: Project) -> None:

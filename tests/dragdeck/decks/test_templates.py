@@ -3,10 +3,9 @@
 import re
 import signal
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
-from made_scenes import BED, script
+from made_scenes import BED, own_template, script
 from made_study import Made
 from markupsafe import Markup
 
@@ -43,13 +42,6 @@ def test_a_title_stays_in_its_comment(project: Project, made: Made) -> None:
     text = script(case, project)
     assert text.splitlines()[0] == "# RD of Müller  x "
     assert comment("a\nb") == "ab"
-
-
-def own(case: Case, text: str, name: str = "process.in.j2") -> Path:
-    file = case.file.parent / "templates" / name
-    file.parent.mkdir(exist_ok=True)
-    file.write_text(text)
-    return file
 
 
 def in_block(text: str) -> str:
@@ -107,7 +99,7 @@ REFUSED = [
 def test_a_template_that_cannot_be_is_refused_and_named(
     case: Case, project: Project, name: str, text: str, words: str
 ) -> None:
-    own(case, text, name)
+    own_template(case, text, name)
     with pytest.raises(InputError, match=words) as caught:
         render(case, project)
     assert name in str(caught.value.file)
@@ -116,7 +108,7 @@ def test_a_template_that_cannot_be_is_refused_and_named(
 def test_a_template_without_end_is_stopped(case: Case, project: Project) -> None:
     """Loops within loops: the timer goes off early, so that nobody waits."""
     loops = "{% for i in range(99999) %}" * 3 + "{% endfor %}" * 3
-    own(case, in_block("{{ deck.title }}" + loops))
+    own_template(case, in_block("{{ deck.title }}" + loops))
     templates = environment(project.templates, case.file.parent / "templates")
     scene = process_scene(case, BED)
     scene = replace(scene, deck=replace(scene.deck, title=_Alarm("slow")))
@@ -134,14 +126,14 @@ class _Alarm(Markup):
 
 
 def test_a_new_block_within_a_known_one_is_fine(case: Case, project: Project) -> None:
-    own(case, in_block("{% block mine %}# mine{% endblock %}"))
+    own_template(case, in_block("{% block mine %}# mine{% endblock %}"))
     assert "# mine" in render(case, project)
 
 
 def test_files_that_no_input_script_uses_are_named_together(case: Case, project: Project) -> None:
-    file = own(case, "", "proces.in.j2")
-    own(case, "", "notes.txt")
-    own(case, "", ".hidden")
+    file = own_template(case, "", "proces.in.j2")
+    own_template(case, "", "notes.txt")
+    own_template(case, "", ".hidden")
     with pytest.raises(InputError) as caught:
         environment(project.templates, file.parent)
     assert "did you mean 'process.in.j2'" in str(caught.value)
@@ -150,9 +142,9 @@ def test_files_that_no_input_script_uses_are_named_together(case: Case, project:
 
 
 def test_a_file_that_an_own_template_imports_is_used(case: Case, project: Project) -> None:
-    own(case, "{% macro hello() %}# hello{% endmacro %}", "mine.j2")
+    own_template(case, "{% macro hello() %}# hello{% endmacro %}", "mine.j2")
     text = '{% from "mine.j2" import hello %}{{ hello() }}'
-    file = own(case, in_block(text))
+    file = own_template(case, in_block(text))
     assert "# hello" in render(case, project)
     templates = environment(project.templates, file.parent)
     assert file.parent / "mine.j2" in template_files(templates, "process")
@@ -169,7 +161,7 @@ hooke tangential history
 def test_a_contact_law_of_a_template_holds_for_particles_and_walls(
     case: Case, project: Project, name: str
 ) -> None:
-    own(case, LAW.replace("base.in", f"{name}.in"), f"{name}.in.j2")
+    own_template(case, LAW.replace("base.in", f"{name}.in"), f"{name}.in.j2")
     text = render(case, project)
     laws = re.findall(r"^(?:pair_style|fix .* wall/gran) .*$", text, re.MULTILINE)
     assert len(laws) == 4
@@ -179,21 +171,21 @@ def test_a_contact_law_of_a_template_holds_for_particles_and_walls(
 
 def test_a_whole_file_may_be_replaced(case: Case, project: Project) -> None:
     walls = (project.templates / "walls.j2").read_text()
-    own(case, walls.replace("zplane 0.0", "zplane 0.001"), "walls.j2")
+    own_template(case, walls.replace("zplane 0.0", "zplane 0.001"), "walls.j2")
     assert "zplane 0.001 store_force" in render(case, project)
 
 
 def test_what_a_template_defines_for_its_blocks_is_no_text(case: Case, project: Project) -> None:
     text = "{% set rate %}5{% endset %}\n{% macro mine() %}# {{ rate }}{% endmacro %}\n"
-    own(case, in_block("{{ mine() }}").replace("\n{% block", f"\n{text}{{% block", 1))
+    own_template(case, in_block("{{ mine() }}").replace("\n{% block", f"\n{text}{{% block", 1))
     assert "# 5" in render(case, project)
 
 
 def test_a_template_that_changes_nothing_has_no_effect(case: Case, project: Project) -> None:
-    file = own(
+    file = own_template(
         case, "{% extends 'base/base.in.j2' %}{% block run %}# never{% endblock %}", "base.in.j2"
     )
-    own(case, in_block("# mine"))
+    own_template(case, in_block("# mine"))
     templates, scene = environment(project.templates, file.parent), process_scene(case, BED)
     assert overriding(scene, templates) == {"base.in.j2", "process.in.j2"}
     assert effective(scene, templates) == {"process.in.j2"}
@@ -202,7 +194,9 @@ def test_a_template_that_changes_nothing_has_no_effect(case: Case, project: Proj
 
 
 def test_output_of_a_template_is_its_own(case: Case, project: Project) -> None:
-    own(case, in_block("{{ super() }}\nvariable mine equal step").replace("extra", "outputs"))
+    own_template(
+        case, in_block("{{ super() }}\nvariable mine equal step").replace("extra", "outputs")
+    )
     assert "variable mine equal step" in render(case, project)
 
 
@@ -216,5 +210,5 @@ def test_output_of_a_template_is_its_own(case: Case, project: Project) -> None:
     ],
 )
 def test_a_loop_that_can_end_stays(case: Case, project: Project, loop: str) -> None:
-    own(case, in_block(loop))
+    own_template(case, in_block(loop))
     assert "jump SELF" in render(case, project)

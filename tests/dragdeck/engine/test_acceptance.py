@@ -1,13 +1,12 @@
 """What tells a whole output file from one that was cut short."""
 
-import struct
 from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
-from made_run import Raw
+from made_run import Raw, output_of_run
 
-from dragdeck.decks.outputs import Kind, OutputOfRun
+from dragdeck.decks.outputs import OutputOfRun
 from dragdeck.dumps.grammar import whole_frames
 from dragdeck.engine.acceptance import check_run
 from dragdeck.records.run import (
@@ -19,37 +18,18 @@ from dragdeck.records.run import (
     SteadyCriterion,
 )
 
-
-def written(kind: Kind, name: str, columns: Sequence[str], last_step: int | None) -> OutputOfRun:
-    return OutputOfRun(
-        kind=kind,
-        binary=kind == "custom",
-        pattern=f"{name}.{{part}}.txt",
-        columns=columns,
-        engine_columns=None,
-        period_steps=1,
-        first_step=0,
-        last_step=last_step,
-        rows_per_particle=1.0,
-    )
+COLUMNS = ["a_id", "force_n"]
+PRINT = output_of_run("force", "print", ["step", "force_n"], 1, 0, None)
+LOCAL = output_of_run("contacts", "local", COLUMNS, 1, 0, None)
+CUSTOM = output_of_run("particles", "custom", COLUMNS, 1, 0, None, binary=True)
 
 
-PRINT = written("print", "force", ["step", "force_n"], None)
-LOCAL = written("local", "contacts", ["a_id", "force_n"], None)
-CUSTOM = written("custom", "particles", ["a_id", "force_n"], None)
+def text_frame(step: int, rows: list[list[float]]) -> bytes:
+    return Raw.text(step, rows, COLUMNS, "local")
 
 
-def text_frame(step: int, rows: list[str]) -> str:
-    box = "ITEM: BOX BOUNDS ff ff ff\n0 1\n0 1\n0 1\n"
-    head = f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ENTRIES\n{len(rows)}\n{box}"
-    head += "ITEM: ENTRIES a_id force_n \n"
-    return head + "".join(row + "\n" for row in rows)
-
-
-def binary_frame(step: int, chunks: list[list[float]]) -> bytes:
-    rows = sum(len(chunk) for chunk in chunks) // 2
-    head = struct.pack("<qqi6i6d2i", step, rows, 0, *[1] * 6, *[0.0] * 6, 2, len(chunks))
-    return head + b"".join(struct.pack(f"<i{len(c)}d", len(c), *c) for c in chunks)
+def binary_frame(step: int, rows: list[list[float]], ranks: int) -> bytes:
+    return Raw.binary(step, rows, len(COLUMNS), ranks)
 
 
 @pytest.mark.parametrize(
@@ -59,15 +39,15 @@ def binary_frame(step: int, chunks: list[list[float]]) -> bytes:
         (PRINT, b"step force_n\n10 1.5\n20 1", None),
         (PRINT, b"step force_n\n10 1.5\n20\n", None),
         (PRINT, b"step force_n\n", None),
-        (LOCAL, (text_frame(5, ["1 2"]) + text_frame(9, ["1 2", "3 4"])).encode(), 9),
-        (LOCAL, text_frame(7, []).encode(), 7),
-        (LOCAL, text_frame(9, ["1 2", "3 4"])[:-3].encode(), None),
-        (LOCAL, text_frame(9, ["1 2", "3 4"])[:-4].encode(), None),
+        (LOCAL, text_frame(5, [[1, 2]]) + text_frame(9, [[1, 2], [3, 4]]), 9),
+        (LOCAL, text_frame(7, []), 7),
+        (LOCAL, text_frame(9, [[1, 2], [3, 4]])[:-4], None),
+        (LOCAL, text_frame(9, [[1, 2], [3, 4]])[:-5], None),
         (LOCAL, b"", None),
-        (CUSTOM, binary_frame(3, [[1, 2], []]) + binary_frame(6, [[1, 2, 3, 4]]), 6),
-        (CUSTOM, binary_frame(3, [[]]), 3),
-        (CUSTOM, binary_frame(3, [[1, 2]])[:-1], None),
-        (CUSTOM, (binary_frame(3, [[1, 2]]) * 2)[:-70], None),
+        (CUSTOM, binary_frame(3, [[1, 2]], 2) + binary_frame(6, [[1, 2], [3, 4]], 1), 6),
+        (CUSTOM, binary_frame(3, [], 1), 3),
+        (CUSTOM, binary_frame(3, [[1, 2]], 1)[:-1], None),
+        (CUSTOM, (binary_frame(3, [[1, 2]], 1) * 2)[:-70], None),
         (CUSTOM, b"", None),
     ],
 )
@@ -93,19 +73,21 @@ INPUTS = CaseFile(
     files={},
 )
 HEAD = "step time_s n_particles kinetic_energy_j rotational_energy_j fastest_particle_m_s\n"
-THERMO = written("print", "thermo", HEAD.split(), 20).model_copy(
-    update={"period_steps": 10, "first_step": 10}
-)
+THERMO = output_of_run("thermo", "print", HEAD.split(), 10, 10, 20, pattern="thermo.{part}.txt")
 GRID = "  1 by 1 by 1 MPI processor grid\n"
 GOOD = HEAD + "10 0.1 2 1e-9 0 0.1\n20 0.2 2 1e-9 0 0.1\n"
 
 
 def failed(
-    folder: Path, inputs: CaseFile, status: int = 0, begins: Sequence[int] = (0,)
+    folder: Path,
+    inputs: CaseFile,
+    status: int = 0,
+    begins: Sequence[int] = (0,),
+    thermo: OutputOfRun = THERMO,
 ) -> set[str]:
     """Codes of the checks that did not pass, of parts that begin at some steps."""
     parts = [RunPart(part=k + 1, checkpoint=None, from_step=step) for k, step in enumerate(begins)]
-    checks = check_run(folder, inputs, {"thermo": THERMO}, status, parts, ranks=1)
+    checks = check_run(folder, inputs, {"thermo": thermo}, status, parts, ranks=1)
     return {check.code for check in checks if not check.passed}
 
 
@@ -140,10 +122,7 @@ def test_a_bed_whose_motion_changes_fails(tmp_path: Path, last: float, fails: se
     (tmp_path / "thermo.1.txt").write_text(HEAD + "".join(rows))
     steady = SteadyCriterion(from_step=10, energy_drift=0.1)
     thermo = THERMO.model_copy(update={"last_step": 70})
-    inputs = INPUTS.model_copy(update={"steady": steady})
-    parts = [RunPart(part=1, checkpoint=None, from_step=0)]
-    checks = check_run(tmp_path, inputs, {"thermo": thermo}, 0, parts, ranks=1)
-    assert {check.code for check in checks if not check.passed} == fails
+    assert failed(tmp_path, INPUTS.model_copy(update={"steady": steady}), thermo=thermo) == fails
 
 
 SETTLED = SettlingCriterion(energy_ratio=1e-6, highest_m=0.05)
@@ -151,10 +130,11 @@ SETTLED = SettlingCriterion(energy_ratio=1e-6, highest_m=0.05)
 
 @pytest.mark.parametrize(("z_m", "fails"), [(0.0479, set()), (0.0481, {"packing_in_bowl"})])
 def test_a_packing_above_the_rim_fails(tmp_path: Path, z_m: float, fails: set[str]) -> None:
-    particles = written("custom", "particles", ["a_id", "z_m", "radius_m"], None)
+    columns = ["a_id", "z_m", "radius_m"]
+    particles = output_of_run("particles", "custom", columns, 1, 0, None, binary=True)
     frames = [[[1, 0.2, 0.002], [2, 0.01, 0.002]], [[1, z_m, 0.002], [2, 0.01, 0.002]]]
     content = [Raw.binary(step, rows, 3) for step, rows in enumerate(frames)]
-    (tmp_path / "particles.1.txt").write_bytes(b"".join(content))
+    (tmp_path / "particles.1").write_bytes(b"".join(content))
     (tmp_path / "screen.1.txt").write_text(GRID + "DRAGDECK SETTLED: after\nDRAGDECK END\n")
     filling = INPUTS.model_copy(update={"settled": SETTLED, "scene": "other"})
     parts = [RunPart(part=1, checkpoint=None, from_step=0)]

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_run import Raw
+from made_run import Raw, output_of_run
 from spoilt_dumps import NAMES, ROWS, SPOILT, binary, text
 
 from dragdeck.decks.outputs import OutputOfRun
@@ -24,17 +24,7 @@ from dragdeck.engine.completeness import (
 from dragdeck.errors import DumpError
 from dragdeck.records.run import RunPart
 
-FORCE = OutputOfRun(
-    kind="print",
-    binary=False,
-    pattern="force.{part}.txt",
-    columns=["step", "force_n"],
-    engine_columns=None,
-    period_steps=10,
-    first_step=10,
-    last_step=60,
-    rows_per_particle=0.0,
-)
+FORCE = output_of_run("force", "print", ["step", "force_n"], 10, 10, 60, pattern="force.{part}.txt")
 HEAD = "step force_n\n"
 
 
@@ -100,17 +90,10 @@ def test_an_output_that_the_engine_decides_on_has_no_gap(tmp_path: Path) -> None
 
 def dump(name: str) -> OutputOfRun:
     """The entry in ``columns.json`` of a spoilt dump."""
-    return OutputOfRun(
-        kind="custom",
-        binary=name.endswith(".bin"),
-        pattern="{part}",
-        columns=NAMES,
-        engine_columns=NAMES,
-        period_steps=7,
-        first_step=0,
-        last_step=21,
-        rows_per_particle=1.0,
-    ).model_copy(update={"pattern": name})
+    made = output_of_run(
+        "dump", "custom", NAMES, 7, 0, 21, binary=name.endswith(".bin"), engine_columns=NAMES
+    )
+    return made.model_copy(update={"pattern": name})
 
 
 NUMBERS = re.compile(r"row \d+: |(id|x|c_f\[1\]) is |as numbers|are not text|names the columns")

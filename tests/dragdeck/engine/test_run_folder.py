@@ -12,11 +12,10 @@ from typing import Any
 
 import psutil
 import pytest
+from made_scenes import rendered
 from made_study import Made
 from run_files import rewrite
 
-from dragdeck.decks.render import write_run
-from dragdeck.decks.templates import environment
 from dragdeck.engine.checkpoints import checkpoint_files, checkpoint_step
 from dragdeck.engine.reports import silent
 from dragdeck.engine.run_folder import fingerprint, run
@@ -24,22 +23,19 @@ from dragdeck.engine.watch import EngineEnded, Watcher, cut_screen
 from dragdeck.errors import EngineError, InputError, RejectedRunError
 from dragdeck.project import Project
 from dragdeck.records.run import CaseFile, RunRecord
-from dragdeck.scenes.filling import FILLING, filling_scene
 
 pytestmark = pytest.mark.engine
 
 
-def rendered(made: Made, project: Project, **fidelity: Any) -> Path:
+def small_filling(made: Made, project: Project, **fidelity: Any) -> Path:
     """A rendered fill of 150 particles, not yet run."""
     case = made({"media.count": 150, **{f"fidelities.quick.{k}": v for k, v in fidelity.items()}})
-    folder = project.run_folder(case, FILLING)
-    write_run(filling_scene(case), folder, environment(project.templates))
-    return folder
+    return rendered(case, project)
 
 
 @pytest.fixture
 def filling(made: Made, project: Project) -> Path:
-    return rendered(made, project)
+    return small_filling(made, project)
 
 
 def state(folder: Path) -> RunRecord:
@@ -105,7 +101,7 @@ def test_a_changed_deck_moves_the_old_run_aside(filling: Path) -> None:
 
 def slow_filling(made: Made, project: Project, ranks: int = 1) -> Path:
     """A rendered fill of a few seconds, not yet run."""
-    return rendered(made, project, ranks=ranks, filling_timestep_fraction=0.1)
+    return small_filling(made, project, ranks=ranks, filling_timestep_fraction=0.1)
 
 
 def start(folder: Path) -> subprocess.Popen[bytes]:

@@ -1,26 +1,24 @@
 """The acceptance check of the time step: on made frames, and on LIGGGHTS."""
 
 import json
-import struct
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from made_run import Raw
+from made_scenes import rendered
 from made_study import Made
 
 from dragdeck.cases.case import Case
 from dragdeck.decks.outputs import particles
-from dragdeck.decks.render import write_run
-from dragdeck.decks.templates import environment
 from dragdeck.engine.acceptance import check_run
 from dragdeck.engine.reports import silent
 from dragdeck.engine.run_folder import run_to_outcome
 from dragdeck.physics.packing import Bed
 from dragdeck.project import Project
 from dragdeck.records.run import AcceptanceCheck, CaseFile, RunPart, RunRecord
-from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import PROCESS
 
 OUTPUT = particles(10, 10, 40, bowl_facets=True)
@@ -29,15 +27,12 @@ RADIUS = 3e-3
 
 def frame(step: int, overlap_m: float, ranks: int) -> bytes:
     """Two particles on the floor, far from each other, dumped by some ranks."""
-    width = len(OUTPUT.columns)
-    rows = np.zeros((2, width))
+    rows = np.zeros((2, len(OUTPUT.columns)))
     names = [column.name for column in OUTPUT.columns]
     rows[:, names.index("x_m")] = -0.01, 0.01
     rows[:, names.index("z_m")] = RADIUS - overlap_m
     rows[:, names.index("radius_m")] = RADIUS
-    head = struct.pack("<qqi6i6d2i", step, 2, 0, *[1] * 6, *[0.0] * 6, width, ranks)
-    chunks = [rows] if ranks == 1 else [rows[:1], rows[1:]]
-    return head + b"".join(struct.pack("<i", part.size) + part.tobytes() for part in chunks)
+    return Raw.binary(step, rows, len(names), ranks)
 
 
 def checked(
@@ -136,10 +131,8 @@ def test_the_engine_at_a_stable_and_at_an_unstable_step(
 
 def outcome(case: Case, project: Project) -> RunRecord:
     """The record of a case's process; its filling is run if it was not before."""
-    templates = environment(project.templates)
-    filling, process = (project.run_folder(case, kind) for kind in (FILLING, PROCESS))
-    write_run(FILLING.build(case, None), filling, templates)
+    filling = rendered(case, project)
     run_to_outcome(filling, filling / "outcome.json", silent)
-    write_run(PROCESS.build(case, Bed(0.055, 0.065)), process, templates)
+    process = rendered(case, project, PROCESS, Bed(0.055, 0.065))
     run_to_outcome(process, process / "outcome.json", silent)
     return RunRecord.read(process / "outcome.json")

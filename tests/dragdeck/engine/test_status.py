@@ -4,33 +4,28 @@ import os
 from pathlib import Path
 
 import pytest
+from made_scenes import rendered
 
 from dragdeck.cases.case import Case
-from dragdeck.decks.render import write_run
-from dragdeck.decks.templates import environment
 from dragdeck.engine.process import only_runner
 from dragdeck.engine.reports import printable, shown_time, silent
 from dragdeck.engine.status import run_status
 from dragdeck.project import Project
 from dragdeck.records.run import RunPart, RunRecord, State
-from dragdeck.scenes.filling import FILLING, filling_scene
-from dragdeck.scenes.process import PROCESS, process_scene
+from dragdeck.scenes.filling import filling_scene
+from dragdeck.scenes.process import PROCESS
 
 HEAD = "step time_s n_particles kinetic_energy_j rotational_energy_j fastest_particle_m_s\n"
 
 
 @pytest.fixture
 def filling(case: Case, project: Project) -> Path:
-    folder = project.run_folder(case, FILLING)
-    write_run(filling_scene(case), folder, environment(project.templates))
-    return folder
+    return rendered(case, project)
 
 
 @pytest.fixture
 def process(case: Case, project: Project) -> Path:
-    folder = project.run_folder(case, PROCESS)
-    write_run(process_scene(case), folder, environment(project.templates))
-    return folder
+    return rendered(case, project, PROCESS)
 
 
 def write_state(folder: Path, state: State, **more: object) -> None:

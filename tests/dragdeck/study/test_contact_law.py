@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from made_scenes import rendered
 from scipy.optimize import brentq
 
 from dragchain.run.run_parts import iter_frames
@@ -20,7 +21,7 @@ from dragdeck.errors import InputError
 from dragdeck.physics.contact_mechanics import effective_modulus, pull_off_force
 from dragdeck.physics.coulomb import FrictionLimit
 from dragdeck.project import Project
-from dragdeck.scenes.filling import FILLING, filling_scene
+from dragdeck.scenes.filling import filling_scene
 from dragdeck.scenes.process import SCENES, process_scene
 from dragdeck.study import contact_law
 from dragdeck.study.contact_law import (
@@ -163,8 +164,7 @@ def test_a_bed_comes_to_rest_with_the_coefficient(
 ) -> None:
     small["media"]["count"] = 50
     case = with_coefficient(small, write_study, name, USED)
-    folder = project.run_folder(case, FILLING)
-    write_run(filling_scene(case), folder, environment(project.templates))
+    folder = rendered(case, project)
     assert run(folder, lambda line: None).state == "complete"
 
 

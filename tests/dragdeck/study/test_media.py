@@ -8,18 +8,17 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from made_scenes import rendered
 from pydantic import ValidationError
 
 from dragchain import write_tables
 from dragdeck.cases.bed import bed_classes, bed_density, bed_radii, bed_rayleigh_time
-from dragdeck.decks.render import write_run
-from dragdeck.decks.templates import environment
 from dragdeck.engine.run_folder import run
 from dragdeck.errors import InputError
 from dragdeck.physics.contact_mechanics import rayleigh_time
 from dragdeck.project import Project
 from dragdeck.records.packing import Packing
-from dragdeck.scenes.filling import FILLING, filling_cautions, filling_scene, first_particles
+from dragdeck.scenes.filling import filling_cautions, filling_scene, first_particles
 from dragdeck.scenes.process import process_scene
 from dragdeck.study.media import Grains
 from dragdeck.study.shapes import SOLID_FRACTION_ESTIMATE
@@ -211,8 +210,7 @@ def test_a_mixture_of_materials_and_sizes_comes_to_rest_as_asked(
     small: Small, write_study: Write, project: Project
 ) -> None:
     (case,) = load_cases(write_study(mixed(small, count=100)))
-    folder = project.run_folder(case, FILLING)
-    write_run(filling_scene(case), folder, environment(project.templates))
+    folder = rendered(case, project)
     assert run(folder, lambda line: None).state == "complete"
     write_tables(folder)
     packing = Packing.read(folder / "tables" / "packing.json")

@@ -99,7 +99,6 @@ def test_a_scene_may_have_a_path_of_its_own(make: Callable[..., Points]) -> None
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"reference": {"vary": {"seed": [1, 2]}}}, "the reference must be a single point"),
         ({"points": [{"vary": {"motion.sped_m_s": [1]}}]}, "unknown key"),
         ({"points": [{"vary": {"fidelity.speed_factor": [0.1]}}]}, "at least 1"),
         ({"points": [{"vary": {"title.long": [1]}}]}, "below a single value"),
@@ -113,24 +112,6 @@ def test_what_a_plan_cannot_say(
     with pytest.raises(InputError, match=words) as caught:
         make(**change)
     assert "plan.yaml" in str(caught.value)
-
-
-def test_one_by_one_values_never_come_together(make: Callable[..., Points]) -> None:
-    block = {
-        "vary": {"fidelity.speed_factor": [1, 2]},
-        "one_by_one": {
-            "workpiece.shape.radius_m": [0.003, 0.005],
-            "motion.immersion_depth_m": [0.016],
-        },
-        "seeds": 1,
-    }
-    points = make(points=[block]).processes[1:]
-    assert len(points) == 2 * 3
-    own = [
-        (case.study.motion.immersion_depth_m, case.study.workpiece.shape.model_dump()["radius_m"])
-        for case in points
-    ]
-    assert own == 2 * [(0.015, 0.003), (0.015, 0.005), (0.016, 0.004)]
 
 
 def test_a_scene_may_name_the_seed_to_begin_with(make: Callable[..., Points]) -> None:

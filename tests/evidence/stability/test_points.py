@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from made_run import run_json
 from paths import ROOT
 
 from dragchain.errors import TableError
@@ -125,12 +126,8 @@ def ended(run: PointRun, state: str, *failed: str) -> PointRun:
         {"code": code, "name": code, "passed": False, "seen": "", "limit": ""} for code in failed
     ]
     run.folder.mkdir(parents=True, exist_ok=True)
-    (run.folder / "state.json").write_text(
-        json.dumps(
-            {"schema": 2, "state": state, "started": "2026-11-21", "engine_version": "3.8.0",
-             "ranks": 1, "parts": [], "checks": checks, "inputs": "0f"}
-        )
-    )  # fmt: skip
+    record = run_json(state=state, checks=checks)
+    (run.folder / "state.json").write_text(json.dumps(record))
     return PointRun(run.point, run.folder)
 
 
