@@ -11,7 +11,14 @@ author = "The developers of dragdeck"
 project_copyright = f"2026, {author}"
 release = version = version_of("dragdeck")
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "numpydoc", "sphinx_copybutton", "mathml"]
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "numpydoc",
+    "sphinx_copybutton",
+    "mathml",
+    "notebook_pages",
+]
 html_math_renderer = "mathml"
 smartquotes_action = "qe"  # no dashes: options begin with two hyphens
 exclude_patterns = ["tools", "data"]

@@ -12,6 +12,7 @@ from figures import draw_all
 from nbclient import NotebookClient
 from page_parts import PageError, stale_files
 from records import ROOT
+from worked_examples import EXAMPLES, run_example
 
 
 def main() -> int:
@@ -19,8 +20,11 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--check", action="store_true", help="change nothing, list stale files")
     parser.add_argument("--figures", action="store_true", help="draw the figures, too")
-    parser.add_argument("--notebooks", action="store_true", help="run examples/, keep their output")
+    parser.add_argument("--notebooks", action="store_true", help="run notebooks, keep their output")
+    parser.add_argument("--example", choices=EXAMPLES, help="run its study, renew what it shows")
     options = parser.parse_args()
+    if options.example:
+        run_example(options.example)
     try:
         stale = list(stale_files())
     except PageError as error:
@@ -38,7 +42,7 @@ def main() -> int:
 
 def store_outputs() -> None:
     """Run the notebooks on the results here and store what they show, without times and places."""
-    for file in sorted((ROOT / "examples").glob("*.ipynb")):
+    for file in sorted((ROOT / "docs/examples").glob("*.ipynb")):
         notebook = nbformat.read(file, as_version=4)
         folder = {"metadata": {"path": str(ROOT / "studies")}}
         NotebookClient(notebook, record_timing=False, resources=folder).execute()

@@ -1,9 +1,13 @@
 """Texts of the reference pages that are made from the code."""
 
 import argparse
+import math
 import re
 import types
 from collections.abc import Callable, Iterator, Sequence
+from fnmatch import fnmatch
+from functools import partial
+from itertools import takewhile
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 import pandas as pd
@@ -14,6 +18,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 from records import ROOT
+from worked_examples import EXAMPLES, study_text
 
 from dragchain.cli import PROGRAM as DRAGCHAIN
 from dragchain.tables.columns import _UNITS as UNITS
@@ -37,34 +42,46 @@ def markdown_table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def command_sections(parser: argparse.ArgumentParser) -> str:
-    """Every command of a program with its arguments."""
-    return "\n\n".join(_commands(parser))
+    """The commands of a program, and their arguments, each described once."""
+    rows: list[list[str]] = []
+    arguments: dict[tuple[str, str], list[str]] = {}
+    for command in _commands(parser):
+        name = command.prog.partition(" ")[2]
+        usage = _cell(" ".join(command.format_usage().split()[2:]).replace("[-h] ", ""))
+        about = command.description or ""
+        rows.append([f"`{usage}`", about[:1].upper() + about[1:].removesuffix(".") + "."])
+        for action in command._actions:
+            if "--help" not in action.option_strings:
+                arguments.setdefault((_names(action), _help(action)), []).append(name)
+    described = [
+        [f"`{name}`", "most" if len(uses) > 5 else ", ".join(f"`{use}`" for use in uses), meaning]
+        for (name, meaning), uses in sorted(arguments.items(), key=lambda item: -len(item[1]))
+    ]
+    table = markdown_table(["command", "effect"], rows)
+    return f"{table}\n\n{markdown_table(['argument', 'commands', 'meaning'], described)}"
 
 
-def _commands(parser: argparse.ArgumentParser) -> Iterator[str]:
+def _commands(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
             for command in action.choices.values():
                 yield from _commands(command)
             return
-    about, usage = parser.description or "", " ".join(parser.format_usage().split()[1:])
-    sentence = about[:1].upper() + about[1:].removesuffix(".") + "."
-    yield f"### `{parser.prog}`\n\n{sentence}\n\n```text\n{usage}\n```"
-    rows = [
-        [f"`{_names(action)}`", _help(action)]
-        for action in parser._actions
-        if "--help" not in action.option_strings
-    ]
-    if rows:
-        yield markdown_table(["argument", "meaning"], rows)
+    yield parser
 
 
 def _help(action: argparse.Action) -> str:
-    return (action.help or "").replace("%(default)s", str(action.default)).replace("|", "\\|")
+    text = (action.help or "").replace("%(default)s", str(action.default))
+    return _cell(text.replace("%%", "%"))
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|")
 
 
 def _names(action: argparse.Action) -> str:
-    value = str(action.metavar or action.dest.upper())
+    words = action.metavar or action.dest.upper()
+    value = words if isinstance(words, str) else " ".join(words)
     if not action.option_strings:
         return str(action.metavar or action.dest)
     return ", ".join(action.option_strings) + ("" if action.nargs == 0 else f" {value}")
@@ -73,20 +90,51 @@ def _names(action: argparse.Action) -> str:
 # --- tables of results -----------------------------------------------------------------
 
 
+ENDS = re.compile(r"_(ci95_(?:low|high)|se)(?=_|\*|$)")
+PARTS = re.compile(r"^[wxyz] (?=component|coordinate)|(?:drag|lateral|vertical) (?=force)")
+
+
 def columns() -> str:
-    """A section for each table: the columns with unit, type and meaning."""
+    """A section for each table, or for tables that share three columns; the rest come first."""
     rows = pd.read_csv(ROOT / "analysis/dragchain/tables/columns.csv", dtype=str)
-    rows = rows.assign(table=rows["tables"].str.split()).explode("table")
-    sections = []
-    for table, own in rows.groupby("table", sort=False):
-        cells = [
-            [f"`{row.column}`", UNITS.get(unit_end(row.column.removesuffix("*")), ""),
-             row.type, row.description]
-            for row in own.itertuples()
-        ]  # fmt: skip
-        table_of = markdown_table(["column", "unit", "type", "meaning"], cells)
-        sections.append(f"### `{table}`\n\n{table_of}")
-    return "\n\n".join(sections)
+    ends = rows["column"].str.extract(ENDS)[0]
+    marks = dict.fromkeys(rows["tables"] + " " + rows["column"], "")
+    for tables, name, end in zip(rows["tables"], rows["column"], ends, strict=True):
+        if isinstance(end, str):
+            stems = {ENDS.sub(part, name).replace("**", "*") for part in ("", "_mean")}
+            base = next(one for one in marks if tables in one and one.split()[-1] in stems)
+            where = "" if base.startswith(f"{tables} {base.split()[-1]}") else f" in `{tables}`"
+            marks[base] = f", with {'SE' if end == 'se' else 'CI'}{where}"
+    rows["key"] = rows["description"].str.replace(PARTS, "", regex=True)
+    rows["key"] += (rows["tables"] + " " + rows["column"]).map(marks)
+    merged = rows[ends.isna()].groupby(["tables", "key", "type"], sort=False)["column"].agg(list)
+    counts = merged.groupby("tables").transform("size")
+    heads = ["column", "unit", "type", "meaning", "tables"]
+    parts: dict[str, list[list[str]]] = {"In several tables": []}
+    for (tables, meaning, kind), names in merged.items():
+        unit = UNITS.get(unit_end(names[0].removesuffix("*")), "")
+        cells = [f"`{_braced(names)}`", unit, kind.removeprefix("number"), meaning]
+        listed = ", ".join(f"`{name}`" for name in tables.split())
+        if " " in tables and counts[tables].max() < 3:
+            parts["In several tables"].append([*cells, listed])
+        else:
+            parts.setdefault(listed, []).append(cells)
+    found = ((name, markdown_table(heads[: len(own[0])], own)) for name, own in parts.items())
+    return "\n\n".join(f"### {name}\n\n{table}" for name, table in found)
+
+
+def _braced(names: Sequence[str]) -> str:
+    """Names that differ in one part, as one: ``force_{x,y,z}_n``."""
+    if len(names) == 1:
+        return names[0]
+    start, end = _common(names), _common([name[::-1] for name in names])
+    parts = ",".join(name[start : len(name) - end] for name in names)
+    return f"{names[0][:start]}{{{parts}}}{names[0][len(names[0]) - end :]}"
+
+
+def _common(names: Sequence[str]) -> int:
+    """Number of characters with which all names start."""
+    return len(list(takewhile(lambda found: len(set(found)) == 1, zip(*names, strict=False))))
 
 
 # --- study file --------------------------------------------------------------------------
@@ -94,26 +142,48 @@ def columns() -> str:
 
 def fields() -> str:
     """One row per field, in one table per top-level key that has fields of its own."""
-    groups: dict[str, list[list[str]]] = {}
-    for name, *cells in _fields(Study, ""):
+    merged: dict[tuple[str, ...], list[str]] = {}
+    for name, *cells in _fields(Study, "", {}):
         head = re.match(r"(\w+)[.\[]", name)
-        groups.setdefault(head[1] if head else "", []).append([f"`{name}`", *cells])
-    heads = ["field", "limits", "default", "meaning"]
+        leaf = name if cells[1:] == ["", ""] else name.rpartition(".")[2]
+        merged.setdefault((head[1] if head else "", leaf, *cells), []).append(name)
+    groups: dict[str, list[list[str]]] = {}
+    for (head, _, *cells), names in merged.items():
+        groups.setdefault(head, []).append([_named(names), *cells])
+    heads = ["field", "limits", "usual", "default", "meaning"]
     parts = [markdown_table(heads, groups.pop("", []))]
     parts += [f"### `{name}`\n\n{markdown_table(heads, rows)}" for name, rows in groups.items()]
     return "\n\n".join(parts)
 
 
-def _fields(model: type[BaseModel], prefix: str) -> Iterator[tuple[str, str, str, str]]:
-    """Name, limits, default and meaning of every field, depth first."""
+def _named(names: Sequence[str]) -> str:
+    """Fields that share a row: one name for all kinds of a part."""
+    kinds: dict[str, list[str]] = {}
+    for name in names:
+        stem, kind, leaf = re.fullmatch(r"(.*?)(?:\[(.*)\](.*))?", name).groups("")
+        kinds.setdefault(stem + (f"[%s]{leaf}" if kind else ""), []).append(kind)
+    return ", ".join(f"`{stem.replace('%s', ','.join(found))}`" for stem, found in kinds.items())
+
+
+def _fields(
+    model: type[BaseModel], prefix: str, seen: dict[type[BaseModel], str]
+) -> Iterator[tuple[str, str, str, str, str]]:
+    """Name, limits, usual values, default and meaning of every field, depth first."""
     for name, field in model.model_fields.items():
         path = f"{prefix}{name}"
         inner = list(_models(field.annotation))
         if not inner or any(get_args(part)[:1] == (str,) for part in _parts(field.annotation)):
-            yield path, _limits(field), _default(field), field.description or ""
+            yield path, *_usual(path, _limits(field)), _default(field), field.description or ""
+        known = [seen[part] for part, _ in inner if part in seen]
+        if known:
+            place = f"{path}.*" if inner[0][1] else path
+            same = known[0] if len(inner) == 1 else known[0].partition("[")[0]
+            yield place, "", "", "", f"as `{same}`"
+            continue
         for part, many in inner:
             kind = f"[{_kind(part)}]" if len(inner) > 1 else ""
-            yield from _fields(part, f"{path}{kind}.{'*.' if many else ''}")
+            seen[part] = f"{path}{kind}"
+            yield from _fields(part, f"{path}{kind}.{'*.' if many else ''}", seen)
 
 
 def _parts(annotation: Any) -> tuple[Any, ...]:
@@ -164,6 +234,33 @@ def _limits(field: FieldInfo) -> str:
     return ", ".join([*found, *([f"{' to '.join(map(str, lengths))} entries"] if lengths else [])])
 
 
+_BOUND = re.compile(r"(above|at least|below|at most) ([^ ,]+),? ?")
+
+
+def _usual(path: str, limits: str) -> tuple[str, str]:
+    """Limits within which a value is accepted, and those within which it gives no warning."""
+    name, rest = re.sub(r"\[\w+\]", "", path), _BOUND.sub("", limits)
+    bounds = {word: float(value) for word, value in _BOUND.findall(limits)}
+    places = ((name, f"{name}.0"), [f"{name}.0.{index}" for index in range(7)])
+    keys = ([next((key for key in RANGES if fnmatch(at, key)), "") for at in of] for of in places)
+    single, several = (list(dict.fromkeys(filter(None, some))) for some in keys)
+    first = [RANGES[key] for key in single[:1] or several]
+    if not first or ("`" in rest and not bounds):
+        return limits, ""
+    accepted, usual = [], []
+    for one in first:
+        low = max(one.least, bounds.get("above", -math.inf), bounds.get("at least", -math.inf))
+        high = min(one.most, bounds.get("below", math.inf), bounds.get("at most", math.inf))
+        above = "above " if low == bounds.get("above") else ""
+        below = "below " if high == bounds.get("below") else ""
+        accepted.append(f"{above}{low:.10g} to {below}{high:.10g}")
+        usual.append(f"{max(low, one.low):.10g} to {min(high, one.high):.10g}")
+    if usual == [re.sub("above |below ", "", one) for one in accepted]:
+        usual = []
+    text = "; ".join([*filter(None, [rest.strip()]), *accepted])
+    return text.replace("or; ", "or "), "; ".join(usual)
+
+
 def _default(field: FieldInfo) -> str:
     if field.is_required():
         return "required"
@@ -182,17 +279,6 @@ def fidelities() -> str:
     return markdown_table(["name", *names], rows)
 
 
-def plausible_ranges() -> str:
-    """The values that give a warning, those that are refused, and the units that are tried."""
-    heads = ["field", "warning outside", "refused outside", "other units tried"]
-    rows = [
-        [f"`{name}`", f"{one.low:g} to {one.high:g}", f"{one.least:g} to {one.most:g}",
-         ", ".join(one.slips)]
-        for name, one in RANGES.items()
-    ]  # fmt: skip
-    return markdown_table(heads, rows)
-
-
 # --- bibliography ------------------------------------------------------------------------
 
 
@@ -208,10 +294,10 @@ def bibliography() -> str:
 TEXTS: dict[str, Callable[[], str]] = {
     "fields": fields,
     "fidelities": fidelities,
-    "ranges": plausible_ranges,
     "dragdeck": lambda: command_sections(DRAGDECK.parser()),
     "dragchain": lambda: command_sections(DRAGCHAIN.parser()),
     "columns": columns,
     "bibliography": bibliography,
+    **{f"study_{name}": partial(study_text, name) for name in EXAMPLES},
 }
 """What a page can enclose by two comments."""

@@ -37,7 +37,7 @@ def numbered(pages: list[tuple[Path, str]]) -> list[str]:
 def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A project whose packages are those of this one."""
     folder = tmp_path_factory.mktemp("clone")
-    for name in (*PROJECT, "examples", "benchmarks", "docs", "tests", "evidence"):
+    for name in (*PROJECT, "benchmarks", "docs", "tests", "evidence"):
         if not (folder / name).exists():
             (folder / name).symlink_to(ROOT / name)
     shutil.copytree(ROOT / "studies", folder / "studies")

@@ -28,7 +28,7 @@ from dragdeck.scenes.filling import FillingDeck
 from dragdeck.scenes.process import PROCESS, ProcessDeck
 
 DOCS = ROOT / "docs"
-NOTEBOOKS = sorted((ROOT / "examples").glob("*.ipynb"))
+NOTEBOOKS = sorted((ROOT / "docs/examples").glob("*.ipynb"))
 INSIDE = {"pass_verdict"}
 """Rules without outputs of their own that are no targets."""
 

@@ -168,7 +168,9 @@ def test_all_contact_columns_would_give_the_same_tables(finished: Path, tmp_path
         pd.testing.assert_frame_equal(lean, fat, check_exact=True)
 
 
-@pytest.mark.parametrize("file", sorted((ROOT / "examples").glob("*.ipynb")), ids=lambda f: f.stem)
+@pytest.mark.parametrize(
+    "file", sorted((ROOT / "docs/examples").glob("*.ipynb")), ids=lambda f: f.stem
+)
 def test_a_notebook_runs(finished: Path, file: Path) -> None:
     import nbformat
     from nbclient import NotebookClient

@@ -35,3 +35,4 @@ def test_edited_templates_run_at_the_first_call(tmp_path: Path) -> None:
     assert "fix damping all viscous" in (filling / "as_run/in.liggghts").read_text()
     header, *rows = (process / "fastest.1.txt").read_text().splitlines()
     assert header == "time_s fastest_m_s" and rows
+    assert "vx vy vz" in (process / "motion.1.dump").read_text()

@@ -1,7 +1,10 @@
 """Colours and style of all figures, and how they become PNG files."""
 
+import json
 import re
+from collections.abc import Mapping
 from contextlib import AbstractContextManager
+from importlib import resources
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -23,30 +26,10 @@ BLUE, ORANGE, GREEN, RED, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#6
 
 INK, LIGHT = "#1d2733", "#c8ced6"
 
-COLOURS = {
-    "drag": BLUE,
-    "lateral": ORANGE,
-    "experiment": "#7a4fa3",
-    "simulation": GREY,
-    "peak": RED,
-    "transient": "#d9dde2",
-    "ahead": BLUE,
-    "behind": "#9cc3dd",
-    "dominant_path": "#1fa2e8",
-    "chain": GREEN,
-    "bowl": "#b9c6d2",
-    "bed": "#d8b365",
-    "workpiece": "#59636e",
-    "swept": "#5ba3d0",
-    "plunge": "#CC79A7",
-    "approach": "#117a65",
-    "ink": INK,
-    "refused": "#b3261e",
-}
-"""One colour for each thing, in every figure and page; `simulation` is that of a source.
-
-`pytest tests/contract --update` copies it to where no import leads: the preview and ``web/``.
-"""
+COLOURS: Mapping[str, str] = json.loads(
+    resources.files("dragdeck").joinpath("data/colours.json").read_text(encoding="utf-8")
+)
+"""One colour for each thing, in all figures and pages; `simulation` is that of a source."""
 
 SERIES = (BLUE, ORANGE, GREEN, RED, "#7a4fa3", "#5b8a99")
 """Colours of series that stand side by side."""

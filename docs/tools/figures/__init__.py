@@ -7,6 +7,7 @@ from io import StringIO
 from pathlib import Path
 
 import matplotlib
+from matplotlib.text import Text
 
 from dragchain.figures.style import drawing, true_minus
 from dragdeck.errors import DragdeckError
@@ -20,11 +21,18 @@ FIGURES = {**CHARTS, "geometry": draw_geometry}
 """What draws a figure, by the name of its file."""
 
 
+_SHOWN_PX, _LEAST_PX = 709, 9
+"""Width of a figure on a page in a window of 1366 pixels; the smallest text there."""
+
+
 def svg(name: str) -> str:
     """A figure as SVG; the same figure gives the same text."""
     with drawing(), matplotlib.rc_context({"svg.hashsalt": "dragdeck", "svg.fonttype": "path"}):
         figure = FIGURES[name]()
         true_minus(figure)
+        shown = min(_SHOWN_PX / (96 * figure.get_tightbbox().width), 1.0)
+        for label in figure.findobj(Text):
+            label.set_fontsize(max(label.get_fontsize(), _LEAST_PX * 72 / 96 / shown))
         text = StringIO()
         figure.savefig(
             text, format="svg", bbox_inches="tight", metadata={"Date": None, "Creator": None}

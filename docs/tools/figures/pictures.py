@@ -53,8 +53,13 @@ PICTURES: Mapping[str, Callable[[Path], bytes]] = {
 
 def drawn_picture(name: str, run: Path) -> bytes:
     """A picture as PNG of few colours."""
+    return few_colours(BytesIO(PICTURES[name](run)))
+
+
+def few_colours(picture: Path | BytesIO) -> bytes:
+    """The same picture as PNG of few colours."""
     content = BytesIO()
-    with Image.open(BytesIO(PICTURES[name](run))) as drawn:
+    with Image.open(picture) as drawn:
         drawn.convert("RGB").quantize(dither=Image.Dither.NONE).save(content, "png", optimize=True)
     return content.getvalue()
 

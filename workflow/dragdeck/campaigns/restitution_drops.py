@@ -77,7 +77,7 @@ def settings(case: Case) -> Calibration:
             "the study has no measured drop test and no measured angle",
             file=case.file,
             field="calibration",
-            remedy="add calibration: {record: FILE.csv}, see docs/start/restitution.md",
+            remedy="add calibration: {record: FILE.csv}, see docs/howto/calibration.md",
         )
     return case.study.calibration
 

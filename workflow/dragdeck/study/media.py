@@ -85,9 +85,9 @@ class Grains(Model):
     )
     sieve: Annotated[list[Sieve], Field(min_length=2, max_length=MOST_SIEVES)] | None = Field(
         default=None,
-        description="instead of radius_mean_m, a sieve analysis: 2 to 100 rows [diameter, fraction "
-        "of the mass that is finer], m and 0 to 1, straight between them; or the name of a CSV "
-        "file with the columns diameter_m and mass_passing, relative to the study",
+        description="sieve analysis instead of radius_mean_m: rows [diameter in m, fraction of the "
+        "mass that is finer], linear between them; or a CSV file with the columns diameter_m and "
+        "mass_passing",
         exclude_if=_none,
     )
     shape: AnyShape | None = Field(

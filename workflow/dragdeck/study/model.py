@@ -99,15 +99,14 @@ class Motion(Superposed):
     path: Annotated[AnyPath, Field(discriminator="kind")]
     speed_m_s: Positive | None = Field(
         default=None,
-        description="speed of the workpiece's axis along the path, m/s; required, but not for the "
-        "paths `rest`, whose `bowl_rpm` gives it, and `waypoints`, whose times do",
+        description="speed of the workpiece's axis along the path, m/s; required except for the "
+        "paths `rest` and `waypoints`",
     )
     ramp_s: NonNegative = Field(
         default=0.0,
         exclude_if=lambda value: value == 0,
-        description="time in which the workpiece starts smoothly from rest along its path, in "
-        "seconds at the study's own speed; no statistic includes it; not for the paths `rest` and "
-        "`waypoints`",
+        description="time in which the workpiece starts from rest along its path, in seconds at "
+        "the study's own speed; no statistic includes it; not for `rest` and `waypoints`",
     )
     immersion_depth_m: Positive = Field(description="depth of the tip below the settled surface, m")
     orientation: Literal["follow_path", "fixed"] = Field(
@@ -386,7 +385,7 @@ class Fidelity(Model):
     ranks: Ranks = Field(
         default=2,
         description="number of MPI ranks; auto: chosen from particles, cases and cores "
-        "(docs/howto/scale_up.md)",
+        "(docs/howto/running.md)",
     )
 
     windows: Windows | None = Field(

@@ -41,7 +41,7 @@ class ParticleShape(Model):
     """
 
     spheres: Annotated[Whole, Field(ge=FEWEST_SPHERES, le=MOST_SPHERES)] = Field(
-        description=f"number of spheres, 2 to {MOST_SPHERES}; `dragdeck shapes` lists the errors"
+        description="number of spheres; `dragdeck shapes` lists the errors"
     )
 
     def corners(self) -> Corners:

@@ -72,9 +72,8 @@ class WaypointsPath(WorkpiecePath):
     length_field: ClassVar[str] = "fraction"
 
     kind: Literal["waypoints"] = Field(
-        description="waypoints: a recorded path, straight between waypoints, at its own speed. "
-        "Lengths along the path refer to its mean speed. The waypoints also define the rotation of "
-        "the workpiece; `orientation` has no effect"
+        description="waypoints: a recorded path with its own speed and rotation. Lengths along the "
+        "path refer to its mean speed; `orientation` has no effect"
     )
     file: Line | None = Field(
         default=None,
@@ -83,12 +82,8 @@ class WaypointsPath(WorkpiecePath):
     )
     points: Annotated[list[Waypoint], Field(min_length=2, max_length=MOST_POINTS)] = Field(
         default_factory=list,
-        description="2 to 100 waypoints [time, x, y, z, turn, pitch, roll]: time, s; position of "
-        "the workpiece's axis, m; height of the tip above the immersion depth, m (default 0); "
-        "angle about the vertical, degrees, positive: counter-clockwise (default 0; only "
-        "differences matter); then inclination about the tip, degrees, 0 at the first waypoint: "
-        "pitch, positive: the upper end leans to the front, and roll, positive: it leans to the "
-        "right (default 0). Equal positions are a pause",
+        description="rows [time, x, y, z, turn, pitch, roll] in s, m and degrees, as the columns "
+        "of the file; the last four may be left out (0)",
     )
     fraction: Annotated[Number, Field(gt=0, le=1)] = Field(
         default=1.0, description="fraction of the recorded time that is simulated, from its start"

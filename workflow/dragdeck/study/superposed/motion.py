@@ -28,8 +28,8 @@ class SuperposedMotion(Model):
 
     ramp_s: NonNegative = Field(
         default=0.1,
-        description="time in which the motion starts smoothly from rest when the drag begins, in "
-        "seconds at the study's own speed; no statistic includes it",
+        description="time in which the motion starts from rest, in seconds at the study's own "
+        "speed; no statistic includes it",
     )
 
     @abstractmethod
