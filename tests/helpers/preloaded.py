@@ -19,6 +19,8 @@ import socket
 import subprocess
 import sys
 import tempfile
+import threading
+import traceback
 from importlib import import_module
 from pathlib import Path
 from typing import NoReturn
@@ -145,7 +147,37 @@ def _answer(connection: socket.socket) -> NoReturn:
         os.setuid(user)
     sys.argv = [program, *arguments]
     sys.stdin, sys.stdout, sys.stderr = (os.fdopen(n, "rw"[n > 0]) for n in range(3))
-    sys.exit(import_module(PROGRAMS[Path(program).name]).main(arguments))
+    _end(_status(program, arguments))
+
+
+def _status(program: str, arguments: list[str]) -> int:
+    """Exit status of a call, as the interpreter would have it."""
+    try:
+        code = import_module(PROGRAMS[Path(program).name]).main(arguments)
+    except SystemExit as end:
+        code = end.code
+    except Exception:
+        traceback.print_exc()
+        return 1
+    if isinstance(code, str):
+        print(code, file=sys.stderr)
+    return code if isinstance(code, int) else int(code is not None)
+
+
+def _end(status: int) -> NoReturn:
+    """End as the interpreter does, but for the destructors of C++ libraries.
+
+    Now and then they abort a forked process ("terminate called without an active exception"),
+    because the threads that the libraries began before the fork are not in it.
+    """
+    threading._shutdown()
+    atexit._run_exitfuncs()
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except OSError:  # a full disk, or nobody reads
+            status = status or 120
+    os._exit(status)
 
 
 if __name__ == "__main__":

@@ -70,7 +70,7 @@ def test_windows_are_run_until_the_tolerance_or_the_end(finished: Path) -> None:
     last = Round.read(rounds[-1])
     assert [Round.read(file).last for file in rounds] == [False] * (len(rounds) - 1) + [True]
     assert len(last.windows) == len(list((finished / "windows").iterdir())) == 3
-    assert not last.reached and last.needed.packings > 1
+    assert not last.tolerance.reached and last.tolerance.needed.packings > 1
     for one in last.quantities:
         if one.asked:
             assert one.value.ci95_low < one.value.value < one.value.ci95_high
