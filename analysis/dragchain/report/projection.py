@@ -30,7 +30,7 @@ from dragdeck.files import draft_of
 from dragdeck.mesh.files import read
 
 _BLOCK_ROWS = 20_000
-"""Contacts whose weights are held at once."""
+"""Contacts of a block, which bounds the memory of the weights."""
 
 NAME = "projection"
 

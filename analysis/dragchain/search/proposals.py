@@ -1,10 +1,10 @@
 """Which setting to try next, and which is best: Gaussian processes on what is known so far.
 
 Pure functions of the trials and a seed: the same trials give the same setting. A *place* is a
-setting in fractions of its bounds. Expected improvement times the probability that all limits hold
-(Gardner et al. 2014) is maximised by the package bayesian-optimization; the Gaussian processes are
-those of scikit-learn (Matern covariance with the exponent 5/2, a length per field), and know the
-standard error of each value.
+setting in fractions of its bounds. Expected improvement times the probability that all limits are
+met (Gardner et al. 2014) is maximised by the package bayesian-optimization; the Gaussian processes
+are those of scikit-learn (Matern covariance with the exponent 5/2, a length per field), and include
+the standard error of each value.
 """
 
 import warnings
@@ -56,9 +56,14 @@ class Trials:
         """Whether a place has no value, (N,)."""
         return np.isnan(self.values).any(axis=1)
 
+    @cached_property
+    def responses(self) -> "Responses":
+        """The model of these trials, which is fitted once."""
+        return Responses(self)
+
     def believing(self, place: Floats) -> "Trials":
         """With a place whose run has not ended: its values are those that the model expects."""
-        mean, _ = Responses(self).predict(place[None])
+        mean, _ = self.responses.predict(place[None])
         return self.joined(place, mean, 1e-9)
 
     def joined(self, place: Floats, value: Any, error: float) -> "Trials":
@@ -117,7 +122,7 @@ class Responses:
         return mean, error
 
     def allowed(self, places: Floats) -> Floats:
-        """Logarithm of the probability that all limits hold at (M, D) places, each apart, (M,)."""
+        """Logarithm of the probability that (M, D) places meet all limits, each apart, (M,)."""
         mean, error = self.predict(places)
         ends = self.trials.high - mean, mean - self.trials.low
         each = [log_ndtr(end / np.maximum(error, 1e-12)) for end in ends]
@@ -147,7 +152,7 @@ def propose(trials: Trials, seed: int) -> Floats:
     dimensions, gone = trials.places.shape[1], trials.refused[:, None]
     if (~gone).sum() < 2:
         return np.asarray(np.random.default_rng(seed).random(dimensions))
-    mean, _ = Responses(trials).predict(trials.places)
+    mean, _ = trials.responses.predict(trials.places)
     values = np.hstack([np.where(gone, mean, trials.values), gone])
     errors = np.where(gone, np.nanstd(trials.values, axis=0), trials.errors)
     errors = np.hstack([errors, np.full(gone.shape, _REFUSED_SE)])
@@ -176,7 +181,7 @@ def propose(trials: Trials, seed: int) -> Floats:
             found = search.suggest()
     except NoValidPointRegisteredError:  # no limit was ever met: go where that is most probable
         places = candidates(dimensions)
-        return np.asarray(places[Responses(trials).allowed(places).argmax()])
+        return np.asarray(places[trials.responses.allowed(places).argmax()])
     return np.array([found[name] for name in names])
 
 
@@ -186,15 +191,14 @@ def _unused(_: Any) -> Any:
 
 
 def best_place(trials: Trials, accepted: Callable[[Floats], bool]) -> Floats | None:
-    """The place of the least expected response where all limits are expected to hold.
+    """The place of the least expected response where all limits are expected to be met.
 
     Where that is nowhere, of the largest probability that they do; None if none is accepted.
     """
     places = np.vstack([trials.places[~trials.refused], candidates(trials.places.shape[1])])
-    model = Responses(trials)
-    mean, _ = model.predict(places)
+    mean, _ = trials.responses.predict(places)
     holds = ((mean >= trials.low) & (mean <= trials.high)).all(axis=1)
-    rank = np.where(holds, mean[:, 0], np.inf) if holds.any() else -model.allowed(places)
+    rank = np.where(holds, mean[:, 0], np.inf) if holds.any() else -trials.responses.allowed(places)
     order = np.argsort(rank, kind="stable")
     return next(
         (places[k] for k in order[:200] if np.isfinite(rank[k]) and accepted(places[k])), None

@@ -14,7 +14,6 @@ from dragchain.figures.panels import band, legend_below, new_panels
 from dragchain.figures.style import BLUE, GREEN, GREY, MARKERS, ORANGE, RED, WIDE_IN
 from dragchain.report.campaign import write_report
 from dragchain.report.page import number, with_interval
-from dragchain.search.proposals import Responses
 from dragchain.search.rounds import (
     Measured,
     SearchedStudy,
@@ -25,7 +24,13 @@ from dragchain.search.rounds import (
     read_findings,
     read_point,
 )
-from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate, EstimateColumns, flattened
+from dragchain.statistics.estimate import (
+    NORMAL_QUANTILE,
+    Estimate,
+    EstimateColumns,
+    Verdict,
+    flattened,
+)
 from dragdeck.engine.reports import say
 from dragdeck.errors import InputError
 from dragdeck.project import find_project
@@ -112,8 +117,8 @@ def rows_of(found: SearchFindings) -> list[SearchRow]:
     return rows
 
 
-def limit_verdict(limit: SearchLimit, value: Estimate) -> str:
-    """Whether a limit holds with the whole interval."""
+def limit_verdict(limit: SearchLimit, value: Estimate) -> Verdict:
+    """Whether the whole interval meets a limit."""
     low = -math.inf if limit.at_least is None else limit.at_least
     high = math.inf if limit.at_most is None else limit.at_most
     if low <= value.ci95_low and value.ci95_high <= high:
@@ -141,7 +146,7 @@ def draw_search(found: SearchFindings, rows: list[SearchRow]) -> dict[str, Figur
               transform=axes.get_xaxis_transform())  # fmt: skip
     axes.set(xlabel="setting in the order of the search", ylabel=objective)
     figures = {"path": legend_below(path)}
-    fields, model = list(found.studied.search.vary.items()), Responses(found.trials)
+    fields, model = list(found.studied.search.vary.items()), found.trials.responses
     if found.studied.search.objective.goal != "target":
         at = _centre(found)
         figures["response"], panels = new_panels(

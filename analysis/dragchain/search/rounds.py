@@ -8,6 +8,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import compress
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from dragchain.report.cases import ReportedCase, read_study_runs
 from dragchain.report.removal import depth_spread, removal_of
 from dragchain.run.basis import QUANTITIES
 from dragchain.run.workpiece import read_surface
-from dragchain.search.proposals import Responses, Trials, best_place, propose, spread_places
+from dragchain.search.proposals import Trials, best_place, propose, spread_places
 from dragchain.statistics.estimate import Estimate, t_interval
 from dragdeck.advice.advise import resolve
 from dragdeck.cases.case import Case, digest
@@ -27,6 +28,7 @@ from dragdeck.errors import InputError
 from dragdeck.outlook.timestep import check_timestep
 from dragdeck.project import Project
 from dragdeck.scenes.process import PROCESS, SCENES
+from dragdeck.study.base import Json
 from dragdeck.study.check import validate
 from dragdeck.study.model import Study
 from dragdeck.study.search import (
@@ -140,10 +142,14 @@ class SearchedStudy:
         search = {name: one for name, one in self.search.plain().items() if name != "runs"}
         return digest({"base": base, "search": search, "sweep": dict(self.study.sweep)})
 
+    @cached_property
+    def _plain(self) -> Json:
+        """The study of a single case."""
+        return {**read_study(self.file), "sweep": {}, "search": None}
+
     def case(self, values: Settings, seed: int) -> Case:
         """The case of a setting with a packing."""
-        plain = {**read_study(self.file), "sweep": {}, "search": None}
-        return settle_case(self.file, plain, {**values, "seed": seed}, resolve=resolve)
+        return settle_case(self.file, self._plain, {**values, "seed": seed}, resolve=resolve)
 
     def folders(self, values: Settings) -> list[Path]:
         """The process runs of a setting, one per packing."""
@@ -259,7 +265,7 @@ class SearchFindings:
     @property
     def of_search(self) -> list[SearchPoint]:
         """The points that are no confirmation."""
-        return [one for one in self.points if one.purpose != "confirmation"]
+        return list(compress(self.points, self.searched))
 
 
 def loss(objective: Objective, value: Any) -> Any:
@@ -334,7 +340,7 @@ def _point(
     values = studied.values_at(place)
     said: dict[str, float] = {}
     if trials is not None:
-        mean, error = Responses(trials).predict(studied.place(values)[None])
+        mean, error = trials.responses.predict(studied.place(values)[None])
         said = {"predicted": float(mean[0, 0]), "predicted_se": float(error[0, 0])}
     return SearchPoint(
         values=values, round=number, purpose=purpose, refused=studied.refusal(values), **said
@@ -344,7 +350,6 @@ def _point(
 def _confirmation(found: SearchFindings, number: int) -> list[SearchPoint]:
     """The best setting by the model at the fidelity of the confirmation, and at the study's own."""
     studied = found.studied
-
     gone = [one.values for one in found.points if one.refused]
 
     def accepted(place: Floats) -> bool:

@@ -87,7 +87,7 @@ class Objective(SearchedMeasure):
 
 
 class SearchLimit(SearchedMeasure):
-    """What must hold."""
+    """A limit on a quantity."""
 
     at_least: Number | None = Field(default=None, description="smallest accepted value")
     at_most: Number | None = Field(default=None, description="largest accepted value")
