@@ -1,7 +1,7 @@
 """Where things are: the project's folders and the paths of a run."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -75,7 +75,8 @@ class Project:
             found = load_cases(file, fidelity, found_by, self.results(study) / SEARCHED)
             for case in found:
                 check_timestep(case)
-                check_timestep(case.of_filling, "fidelity.soft_start")
+                start = replace(case, study=case.study.at_start())
+                check_timestep(start, "fidelity.soft_start")
         except InputError as error:
             raise located(error) from None
         return found

@@ -123,8 +123,8 @@ class Work:
 
     def cpu_time(self, fidelity: Fidelity, windows: int = 0) -> float:
         """CPU time of all runs with some settings, s: only ratios of it count."""
-        start = self.study.model_copy(update={"fidelity": fidelity}).at_start()
-        filling = self.filling_s / bed_timestep(start, "filling_timestep_fraction")
+        filled = self.study.model_copy(update={"fidelity": fidelity}).at_filling()
+        filling = self.filling_s / bed_timestep(filled, "filling_timestep_fraction")
         count, of_facets = self.study.sphere_count, self.facets * FACET_STEP_S
         return filling * count / FILLING.particle_steps_per_s + self.steps(fidelity, windows) * (
             count / PARTICLE_STEPS_PER_S + of_facets

@@ -93,9 +93,9 @@ class Case:
 
     @property
     def of_filling(self) -> "Case":
-        """The case whose filling it starts from: that of its lead, with the settings of a start."""
+        """The case whose filling it starts from: that of its lead, with the settings of a filling."""
         first = self.lead or self
-        return replace(first, study=first.study.at_start())
+        return replace(first, study=first.study.at_filling())
 
     @property
     def ranks(self) -> int:

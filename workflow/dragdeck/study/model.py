@@ -345,9 +345,10 @@ class Windows(Model):
 
 
 class SoftStart(Model):
-    """Settings of what goes before the statistics, with smaller moduli.
+    """Settings of the process until shortly before its statistics, with smaller moduli.
 
-    The moduli are raised to those of the run before the statistics begin.
+    The moduli are raised to those of the run before the statistics begin. The filling has those of
+    the run: the bed's surface, from which depth is measured, depends on them.
     """
 
     youngs_modulus_scale: Annotated[Number, Field(gt=0, lt=1)] = Field(
@@ -366,8 +367,8 @@ class Fidelity(Model):
     )
     soft_start: SoftStart | None = Field(
         default=None,
-        description="settings of filling, plunge, approach and the start of the drag; none: "
-        "those of the rest",
+        description="settings of plunge, approach and the start of the drag; none: those of the "
+        "rest",
         exclude_if=lambda value: value is None,
     )
     timestep_fraction: Annotated[Number, Field(gt=0, le=LARGEST_TIMESTEP_FRACTION)] = Field(
@@ -375,6 +376,12 @@ class Fidelity(Model):
     )
     filling_timestep_fraction: Annotated[Number, Field(gt=0, le=1)] = Field(
         default=0.25, description="time step of the filling as a fraction of the Rayleigh time"
+    )
+    filling_youngs_modulus_scale: Annotated[Number, Field(gt=0, le=1)] | None = Field(
+        default=None,
+        description="multiplier of every Young's modulus in the filling; none: that of the "
+        "results, which is 1 with windows",
+        exclude_if=lambda value: value is None,
     )
     speed_factor: Annotated[Number, Field(ge=1, le=100)] = Field(
         default=1.0, description="multiplier of the speed of the workpiece; 1: real speed"
@@ -408,14 +415,42 @@ class Fidelity(Model):
                 f"soft_start has a youngs_modulus_scale of {start.youngs_modulus_scale:g}, not "
                 f"below {scale:g}"
             )
+        first = (start or self).youngs_modulus_scale
+        if self._filling_scale < first:
+            raise ValueError(
+                f"filling_youngs_modulus_scale is {self._filling_scale:g}: a process that starts "
+                f"with {first:g} would throw so soft a bed up; use {first:g} or more"
+            )
         return self
 
     @property
+    def _filling_scale(self) -> float:
+        of_results = 1.0 if self.windows else self.youngs_modulus_scale
+        return self.filling_youngs_modulus_scale or of_results
+
+    @property
+    def of_filling(self) -> "Fidelity":
+        """The settings of the filling, which has the modulus at which the results hold.
+
+        A bed of softer particles is lower, and depth is measured from its surface.
+        """
+        if self._filling_scale == self.youngs_modulus_scale:
+            return self
+        return self.model_copy(
+            update={
+                "youngs_modulus_scale": self._filling_scale,
+                "filling_youngs_modulus_scale": None,
+                "windows": None,
+            }
+        )
+
+    @property
     def of_start(self) -> "Fidelity":
-        """The settings of filling, plunge, approach and the beginning of the drag."""
+        """The settings of plunge, approach and the beginning of the drag."""
         if self.soft_start is None:
             return self
-        return self.model_copy(update={**dict(self.soft_start), "soft_start": None})
+        filling = {"filling_youngs_modulus_scale": self._filling_scale}
+        return self.model_copy(update={**dict(self.soft_start), "soft_start": None, **filling})
 
 
 class Tolerance(Model):
@@ -655,8 +690,9 @@ class Study(Model):
         return known[self.fidelity]
 
     def at_start(self) -> "Study":
-        """The study with the settings of its filling, and of what leads to its statistics."""
-        chosen = self.chosen_fidelity()
-        if chosen.soft_start is None:
-            return self
-        return self.model_copy(update={"fidelity": chosen.of_start})
+        """The study with the settings of what leads to its statistics."""
+        return self.model_copy(update={"fidelity": self.chosen_fidelity().of_start})
+
+    def at_filling(self) -> "Study":
+        """The study with the settings of its filling."""
+        return self.model_copy(update={"fidelity": self.chosen_fidelity().of_filling})

@@ -108,7 +108,7 @@ _RANGES = {
     "filling.max_time_s": _Range(1e-3, 0.1, 200, 1e5, {"ms": 1e-3}),
     "fidel*.speed_factor": _Range(1, 1, 10, 100, {}),
     "fidel*.skin_m": _Range(1e-7, 5e-6, 0.02, 1, _LENGTH),
-    "fidel*.youngs_modulus_scale": _Range(1e-6, 1e-5, 1, 1, {}),
+    "fidel*youngs_modulus_scale": _Range(1e-6, 1e-5, 1, 1, {}),
     "fidel*.windows.most": _Range(2, 2, 64, 64, {}),
     "*.timestep_fraction": _Range(1e-4, 1e-3, 2, 2, {}),
     "fidel*.filling_timestep_fraction": _Range(1e-4, 1e-3, 1, 1, {}),
