@@ -118,14 +118,21 @@ def test_a_lead_is_soft_and_ends_where_the_run_goes_on(made: Make, project: Proj
     assert reached == pytest.approx(begun, abs=scene.deck.timestep_s)
 
 
-def test_it_starts_from_the_filling_of_its_lead(made: Make) -> None:
-    stiff = made(STIFF)
-    soft = made({**STIFF, "youngs_modulus_scale": 0.01, "soft_start": None})
-    assert FILLING.run_id(stiff) == FILLING.run_id(soft)
-    assert FILLING.build(stiff, None).deck.materials.youngs_modulus_scale == 0.01
-    plain = made({**STIFF, "soft_start": None})
-    assert FILLING.run_id(plain) != FILLING.run_id(stiff)
+def test_a_run_that_begins_softer_is_filled_like_a_plain_one(made: Make) -> None:
+    plain, stiff, soft = made({**STIFF, "soft_start": None}), made(STIFF), made(SOFT)
+    alike = [plain, stiff, led(stiff).lead, soft, *windows_of(soft)]
+    fillings = {FILLING.run_id(case) for case in alike if case}
+    assert fillings == {FILLING.run_id(plain)}
+    assert FILLING.build(soft, None).deck.materials.youngs_modulus_scale == 1
     assert PROCESS.run_id(plain) != PROCESS.run_id(stiff)
+
+
+def test_a_filling_may_have_a_modulus_of_its_own(made: Make) -> None:
+    soft = {**STIFF, "youngs_modulus_scale": 0.01, "soft_start": None}
+    stiffer = {**soft, "filling_youngs_modulus_scale": 0.1}
+    assert FILLING.build(made(soft), None).deck.materials.youngs_modulus_scale == 0.01
+    assert FILLING.build(made(stiffer), None).deck.materials.youngs_modulus_scale == 0.1
+    assert PROCESS.run_id(made(stiffer)) != PROCESS.run_id(made(soft))
 
 
 def test_nothing_is_counted_before_the_bed_has_settled(made: Make) -> None:
@@ -183,6 +190,7 @@ def test_a_tolerance_does_not_name_a_run(made: Make) -> None:
         ({"windows": WINDOWS}, "windows require a youngs_modulus_scale below 1"),
         ({**SOFT, "speed_factor": 2}, "windows require"),
         ({**SOFT, "soft_start": {"youngs_modulus_scale": 0.001}}, "windows require"),
+        ({"filling_youngs_modulus_scale": 0.5}, "filling_youngs_modulus_scale is 0.5"),
     ],
 )
 def test_settings_that_do_not_fit_are_refused(settings: Json, said: str, made: Make) -> None:
