@@ -5,7 +5,6 @@ import math
 import re
 import types
 from collections.abc import Callable, Iterator, Sequence
-from fnmatch import fnmatch
 from functools import partial
 from itertools import takewhile
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
@@ -25,7 +24,7 @@ from dragchain.tables.columns import _UNITS as UNITS
 from dragchain.tables.columns import unit_end
 from dragdeck.cli import PROGRAM as DRAGDECK
 from dragdeck.study.model import BUILT_IN_FIDELITIES, Fidelity, Study
-from dragdeck.study.plausible import _RANGES as RANGES
+from dragdeck.study.plausible import plausible_range
 
 NUMBERS = re.compile(r"[-+x ]*\d[\d., %]*(e[-+]\d+)?( \(.*\))?|")
 
@@ -242,19 +241,22 @@ def _usual(path: str, limits: str) -> tuple[str, str]:
     name, rest = re.sub(r"\[\w+\]", "", path), _BOUND.sub("", limits)
     bounds = {word: float(value) for word, value in _BOUND.findall(limits)}
     places = ((name, f"{name}.0"), [f"{name}.0.{index}" for index in range(7)])
-    keys = ([next((key for key in RANGES if fnmatch(at, key)), "") for at in of] for of in places)
-    single, several = (list(dict.fromkeys(filter(None, some))) for some in keys)
-    first = [RANGES[key] for key in single[:1] or several]
+    single, several = ([*dict.fromkeys(filter(None, map(plausible_range, of)))] for of in places)
+    first = single[:1] or several
     if not first or ("`" in rest and not bounds):
         return limits, ""
     accepted, usual = [], []
     for one in first:
-        low = max(one.least, bounds.get("above", -math.inf), bounds.get("at least", -math.inf))
-        high = min(one.most, bounds.get("below", math.inf), bounds.get("at most", math.inf))
+        low = max(
+            one.refused_below, bounds.get("above", -math.inf), bounds.get("at least", -math.inf)
+        )
+        high = min(
+            one.refused_above, bounds.get("below", math.inf), bounds.get("at most", math.inf)
+        )
         above = "above " if low == bounds.get("above") else ""
         below = "below " if high == bounds.get("below") else ""
         accepted.append(f"{above}{low:.10g} to {below}{high:.10g}")
-        usual.append(f"{max(low, one.low):.10g} to {min(high, one.high):.10g}")
+        usual.append(f"{max(low, one.warned_below):.10g} to {min(high, one.warned_above):.10g}")
     if usual == [re.sub("above |below ", "", one) for one in accepted]:
         usual = []
     text = "; ".join([*filter(None, [rest.strip()]), *accepted])

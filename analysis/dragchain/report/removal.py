@@ -1,7 +1,8 @@
 """Removal from a workpiece: what the loads of its packings and the coefficient of a law predict.
 
 The scatter of the load and the uncertainty of the coefficient are kept apart, and joined by the
-approximation of Welch (1947) and Satterthwaite (1946); see ``benchmarks/removal_coverage.py``.
+approximation of Welch (1947) and Satterthwaite (1946); coverage in simulated processes stands in
+``docs/data/loading/removal_coverage.csv``.
 """
 
 import math

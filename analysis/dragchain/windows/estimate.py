@@ -71,7 +71,7 @@ class WindowsRecord(Document):
     quantities : mapping
     """
 
-    remedy = "make it with: python benchmarks/windows_record.py"
+    remedy = "install dragdeck again: it belongs to the package"
 
     measured: str
     source: str
