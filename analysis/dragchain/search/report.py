@@ -57,8 +57,7 @@ def write_round(study: str) -> None:
 
 
 def advance(
-    studied: SearchedStudy,
-    measure: Callable[[SearchedStudy, SearchPoint], Measured] = read_point,
+    studied: SearchedStudy, measure: Callable[[SearchedStudy, SearchPoint], Measured] = read_point
 ) -> str:
     """One step of a search; see `write_round`. `measure` reads the runs of a setting."""
     file, asked = studied.record, studied.asked()

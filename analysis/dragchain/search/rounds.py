@@ -31,13 +31,7 @@ from dragdeck.scenes.process import PROCESS, SCENES
 from dragdeck.study.base import Json
 from dragdeck.study.check import validate
 from dragdeck.study.model import Study
-from dragdeck.study.search import (
-    RECORD,
-    Objective,
-    Search,
-    SearchedMeasure,
-    SearchPoint,
-)
+from dragdeck.study.search import RECORD, Objective, Search, SearchedMeasure, SearchPoint
 from dragdeck.study.yaml import read_study
 from dragdeck.sweep.cases import Settings, settle_case, study_file
 

@@ -231,11 +231,7 @@ def flooded(frame: NetworkFrame, least: float) -> tuple[np.ndarray, set[str]]:
     return sizes[sizes > 1], {name for name, spanning in found.items() if spanning}
 
 
-@given(
-    seed=st.integers(0, 2**32 - 1),
-    edge=st.integers(2, 6),
-    levels=st.sampled_from([None, 1, 4]),
-)
+@given(seed=st.integers(0, 2**32 - 1), edge=st.integers(2, 6), levels=st.sampled_from([None, 1, 4]))
 @settings(max_examples=30)
 def test_clusters_are_those_of_a_flood(seed: int, edge: int, levels: int | None) -> None:
     frame = random_frame(seed, edge=edge, levels=levels)
