@@ -17,13 +17,7 @@ from pydantic import JsonValue
 from dragchain.loading.document import Loading
 from dragchain.loading.wear import FILE as WEAR
 from dragchain.loading.wear import Wear
-from dragchain.report.findings import (
-    FILE,
-    DropFindings,
-    FillingFindings,
-    Findings,
-    ProcessFindings,
-)
+from dragchain.report.findings import FILE, DropFindings, FillingFindings, Findings, ProcessFindings
 from dragchain.report.page import TIMES, fixed, number, with_interval
 from dragchain.report.values import (
     Extrapolated,
@@ -169,6 +163,8 @@ def _bowl(case: CaseOfRun, filling: FillingFindings | None) -> Iterator[str]:
         fraction = filling.bed.get("solid_fraction")
         solid = f", solid fraction {number(fraction)}" if fraction is not None else ""
         yield f"filled to {_mm(float(filling.bed['bed_height_m']))}{solid}"
+    if (density := case.inputs.get("compound.density_kg_m3")) is not None:
+        yield f"compound of {density} kg/m³ (buoyancy only)"
 
 
 def _settings(case: CaseOfRun, packings: int) -> Iterator[str]:

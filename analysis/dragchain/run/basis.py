@@ -167,8 +167,9 @@ def judge(
         low, high = sorted(run.value * end for end in ends)
         value = Estimate(run.value * correction.factor.value, low, high)
         return Standing(quantity, run, value, Basis.WINDOWS, "", reliable, correction.windows)
-    why = _why_not(case)
-    reason = f"not corrected for {' and '.join(doubts)}: {why}"
+    reason = f"not corrected for {' and '.join(doubts)}"
+    if case.marks:
+        reason += f": {_why_not(case)}"
     if quantity.robust:
         return Standing(quantity, run, run, scaled, reason, reliable)
     return Standing(quantity, run, None, Basis.NONE, reason, reliable)
@@ -222,8 +223,8 @@ def _of_modulus_and_speed(case: CaseOfRun) -> Iterator[str]:
         yield f"Nothing is corrected: {_why_not(case)}."
     if case.lead:
         yield (
-            "Filling, plunge, approach and the beginning of the drag have a reduced modulus; it "
-            "was raised before the statistics begin."
+            "Plunge, approach and the beginning of the drag have a reduced modulus; it was raised "
+            "before the statistics begin."
         )
 
 
