@@ -136,10 +136,7 @@ def test_arguments_arrive_whole_from_anywhere(
 @pytest.mark.parametrize(
     ("arguments", "called"),
     [
-        (
-            ["--quick", "-x"],
-            r"ruff .*\npytest .*\[-m\] \[not engine and not slow\] \[-x\]",
-        ),
+        (["--quick", "-x"], r"ruff .*\npytest .*\[-m\] \[not engine and not slow\] \[-x\]"),
         (["--attacks", "-k", "kill"], r"pytest .*\[--attacks\] \[-m\] \[attack\] \[-k\] \[kill\]"),
         (["-k", "mesh or run"], r"pytest \[-k\] \[mesh or run\]"),
         ([], r"pytest \[-n\] [^k]* in .*\nrun: ruff check .*\n(.*\n)*lint-imports .*"),

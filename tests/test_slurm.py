@@ -118,10 +118,7 @@ def test_the_queue_changes_no_table(local: Path, queued: Path) -> None:
 
 @pytest.mark.parametrize("launcher", ["mpirun", "srun --mpi=pmix"])
 def test_a_job_has_a_processor_for_each_rank(
-    launcher: str,
-    cluster: Cluster,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    launcher: str, cluster: Cluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if launcher == "mpirun":
         monkeypatch.delenv("DRAGDECK_LAUNCHER", raising=False)

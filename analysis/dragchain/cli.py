@@ -242,10 +242,7 @@ STEPS = (
 """What the rules call: ``dragchain step NAME``."""
 
 PROGRAM = Program(
-    "dragchain",
-    "Make tables, figures and reports from the output of LIGGGHTS.",
-    COMMANDS,
-    STEPS,
+    "dragchain", "Make tables, figures and reports from the output of LIGGGHTS.", COMMANDS, STEPS
 )
 main = PROGRAM.main
 

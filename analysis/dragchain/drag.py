@@ -236,11 +236,7 @@ def ahead_behind(
 
 
 def azimuth_profile(
-    frame: Ints,
-    frames: int,
-    azimuth_rad: Floats,
-    normal_force_n: Floats,
-    bins: int = AZIMUTH_BINS,
+    frame: Ints, frames: int, azimuth_rad: Floats, normal_force_n: Floats, bins: int = AZIMUTH_BINS
 ) -> tuple[Floats, list[Estimate]]:
     """The edges of equal bins over the circumference and the mean force a frame in each, N.
 

@@ -35,9 +35,7 @@ EXAMPLES: dict[str, dict[str, str]] = {
         "network": "process/*/figures/network_xz.png",
         "depth": "process/*/figures/force_depth.png",
     },
-    "removal": {
-        "load": "process/*/figures/workpiece.png",
-    },
+    "removal": {"load": "process/*/figures/workpiece.png"},
 }
 """Pictures of each example: name, and place in the folder of results."""
 

@@ -121,9 +121,7 @@ _TITLES = {
 
 
 def draw_map(
-    points: pd.DataFrame,
-    conditions: pd.DataFrame,
-    errors: RestitutionErrors,
+    points: pd.DataFrame, conditions: pd.DataFrame, errors: RestitutionErrors
 ) -> dict[str, Figure]:
     """All figures by name.
 

@@ -353,10 +353,7 @@ def _order_of_convergence(runs: Sequence[Recording]) -> Iterator[tuple[Recording
         if len(own) < 3:
             continue
         errors = sorted(
-            (
-                run.case.steps_per_contact,
-                abs(run.contact.rebound - run.contact.constants.rebound),
-            )
+            (run.case.steps_per_contact, abs(run.contact.rebound - run.contact.constants.rebound))
             for run in own
         )
         name = f"{own[-1].case.series}, limitForce {'on' if limit else 'off'}, all steps"

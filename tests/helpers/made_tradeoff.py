@@ -20,11 +20,7 @@ def made_tradeoff(**more: Any) -> TradeoffRecord:
         **dict.fromkeys(("plan", "study"), "any"),
         **dict.fromkeys(("runs", "engine_hours"), 0),
         "machine": {"cores": 2, "processor": "any"},
-        "reference": {
-            "youngs_modulus_scale": 1.0,
-            "timestep_fraction": 0.2,
-            "speed_factor": 1.0,
-        },
+        "reference": {"youngs_modulus_scale": 1.0, "timestep_fraction": 0.2, "speed_factor": 1.0},
         "versions": {"engine": "3.8.0"},
         "drop_test": [
             {"timestep_fraction": 0.02, "restitution_error": -1e-4, "relative_cost": 1.0},

@@ -60,6 +60,7 @@ TYPES = {
     "flag": "bool",
     "text": ("large_string", "dictionary<values=string"),
     "list of integers": "list<element: int64",
+    "list of texts": "list<element: string",
     "any": "",
 }
 """Types of the reference, and how those of Parquet begin."""

@@ -6,9 +6,9 @@ export { COLOURS };
 export const PALE = "#dfe3e8",
   MEDIA = "#b9c2cc",
   STEEL = "#8d98a5",
-  CHOSEN = "#d55e00";
-export const CLASS_COLOURS = ["#56657a", "#d55e00", "#0072b2"]; // told apart with any colour vision
-const OF_MEDIA = ["#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00"];
+  CHOSEN = COLOURS.red;
+export const CLASS_COLOURS = [COLOURS.grey, COLOURS.red, COLOURS.blue]; // told apart with any colour vision
+const OF_MEDIA = ["blue", "orange", "green", "violet", "teal", "red"].map((name) => COLOURS[name]);
 /** Colour of a class of media by its number. */
 export const mediaColour = (number) => OF_MEDIA[number % OF_MEDIA.length];
 

@@ -362,12 +362,7 @@ def _keep(file: Path, content: AdviceFile) -> None:
 
 
 def render(
-    study: str,
-    fidelity: str | None,
-    plan: str | None,
-    scene: str,
-    run: str,
-    packing: Path | None,
+    study: str, fidelity: str | None, plan: str | None, scene: str, run: str, packing: Path | None
 ) -> None:
     """Write the input files of one run, or the folder of a further workpiece of a run."""
     project = find_project(Path.cwd())
@@ -427,13 +422,7 @@ def _bed(kind: SceneType, packing: Path | None) -> Bed | None:
     return read_bed(packing)
 
 
-def drops_command(
-    study: str,
-    fidelity: str | None,
-    out: Path,
-    set: str,
-    fit: Path | None,
-) -> None:
+def drops_command(study: str, fidelity: str | None, out: Path, set: str, fit: Path | None) -> None:
     """Run one set of drop tests.
 
     Raises

@@ -27,13 +27,7 @@ from dragchain.figures.panels import head, new_panels
 from dragchain.figures.style import MARKERS, SERIES, WIDE_IN, force_map
 from dragchain.report.campaign import write_report
 from dragchain.report.cases import ReportedCase, StudyRuns, cases_of, read_study_runs
-from dragchain.report.page import (
-    NETWORK_PAGE,
-    TIMES,
-    render_page,
-    with_interval,
-    write_bundle,
-)
+from dragchain.report.page import NETWORK_PAGE, TIMES, render_page, with_interval, write_bundle
 from dragchain.run.basis import QUANTITIES, Quantity, Standing
 from dragchain.run.case import changed_inputs
 from dragchain.statistics.estimate import Estimate, flattened, mean_of

@@ -21,17 +21,17 @@ from PIL import Image
 
 from dragdeck.files import write_bytes
 
-BLUE, ORANGE, GREEN, RED, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#6b7480"
-"""After Okabe and Ito (2008): told apart with any kind of colour vision."""
-
-INK, LIGHT = "#1d2733", "#c8ced6"
-
 COLOURS: Mapping[str, str] = json.loads(
     resources.files("dragdeck").joinpath("data/colours.json").read_text(encoding="utf-8")
 )
-"""One colour for each thing, in all figures and pages; `simulation` is that of a source."""
+"""A few by name, then one for each thing, in all figures and pages."""
 
-SERIES = (BLUE, ORANGE, GREEN, RED, "#7a4fa3", "#5b8a99")
+BLUE, ORANGE, GREEN, RED = (COLOURS[name] for name in ("blue", "orange", "green", "red"))
+"""After Okabe and Ito (2008): told apart with any kind of colour vision."""
+
+GREY, INK, LIGHT = COLOURS["grey"], COLOURS["ink"], COLOURS["light"]
+
+SERIES = (BLUE, ORANGE, GREEN, RED, COLOURS["violet"], COLOURS["teal"])
 """Colours of series that stand side by side."""
 
 MARKERS = "os^vDPX*<p>d"

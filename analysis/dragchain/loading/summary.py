@@ -12,14 +12,7 @@ import pandas as pd
 from dragchain.arrays import Floats, Ints
 from dragchain.drag import circumference, parts, within_angle
 from dragchain.loading.contact_events import AMOUNTS, LIMITS, TYPES, surfaces
-from dragchain.loading.document import (
-    ContactType,
-    LoadClosure,
-    Loading,
-    Profile,
-    Quantiles,
-    Totals,
-)
+from dragchain.loading.document import ContactType, LoadClosure, Loading, Profile, Quantiles, Totals
 from dragchain.loading.samples import WORKPIECE, Sampled
 from dragchain.statistics.correlated import estimates
 from dragchain.statistics.estimate import CONFIDENCE, EstimateColumns

@@ -21,6 +21,7 @@ from dragchain.network.chains import (
 from dragchain.network.frame import FLOOR, KINDS, SIDE, NetworkFrame, network_frames
 from dragchain.network.statistics import cluster_rows, frame_clusters, frame_statistics
 from dragchain.tables.parquet import table_writer, write_parquet
+from dragdeck.records.case import load_case
 from dragdeck.study.drive import wrap_angle
 
 
@@ -175,6 +176,7 @@ def write_chains(run_dir: Path) -> None:
     """Write the tables ``network``, ``clusters`` and ``chains`` of a process run.
 
     They contain the frames of the drag that enter the statistics. At most one frame is in memory.
+    If the media have classes, ``classes`` of ``chains`` are those of ``particle_ids``.
 
     Raises
     ------
@@ -183,13 +185,18 @@ def write_chains(run_dir: Path) -> None:
     """
     network: list[dict[str, float]] = []
     grown: list[dict[str, NDArray[Any]]] = []
-    tables = run_dir / "tables"
+    tables, case = run_dir / "tables", load_case(run_dir)
+    names = np.array([one.name for one in case.classes])
     with table_writer(tables / "chains.parquet") as found:
         for frame in network_frames(run_dir):
             clusters = frame_clusters(frame)
             network.append(frame_statistics(frame, clusters))
             grown.append(cluster_rows(frame, clusters))
-            found.write(chain_table(frame))
+            chains = chain_table(frame)
+            if names.size:
+                each = (names[case.class_of(np.array(ids))] for ids in chains["particle_ids"])
+                chains["classes"] = [one.tolist() for one in each]
+            found.write(chains)
         if not network:
             raise TableError(
                 f"{run_dir}: the statistics contain no frame of the contact network; "

@@ -17,13 +17,7 @@ from pydantic import JsonValue
 from dragchain.loading.document import Loading
 from dragchain.loading.wear import FILE as WEAR
 from dragchain.loading.wear import Wear
-from dragchain.report.findings import (
-    FILE,
-    DropFindings,
-    FillingFindings,
-    Findings,
-    ProcessFindings,
-)
+from dragchain.report.findings import FILE, DropFindings, FillingFindings, Findings, ProcessFindings
 from dragchain.report.page import TIMES, fixed, number, with_interval
 from dragchain.report.values import (
     Extrapolated,

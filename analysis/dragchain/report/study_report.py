@@ -21,13 +21,7 @@ from dragchain.report.cases import (
 )
 from dragchain.report.cost_check import CostRow, answers, cost_rows, prediction_for, read_advice
 from dragchain.report.findings import FIGURES, Findings
-from dragchain.report.page import (
-    NETWORK_PAGE,
-    data_uri,
-    file_uri,
-    render_page,
-    write_bundle,
-)
+from dragchain.report.page import NETWORK_PAGE, data_uri, file_uri, render_page, write_bundle
 from dragchain.report.removal import UM_PER_H, RemovalOfCase, removal_of, touch_rows
 from dragchain.report.spreadsheet import summary_workbook
 from dragchain.report.summary import summary

@@ -132,10 +132,7 @@ def _check_alike(cases: Sequence[CaseOfRun], field: str) -> None:
 
 
 def find(
-    run_dirs: Sequence[Path],
-    field: str,
-    expected: Expectation,
-    commands: Sequence[str] = (),
+    run_dirs: Sequence[Path], field: str, expected: Expectation, commands: Sequence[str] = ()
 ) -> ScalingFile:
     """Everything that runs say of a field.
 

@@ -57,8 +57,7 @@ def write_round(study: str) -> None:
 
 
 def advance(
-    studied: SearchedStudy,
-    measure: Callable[[SearchedStudy, SearchPoint], Measured] = read_point,
+    studied: SearchedStudy, measure: Callable[[SearchedStudy, SearchPoint], Measured] = read_point
 ) -> str:
     """One step of a search; see `write_round`. `measure` reads the runs of a setting."""
     file, asked = studied.record, studied.asked()
@@ -161,7 +160,7 @@ def draw_search(found: SearchFindings, rows: list[SearchRow]) -> dict[str, Figur
             axes.plot(x, [one.value for one in each], color=GREEN)
             columns = EstimateColumns.of(each)
             band(axes, x, Estimate(0.0, columns.ci95_low, columns.ci95_high), GREEN)  # type: ignore[arg-type]
-            own = [one for one in rows if one.objective and one.point.purpose != "confirmation"]
+            own = [one for one in rows if one.objective and not one.point.confirms]
             _bars(axes, [one.point.values[field] for one in own], own, "model", "o")
             axes.axvline(low + at[k] * (high - low), color=RED, ls=":")
             axes.set(xlabel=field, ylabel="" if k % 3 else objective)
@@ -183,7 +182,7 @@ def draw_search(found: SearchFindings, rows: list[SearchRow]) -> dict[str, Figur
 def _centre(found: SearchFindings) -> Any:
     """Where the responses are drawn: at the confirmed setting, or else at the best point so far."""
     last = found.points[-1]
-    if last.purpose == "confirmation":
+    if last.confirms:
         return found.studied.place(last.values)
     return found.trials.places[np.nanargmin(found.trials.values[:, 0])]
 
@@ -197,13 +196,13 @@ def _bars(axes: Any, x: list[Any], rows: list[SearchRow], purpose: str, marker: 
 def write_search(out_dir: Path, found: SearchFindings) -> None:
     """Write ``search.html`` and ``points.csv``."""
     studied, search, rows = found.studied, found.studied.search, rows_of(found)
-    confirmed = [one for one in rows if one.point.purpose == "confirmation"]
+    confirmed = [one for one in rows if one.point.confirms]
     best = None
     if confirmed:
         full = confirmed[-1]
         same = [one for one in rows if one.point.values.items() <= full.point.values.items()]
         best = {"full": full, "soft": same[0], "bounds": at_bounds(found, full.point)}
-    measured = [one for one in rows if one.objective and one.point.purpose != "confirmation"]
+    measured = [one for one in rows if one.objective and not one.point.confirms]
     lowest = min(measured, key=lambda one: loss(search.objective, one.objective.value))  # type: ignore[union-attr]
     table = pd.DataFrame(
         flattened(

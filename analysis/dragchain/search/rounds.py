@@ -31,17 +31,10 @@ from dragdeck.scenes.process import PROCESS, SCENES
 from dragdeck.study.base import Json
 from dragdeck.study.check import validate
 from dragdeck.study.model import Study
-from dragdeck.study.search import (
-    RECORD,
-    Objective,
-    Search,
-    SearchedMeasure,
-    SearchPoint,
-)
+from dragdeck.study.search import RECORD, Objective, Search, SearchedMeasure, SearchPoint
 from dragdeck.study.yaml import read_study
 from dragdeck.sweep.cases import Settings, settle_case, study_file
 
-_REJECTED = "run rejected: "
 _MOST_REFUSED = 20
 """Settings of a round that the study's checks may refuse one after the other."""
 
@@ -222,7 +215,7 @@ class SearchFindings:
     @cached_property
     def searched(self) -> Any:
         """Whether a point is no confirmation, (N,)."""
-        return np.array([one.purpose != "confirmation" for one in self.points])
+        return np.array([not one.confirms for one in self.points])
 
     @cached_property
     def means(self) -> Floats:
@@ -287,10 +280,12 @@ def read_findings(
         found = one.refused if one.refused else measure(studied, one)
         if found is None:
             return None
-        gone = isinstance(found, str)
-        rows.append(np.full(shape, np.nan) if isinstance(found, str) else found)
-        why = f"{_REJECTED}{found}" if gone and not one.refused else one.refused
-        known.append(one.model_copy(update={"refused": why}))
+        if isinstance(found, str):
+            ran = one.ran or not one.refused
+            one = one.model_copy(update={"refused": found, "ran": ran})
+            found = np.full(shape, np.nan)
+        rows.append(found)
+        known.append(one)
     return SearchFindings(studied, known, np.array(rows).reshape(-1, *shape))
 
 
@@ -300,7 +295,7 @@ def read_findings(
 def next_points(found: SearchFindings) -> list[SearchPoint]:
     """The points of the next round; none if the search is complete."""
     studied, search, points = found.studied, found.studied.search, found.of_search
-    tried = [one for one in points if not one.refused or one.refused.startswith(_REJECTED)]
+    tried = [one for one in points if one.ran or not one.refused]
     number = 1 + max((one.round for one in found.points), default=0)
     if not points:
         places = list(spread_places(search.start, len(search.vary), search.seed))
@@ -308,7 +303,7 @@ def next_points(found: SearchFindings) -> list[SearchPoint]:
     if np.isfinite(found.means[:, 0]).sum() < 2:
         raise _stuck(studied, "fewer than two settings can be compared", points[0].refused)
     if len(tried) >= search.runs:
-        done = found.points[-1].purpose == "confirmation"
+        done = found.points[-1].confirms
         return [] if done else _confirmation(found, number)
     trials, chosen = found.trials, list[SearchPoint]()
     wanted = min(search.at_once, search.runs - len(tried))

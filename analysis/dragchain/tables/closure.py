@@ -93,10 +93,7 @@ class Closure:
     _parts: list[Floats] = field(default_factory=list)
 
     def add(
-        self,
-        frames: WorkpieceFrames,
-        workpiece_force_n: Floats,
-        counted: NDArray[np.bool_],
+        self, frames: WorkpieceFrames, workpiece_force_n: Floats, counted: NDArray[np.bool_]
     ) -> NDArray[np.bool_]:
         """Take in the contacts of F steps.
 

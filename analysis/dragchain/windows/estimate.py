@@ -25,12 +25,7 @@ from scipy.special import erf
 from dragchain.arrays import Floats
 from dragchain.report.values import Extrapolated, LoadMap, Need, Reached
 from dragchain.statistics.correlated import MIN_SAMPLES, estimate_mean
-from dragchain.statistics.estimate import (
-    NORMAL_QUANTILE,
-    Estimate,
-    mean_of,
-    student_quantile,
-)
+from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate, mean_of, student_quantile
 from dragdeck.documents import Document, Part
 
 

@@ -4,13 +4,7 @@ import math
 from collections.abc import Iterator
 from pathlib import Path
 
-from dragchain.report.values import (
-    EXTRAPOLATED,
-    Extrapolated,
-    ExtrapolatedQuantity,
-    Need,
-    Reached,
-)
+from dragchain.report.values import EXTRAPOLATED, Extrapolated, ExtrapolatedQuantity, Need, Reached
 from dragchain.tradeoff.measure_run import quantities_along
 from dragchain.tradeoff.measures import QUANTITIES
 from dragchain.windows.estimate import UNKNOWN, Round, WindowsRecord, of_one_run

@@ -10,11 +10,7 @@ from dragchain.arrays import Floats
 from dragchain.report.values import ExtrapolatedQuantity, LoadMap, Need, Reached
 from dragchain.statistics.estimate import Estimate
 from dragchain.tables.by_step import read_table
-from dragchain.tradeoff.measure_run import (
-    make_tables,
-    quantities_along,
-    read_outcome,
-)
+from dragchain.tradeoff.measure_run import make_tables, quantities_along, read_outcome
 from dragchain.tradeoff.measures import QUANTITIES, Measurand, PathQuantities, checks_in_words
 from dragchain.windows.estimate import (
     UNKNOWN,

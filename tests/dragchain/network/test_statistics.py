@@ -4,8 +4,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from figure_files import case_json
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from made_run import write_documents
 from networks import random_frame, real_frame
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
@@ -119,8 +121,13 @@ def test_a_gap_in_the_counted_stretch_is_refused() -> None:
 @pytest.fixture
 def run_dir(tmp_path: Path) -> Path:
     """Return a run folder with frames at 0, 10, 20 and 30, of which 10 and 20 are counted."""
-    tables = tmp_path / "tables"
-    tables.mkdir()
+    own = {"volume_m3": 1e-6, "radius_mean_m": 1e-3, "radius_std_m": 0, "contact_moduli": {}}
+    rows = [("fine", 1, 4), ("coarse", 5, 5)]
+    classes = [
+        {"name": name, "material": name, "first_id": first, "count": n, "density_kg_m3": 2e3, **own}
+        for name, first, n in rows
+    ]
+    tables = write_documents(tmp_path, case_json("process", classes=classes)) / "tables"
     steps = list(range(0, 40, 5))
     samples(steps, [10 <= step <= 25 for step in steps]).to_parquet(
         tables / "workpiece_force.parquet"
@@ -161,6 +168,8 @@ def test_write_chains_writes_counted_frames_only(run_dir: Path) -> None:
     assert set(chains["step"]) == {10}
     path = chains[chains["definition"] == "widest_path"].iloc[0]
     assert list(path["particle_ids"]) == [7, 1] or not path["reaches_bowl"]
+    for ids, of_media in zip(chains["particle_ids"], chains["classes"], strict=True):
+        assert list(of_media) == ["fine" if one < 5 else "coarse" for one in ids]
     clusters = pd.read_parquet(run_dir / "tables" / "clusters.parquet")
     assert clusters["step"].tolist() == [10] * len(FORCE_FACTORS) + [20] * len(FORCE_FACTORS)
     # above the mean of 3 N: particle 7 with particle 1 and on the workpiece, and particle 4 on the
@@ -231,11 +240,7 @@ def flooded(frame: NetworkFrame, least: float) -> tuple[np.ndarray, set[str]]:
     return sizes[sizes > 1], {name for name, spanning in found.items() if spanning}
 
 
-@given(
-    seed=st.integers(0, 2**32 - 1),
-    edge=st.integers(2, 6),
-    levels=st.sampled_from([None, 1, 4]),
-)
+@given(seed=st.integers(0, 2**32 - 1), edge=st.integers(2, 6), levels=st.sampled_from([None, 1, 4]))
 @settings(max_examples=30)
 def test_clusters_are_those_of_a_flood(seed: int, edge: int, levels: int | None) -> None:
     frame = random_frame(seed, edge=edge, levels=levels)

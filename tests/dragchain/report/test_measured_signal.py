@@ -10,12 +10,7 @@ import pandas as pd
 import pytest
 from report_files import PICTURES, case_json, make_run, page_of, process_findings
 
-from dragchain.report.measured_signal import (
-    SIGNAL_QUANTITIES,
-    Difference,
-    _over_packings,
-    compared,
-)
+from dragchain.report.measured_signal import SIGNAL_QUANTITIES, Difference, _over_packings, compared
 from dragchain.report.study_report import write_study_report
 from dragchain.statistics.estimate import Estimate
 

@@ -10,14 +10,7 @@ import pandas as pd
 import pytest
 from loading_files import PLATE, made_contacts, write_run
 from loading_files import case_json as contact_case
-from report_files import (
-    PICTURES,
-    case_json,
-    make_run,
-    page_of,
-    process_findings,
-    write_quantities,
-)
+from report_files import PICTURES, case_json, make_run, page_of, process_findings, write_quantities
 
 from dragchain.errors import TableError
 from dragchain.loading.document import Loading

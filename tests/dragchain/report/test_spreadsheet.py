@@ -33,7 +33,7 @@ def test_no_text_becomes_a_formula_or_a_link(text: str) -> None:
 def test_cells_keep_their_values_and_types() -> None:
     values = [1.5, math.nan, -math.inf, None]
     table = pd.DataFrame(
-        {"x": values, "n": np.arange(4), "flag": [True, False] * 2, "text": ["a", "", None, "1"]},
+        {"x": values, "n": np.arange(4), "flag": [True, False] * 2, "text": ["a", "", None, "1"]}
     )
     found = list(read(workbook({"Sheet": table}))["Sheet"].iter_rows(min_row=2, values_only=True))
     assert found == [

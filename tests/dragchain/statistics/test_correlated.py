@@ -8,12 +8,7 @@ from scipy.signal import lfilter
 
 from dragchain.drag import ahead_behind, azimuth_profile, depth_profile, depth_slope
 from dragchain.errors import SeriesError
-from dragchain.statistics.correlated import (
-    autocovariance,
-    estimate_mean,
-    estimates,
-    slow_error,
-)
+from dragchain.statistics.correlated import autocovariance, estimate_mean, estimates, slow_error
 from dragchain.statistics.estimate import Estimate
 
 

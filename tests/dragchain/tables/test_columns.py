@@ -24,7 +24,7 @@ TABLES = (
 SOME_RUNS_ONLY = {
     *(*BODY, *BODY_IMPULSE, *ORIENTATION, ATTRACTION, "fastest_particle_m_s"),
     *(name for columns in CLASSES.values() for name in columns),
-    *("peak_pressure_pa", "touch_normal_m_s", "touches_per_m2_s"),
+    *("classes", "peak_pressure_pa", "touch_normal_m_s", "touches_per_m2_s"),
 }
 """Columns of spinning workpieces, clumps, attraction, classes and touches, and one not written."""
 

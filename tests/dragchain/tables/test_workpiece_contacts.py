@@ -6,11 +6,7 @@ from hypothesis.extra import numpy as arrays
 from made_frames import frame
 
 from dragchain.errors import TableError
-from dragchain.tables.workpiece_contacts import (
-    WallContacts,
-    WorkpieceFrames,
-    join_workpiece_frames,
-)
+from dragchain.tables.workpiece_contacts import WallContacts, WorkpieceFrames, join_workpiece_frames
 from dragdeck.dumps.frame import Frame
 from dragdeck.physics.coulomb import FrictionLimit
 

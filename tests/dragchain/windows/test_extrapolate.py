@@ -11,13 +11,7 @@ from figure_files import case_json
 from paths import WINDOWS_RECORD
 from report_files import ASKED
 
-from dragchain.report.values import (
-    EXTRAPOLATED,
-    Extrapolated,
-    ExtrapolatedQuantity,
-    Need,
-    Reached,
-)
+from dragchain.report.values import EXTRAPOLATED, Extrapolated, ExtrapolatedQuantity, Need, Reached
 from dragchain.statistics.estimate import Estimate
 from dragchain.tradeoff.measures import PathQuantities
 from dragchain.windows import extrapolate

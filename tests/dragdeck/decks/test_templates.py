@@ -11,12 +11,7 @@ from markupsafe import Markup
 
 from dragdeck.cases.case import Case
 from dragdeck.decks.render import deck_text, effective, idle, overriding
-from dragdeck.decks.templates import (
-    comment,
-    environment,
-    quoted,
-    template_files,
-)
+from dragdeck.decks.templates import comment, environment, quoted, template_files
 from dragdeck.errors import InputError
 from dragdeck.project import Project
 from dragdeck.scenes.process import process_scene

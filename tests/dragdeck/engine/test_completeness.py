@@ -15,12 +15,7 @@ from spoilt_dumps import NAMES, ROWS, SPOILT, binary, text
 from dragdeck.decks.outputs import OutputOfRun
 from dragdeck.dumps.grammar import whole_frames
 from dragdeck.dumps.reader import read_frames
-from dragdeck.engine.completeness import (
-    coverage,
-    cut_outputs,
-    first_gap,
-    some_frames,
-)
+from dragdeck.engine.completeness import coverage, cut_outputs, first_gap, some_frames
 from dragdeck.errors import DumpError
 from dragdeck.records.run import RunPart
 

@@ -86,9 +86,7 @@ def test_cylinder_against_the_formulas(facet_size_m: float):
 
 @settings(max_examples=40)
 @given(
-    radius=st.floats(1e-4, 0.05),
-    slenderness=st.floats(0.3, 20),
-    refinement=st.floats(1.0, 12.0),
+    radius=st.floats(1e-4, 0.05), slenderness=st.floats(0.3, 20), refinement=st.floats(1.0, 12.0)
 )
 def test_every_cylinder_is_a_body_of_shapely_facets(
     radius: float, slenderness: float, refinement: float

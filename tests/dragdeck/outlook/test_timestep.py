@@ -21,11 +21,7 @@ from dragdeck.outlook.timestep import (
     stable_step_note,
 )
 from dragdeck.physics.contact_mechanics import effective_modulus, rayleigh_time
-from dragdeck.records.stability import (
-    RestitutionErrors,
-    StableStepLaw,
-    stable_step_law,
-)
+from dragdeck.records.stability import RestitutionErrors, StableStepLaw, stable_step_law
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import PROCESS
 from dragdeck.scenes.workpiece import describe, workpiece_radius

@@ -11,11 +11,7 @@ from dragdeck.physics.packing import pour
 from dragdeck.study.media import quantiles
 
 
-@given(
-    count=st.integers(2, 5000),
-    mean=st.floats(1e-4, 1e-1),
-    spread=st.floats(0.001, 0.3),
-)
+@given(count=st.integers(2, 5000), mean=st.floats(1e-4, 1e-1), spread=st.floats(0.001, 0.3))
 def test_mean_and_spread_are_exact(count: int, mean: float, spread: float) -> None:
     found = quantiles("normal", mean, spread * mean, count)
     assert found.mean() == pytest.approx(mean, rel=1e-12)

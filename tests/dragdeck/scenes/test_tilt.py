@@ -113,9 +113,7 @@ def test_a_workpiece_that_leans_into_the_wall_is_refused(moved: Made) -> None:
 # --- spin about an inclined axis, and waypoints that incline -----------------------------------
 
 
-def test_a_tilted_workpiece_that_spins_has_its_reference_point_on_its_axis(
-    moved: Made,
-) -> None:
+def test_a_tilted_workpiece_that_spins_has_its_reference_point_on_its_axis(moved: Made) -> None:
     """Its lowest point, at whatever angle, is at the immersion depth."""
     case = moved(tilt_deg=20, spin={"rpm": 60})
     mesh, radius = workpiece_mesh(case), case.study.workpiece.shape.radius_m

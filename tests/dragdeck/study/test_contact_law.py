@@ -136,12 +136,7 @@ def _linear(value: float, radius: Floats, overlap: Floats, wall: bool) -> Floats
 def test_a_coefficient_that_adds_a_force_is_found_in_a_script(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    row = Coefficient(
-        "liquid",
-        "liquid",
-        "surface wet",
-        attraction=_linear,
-    )
+    row = Coefficient("liquid", "liquid", "surface wet", attraction=_linear)
     monkeypatch.setattr(contact_law, "coefficients", lambda: {"liquid": row})
     assert added_forces(["gran", "model", "hertz", "surface", "wet"]) == ["surface wet"]
 

@@ -63,7 +63,7 @@ WRONG = {
 INTERNAL = re.compile(
     r"Input should|NamedTuple|dictionary|instance|Extra inputs|Field required|discriminator|"
     r"pydantic|argument|tuple|integer|Value error|validator|\btag\b|\bNone\b(?! *[,\]])|"
-    r"List should|items after validation|\bstring\b",
+    r"List should|items after validation|\bstring\b"
 )
 
 

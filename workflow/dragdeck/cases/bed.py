@@ -157,9 +157,7 @@ def bed_rayleigh_time(study: Study) -> float:
     scale = study.chosen_fidelity().youngs_modulus_scale
     return min(
         rayleigh_time(
-            study.materials[one.material],
-            float(one.radii_m[0]) * one.clump.timestep_radius,
-            scale,
+            study.materials[one.material], float(one.radii_m[0]) * one.clump.timestep_radius, scale
         )
         for one in bed_classes(study)
     )

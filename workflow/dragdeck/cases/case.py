@@ -93,7 +93,7 @@ class Case:
 
     @property
     def of_filling(self) -> "Case":
-        """The case whose filling it starts from: that of its lead, with the settings of a filling."""
+        """The case of the filling that it, or its lead, starts from."""
         first = self.lead or self
         return replace(first, study=first.study.at_filling())
 

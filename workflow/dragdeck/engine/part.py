@@ -21,14 +21,7 @@ from dragdeck.engine.reports import Report
 from dragdeck.engine.space import SPARE_BYTES, check_space, free_bytes, space_left
 from dragdeck.engine.watch import EngineEnded, LimitMet, Watcher, cut_screen
 from dragdeck.errors import EngineError, RejectedRunError
-from dragdeck.records.run import (
-    REMEDIES,
-    AcceptanceCheck,
-    CaseFile,
-    CheckCode,
-    RunPart,
-    RunRecord,
-)
+from dragdeck.records.run import REMEDIES, AcceptanceCheck, CaseFile, CheckCode, RunPart, RunRecord
 
 STATE_FILE = "state.json"
 _WRITTEN: set[CheckCode] = {"output_complete", "packing_whole"}

@@ -103,11 +103,7 @@ def cylinder_facets(
 
 
 def prism(
-    sides: int,
-    corner_radius_m: float,
-    length_m: float,
-    facet_size_m: float,
-    facet_length_m: float,
+    sides: int, corner_radius_m: float, length_m: float, facet_size_m: float, facet_length_m: float
 ) -> Trimesh:
     """Make a closed upright bar with a regular polygon as its section.
 

@@ -134,10 +134,7 @@ def scene_lines(
 
 
 def explanation(
-    scene: StudyScene,
-    cost: Cost,
-    notes: Iterable[tuple[str, str]],
-    tradeoff: TradeoffRecord | None,
+    scene: StudyScene, cost: Cost, notes: Iterable[tuple[str, str]], tradeoff: TradeoffRecord | None
 ) -> Table:
     """The table of one scene.
 

@@ -54,10 +54,7 @@ class FrictionLimit:
 
 
 def within_friction(
-    force_n: Floats,
-    normal: Floats,
-    friction: Floats | float,
-    attraction_n: Floats | float = 0.0,
+    force_n: Floats, normal: Floats, friction: Floats | float, attraction_n: Floats | float = 0.0
 ) -> tuple[Floats, Floats]:
     """Cut the tangential part of forces to friction times the repulsive normal force.
 

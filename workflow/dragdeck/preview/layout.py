@@ -176,7 +176,7 @@ def _stages(case: Case, way: Course) -> Iterator[Stage]:
 COLOURS: dict[str, str] = json.loads(
     resources.files("dragdeck").joinpath("data/colours.json").read_text(encoding="utf-8")
 )
-"""Those of all figures and pages."""
+"""Those of all figures and pages: a few by name, then one for each thing."""
 
 
 @dataclass(frozen=True)

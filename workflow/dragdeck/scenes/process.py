@@ -131,13 +131,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         rayleigh_time_s=bed_rayleigh_time(study),
         neighbours=max(ENGINE_NEIGHBOURS, _bowl_neighbours(study), *counts),
         outputs=_outputs(
-            periods,
-            drag,
-            steps,
-            [one.name for one in moved],
-            facets,
-            touches,
-            study.media.clumped,
+            periods, drag, steps, [one.name for one in moved], facets, touches, study.media.clumped
         ),
         thermo_steps=periods.network,
         checkpoint_steps=_checkpoint_steps(study, steps.end - steps.entry),

@@ -10,14 +10,7 @@ import numpy as np
 from dragdeck import __version__
 from dragdeck.cases.bed import bed_classes, bed_density, body_sizes, skin
 from dragdeck.cases.case import Case, digest, slug
-from dragdeck.decks.deck import (
-    NOT_OF_LIQUID,
-    LeftOut,
-    Liquid,
-    Materials,
-    Scene,
-    contact_law,
-)
+from dragdeck.decks.deck import NOT_OF_LIQUID, LeftOut, Liquid, Materials, Scene, contact_law
 from dragdeck.errors import InputError
 from dragdeck.physics.contact_mechanics import (
     ENGINE_SOFTEST_PA,

@@ -15,15 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from dragdeck.study.base import (
-    MaterialName,
-    Model,
-    Name,
-    NonNegative,
-    Number,
-    Positive,
-    Whole,
-)
+from dragdeck.study.base import MaterialName, Model, Name, NonNegative, Number, Positive, Whole
 from dragdeck.study.shapes import FEWEST_SPHERES, SOLID_FRACTION_ESTIMATE, AnyShape
 
 Array = NDArray[np.float64]

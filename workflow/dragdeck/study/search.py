@@ -157,6 +157,8 @@ class SearchPoint(Part):
         Objective and its standard error by the model before the run.
     refused : str
         Why no run of it counts; empty if there is no reason.
+    ran : bool
+        Whether that is known from its runs, and not from the checks of its study.
     """
 
     values: Mapping[str, Any]
@@ -165,6 +167,12 @@ class SearchPoint(Part):
     predicted: float | None = None
     predicted_se: float | None = None
     refused: str = ""
+    ran: bool = False
+
+    @property
+    def confirms(self) -> bool:
+        """Whether it is a confirmation, which the model does not use."""
+        return self.purpose == "confirmation"
 
 
 class SearchRecord(Document):
