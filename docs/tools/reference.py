@@ -20,8 +20,6 @@ from records import ROOT
 from worked_examples import EXAMPLES, study_text
 
 from dragchain.cli import PROGRAM as DRAGCHAIN
-from dragchain.tables.columns import _UNITS as UNITS
-from dragchain.tables.columns import unit_end
 from dragdeck.cli import PROGRAM as DRAGDECK
 from dragdeck.study.model import BUILT_IN_FIDELITIES, Fidelity, Study
 from dragdeck.study.plausible import plausible_range
@@ -106,13 +104,12 @@ def columns() -> str:
             marks[base] = f", with {'SE' if end == 'se' else 'CI'}{where}"
     rows["key"] = rows["description"].str.replace(PARTS, "", regex=True)
     rows["key"] += (rows["tables"] + " " + rows["column"]).map(marks)
-    merged = rows[ends.isna()].groupby(["tables", "key", "type"], sort=False)["column"].agg(list)
+    merged = rows[ends.isna()].groupby(["tables", "key"], sort=False)["column"].agg(list)
     counts = merged.groupby("tables").transform("size")
-    heads = ["column", "unit", "type", "meaning", "tables"]
+    heads = ["column", "meaning", "tables"]
     parts: dict[str, list[list[str]]] = {"In several tables": []}
-    for (tables, meaning, kind), names in merged.items():
-        unit = UNITS.get(unit_end(names[0].removesuffix("*")), "")
-        cells = [f"`{_braced(names)}`", unit, kind.removeprefix("number"), meaning]
+    for (tables, meaning), names in merged.items():
+        cells = [f"`{_braced(names)}`", meaning]
         listed = ", ".join(f"`{name}`" for name in tables.split())
         if " " in tables and counts[tables].max() < 3:
             parts["In several tables"].append([*cells, listed])
