@@ -22,8 +22,8 @@ EXAMPLES: dict[str, dict[str, str]] = {
         "forces": "process/*/figures/forces.png",
     },
     "carousel": {
-        "network": "process/*count-3*[0-9a-f]/figures/network_xy.png",
-        "forces": "process/*count-3*[0-9a-f]/figures/forces.png",
+        "network": "process/*count-3-????????/figures/network_xy.png",
+        "forces": "process/*count-3-????????/figures/forces.png",
     },
     "tilted_stream": {
         "preview": "preview.png",
