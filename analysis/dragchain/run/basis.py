@@ -198,7 +198,7 @@ def _why_not(case: CaseOfRun) -> str:
         return "the effect of a higher speed is not measured"
     if case.marks:
         return "its windows do not give this quantity"
-    return "fidelity: {tolerance: 0.1} measures it at the physical modulus"
+    return "fidelity: {tolerance: 0.1} would measure values at the physical modulus"
 
 
 def notes(case: CaseOfRun) -> list[str]:

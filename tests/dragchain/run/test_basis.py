@@ -70,7 +70,7 @@ def test_the_interval_of_a_value_from_windows_is_theirs() -> None:
 @pytest.mark.parametrize(
     ("settings", "more", "remedy"),
     [
-        ((0.01, 1.0), {}, "fidelity: {tolerance: 0.1} measures it"),
+        ((0.01, 1.0), {}, "fidelity: {tolerance: 0.1} would measure"),
         ((0.01, 1.0), {"marks": ["state.1.restart"]}, "its windows do not give"),
         ((0.01, 5.0), {}, "higher speed is not measured"),
     ],
