@@ -58,6 +58,11 @@ def test_every_link_leads_somewhere(page: Path) -> None:
     assert missing == []
 
 
+def test_no_line_of_a_page_is_taken_for_a_comment() -> None:
+    """A line that begins with a percent sign is one for Sphinx, and is left out."""
+    assert [name_of(page) for page in PAGES if re.search("^%", page.read_text(), re.M)] == []
+
+
 def test_every_image_is_shown_and_every_figure_is_drawn() -> None:
     text = "".join(page.read_text() for page in PAGES)
     files = {file.name for file in IMAGES.iterdir()}
