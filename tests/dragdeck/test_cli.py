@@ -9,9 +9,12 @@ import pytest
 import yaml
 from made_scenes import own_template
 
+from dragchain.cli import PROGRAM as DRAGCHAIN
 from dragdeck.cases.case import Case
 from dragdeck.cases.ranks import CORES_VARIABLE
+from dragdeck.cli import PROGRAM as DRAGDECK
 from dragdeck.cli import main
+from dragdeck.command_line import Program
 from dragdeck.project import Project
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import PROCESS
@@ -20,6 +23,15 @@ from dragdeck.scenes.process import PROCESS
 @pytest.fixture(autouse=True)
 def inside(project: Project, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(project.root)
+
+
+@pytest.mark.parametrize("program", [DRAGDECK, DRAGCHAIN])
+def test_every_command_has_help(program: Program, capsys: pytest.CaptureFixture[str]) -> None:
+    steps = [["step", one.name] for one in program.steps]
+    for words in [*([one.name] for one in program.commands), *steps]:
+        with pytest.raises(SystemExit):
+            program.main([*words, "--help"])
+        assert " ".join(words) in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("command", ["check", "explain", "cases"])

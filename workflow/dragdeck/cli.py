@@ -87,8 +87,8 @@ COMMANDS = (
             "commands:advise", (
         STUDY, FIDELITY,
         Argument("--tolerance", type=float, metavar="X",
-                  help="largest relative error caused by the settings, from 0 to 1 (default: "
-                  "the study's, or 0.05)"),
+                  help="half-width of the 95 %% confidence interval, relative, from 0 to 1; for a "
+                  "restitution the largest error (default: the study's, or 0.1)"),
         Argument("--quantity", metavar="NAME",
                   help="quantity to which the tolerance applies, for example drag_mean, drag_std, "
                   "workpiece_contacts or restitution; docs/reference/study.md lists all (default: "

@@ -19,7 +19,7 @@ _TIMES = "\N{MULTIPLICATION SIGN}"
 class Basis(StrEnum):
     """What a value of the physical process rests on."""
 
-    MEASURED = "as measured"
+    MEASURED = "as simulated"
     WINDOWS = "from windows at the physical Young's modulus"
     SCALED = "scaled to process time"
     NONE = "not available"
