@@ -59,6 +59,12 @@ def test_a_workpiece_shorter_than_its_immersion_is_refused(dragged: Dragged) -> 
     assert "0.011 m" in str(caught.value.limit)
 
 
+def test_a_part_that_was_moved_off_its_axis_is_told_so(dragged: Dragged) -> None:
+    with pytest.raises(InputError, match="does not fit") as caught:
+        process_scene(dragged(offset_m=[0.1, 0.02]))
+    assert caught.value.remedy.startswith("leave workpiece.shape.offset_m out")
+
+
 def test_a_part_that_lies_is_turned_upright_and_moved_to_its_clamping_axis(
     dragged: Dragged,
 ) -> None:
