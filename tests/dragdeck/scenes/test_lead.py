@@ -135,6 +135,10 @@ def test_a_filling_may_have_a_modulus_of_its_own(made: Make) -> None:
     assert PROCESS.run_id(made(stiffer)) != PROCESS.run_id(made(soft))
 
 
+def test_a_filling_has_the_name_of_the_fidelity(made: Make) -> None:
+    assert FILLING.build(made("draft"), None).case.fidelity.name == "draft"
+
+
 def test_nothing_is_counted_before_the_bed_has_settled(made: Make) -> None:
     case = made(STIFF, transient_m=0.0)
     scene = process_scene(case, BED)

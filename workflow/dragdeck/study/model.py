@@ -436,17 +436,11 @@ class Fidelity(Model):
         """
         if self._filling_scale == self.youngs_modulus_scale:
             return self
-        return self.model_copy(
-            update={
-                "youngs_modulus_scale": self._filling_scale,
-                "filling_youngs_modulus_scale": None,
-                "windows": None,
-            }
-        )
+        return self.model_copy(update={"youngs_modulus_scale": self._filling_scale})
 
     @property
     def of_start(self) -> "Fidelity":
-        """The settings of plunge, approach and the beginning of the drag."""
+        """The settings of plunge, approach and the start of the drag."""
         if self.soft_start is None:
             return self
         filling = {"filling_youngs_modulus_scale": self._filling_scale}
@@ -691,8 +685,14 @@ class Study(Model):
 
     def at_start(self) -> "Study":
         """The study with the settings of what leads to its statistics."""
-        return self.model_copy(update={"fidelity": self.chosen_fidelity().of_start})
+        return self._at(self.chosen_fidelity().of_start)
 
     def at_filling(self) -> "Study":
         """The study with the settings of its filling."""
-        return self.model_copy(update={"fidelity": self.chosen_fidelity().of_filling})
+        return self._at(self.chosen_fidelity().of_filling)
+
+    def _at(self, settings: Fidelity) -> "Study":
+        """With these settings; itself, with the name of its fidelity, if they are its own."""
+        if settings is self.chosen_fidelity():
+            return self
+        return self.model_copy(update={"fidelity": settings})
