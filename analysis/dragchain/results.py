@@ -169,7 +169,7 @@ class FinishedRun(RunData):
             "study": self.case.study,
             "run": self.case.run,
             "units": {name: self.units[name] for name in table.columns},
-            "basis": " ".join(notes(self.case)) if process else str(Basis.MEASURED),
+            "basis": " ".join(notes(self.case)) if process else str(Basis.SIMULATED),
         }
         return table
 

@@ -75,8 +75,9 @@ class Project:
             found = load_cases(file, fidelity, found_by, self.results(study) / SEARCHED)
             for case in found:
                 check_timestep(case)
-                start = replace(case, study=case.study.at_start())
-                check_timestep(start, "fidelity.soft_start")
+                if case.study.chosen_fidelity().soft_start:
+                    start = replace(case, study=case.study.at_start())
+                    check_timestep(start, "fidelity.soft_start")
         except InputError as error:
             raise located(error) from None
         return found

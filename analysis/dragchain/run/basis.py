@@ -19,7 +19,7 @@ _TIMES = "\N{MULTIPLICATION SIGN}"
 class Basis(StrEnum):
     """What a value of the physical process rests on."""
 
-    MEASURED = "as simulated"
+    SIMULATED = "as simulated"
     WINDOWS = "from windows at the physical Young's modulus"
     SCALED = "scaled to process time"
     NONE = "not available"
@@ -158,7 +158,7 @@ def judge(
     """
     factor = case.fidelity.speed_factor**quantity.time
     run = own.over(1.0 / factor)
-    scaled = Basis.SCALED if factor != 1.0 else Basis.MEASURED
+    scaled = Basis.SCALED if factor != 1.0 else Basis.SIMULATED
     doubts = changed_settings(case.fidelity)
     if not doubts:
         return Standing(quantity, run, run, scaled, "", reliable)
@@ -223,7 +223,7 @@ def _of_modulus_and_speed(case: CaseOfRun) -> Iterator[str]:
         yield f"Nothing is corrected: {_why_not(case)}."
     if case.lead:
         yield (
-            "Plunge, approach and the beginning of the drag have a reduced modulus; it was raised "
+            "Plunge, approach and the start of the drag have a reduced modulus; it was raised "
             "before the statistics begin."
         )
 

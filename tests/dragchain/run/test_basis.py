@@ -27,15 +27,15 @@ def case(scale: float = 1.0, factor: float = 1.0, **more: Any) -> CaseOfRun:
 @pytest.mark.parametrize(
     ("quantity", "settings", "windows", "basis", "value"),
     [
-        (PLAIN, (1.0, 1.0), None, Basis.MEASURED, 10.0),
+        (PLAIN, (1.0, 1.0), None, Basis.SIMULATED, 10.0),
         (PLAIN, (0.01, 1.0), WINDOWS, Basis.WINDOWS, 8.0),
         (PLAIN, (0.01, 1.0), None, Basis.NONE, None),
         (PLAIN, (1.0, 5.0), None, Basis.NONE, None),
         (PLAIN, (0.01, 5.0), None, Basis.NONE, None),
         (ROBUST, (0.01, 1.0), WINDOWS, Basis.WINDOWS, 8.0),
-        (ROBUST, (0.01, 5.0), None, Basis.MEASURED, 10.0),
+        (ROBUST, (0.01, 5.0), None, Basis.SIMULATED, 10.0),
         (IMPULSE, (1.0, 5.0), None, Basis.SCALED, 50.0),
-        (IMPULSE, (0.01, 1.0), None, Basis.MEASURED, 10.0),
+        (IMPULSE, (0.01, 1.0), None, Basis.SIMULATED, 10.0),
         (RATE, (1.0, 5.0), None, Basis.SCALED, 2.0),
     ],
 )

@@ -416,8 +416,9 @@ def _beside(case: Case, gap: float) -> Iterator[InputError]:
     radius = study.bowl.radius_m - gap - reach
     diameter = 2 * typical_reach(study)
     if gap < diameter:
-        shifted = getattr(study.workpiece.shape, "offset_m", None) is not None
-        centre = "leave workpiece.shape.offset_m out, so that the part's centre is on the axis; or "
+        remedy, shape = "use a smaller path or workpiece, or a wider bowl", study.workpiece.shape
+        if isinstance(shape, MeshShape) and shape.offset_m:
+            remedy = f"leave workpiece.shape.offset_m out: the part is centred then; or {remedy}"
         yield InputError(
             "the workpiece does not fit between its path and the bowl"
             if gap <= 0
@@ -427,7 +428,7 @@ def _beside(case: Case, gap: float) -> Iterator[InputError]:
             value=f"axis up to {reach:.4g} m from the bowl's axis, workpiece radius {radius:.4g} m",
             limit=f"sum at most {study.bowl.radius_m - diameter:.4g} m: the bowl's radius "
             "minus a particle diameter",
-            remedy=f"{centre if shifted else ''}use a smaller path or workpiece, or a wider bowl",
+            remedy=remedy,
         )
 
 

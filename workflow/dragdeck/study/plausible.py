@@ -16,11 +16,11 @@ from dragdeck.study.base import Json, flat
 _FILE = Path(__file__).parents[1] / "data" / "plausible.csv"
 
 _FACTORS = {
-    **{"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "mm/s": 1e-3, "m/min": 1 / 60, "ms": 1e-3, "min": 60.0},
-    **{"GPa": 1e9, "MPa": 1e6, "kHz": 1e3, "1/min": 1 / 60, "g": 1e-3, "mg": 1e-6, "g/cm3": 1e3},
-    **{"rad": 180 / math.pi, "rad/s": 30 / math.pi, "%": 0.01, "cm/s2": 0.01, "mm/s2": 1e-3},
-    **{"kJ/m3": 1e3, "MJ/m3": 1e6, "mN": 1e-3, "mm3/(N m)": 1e-9},
-}
+    "um": 1e-6, "mm": 1e-3, "cm": 1e-2, "mm/s": 1e-3, "m/min": 1 / 60, "ms": 1e-3, "min": 60.0,
+    "GPa": 1e9, "MPa": 1e6, "kHz": 1e3, "1/min": 1 / 60, "g": 1e-3, "mg": 1e-6, "g/cm3": 1e3,
+    "rad": 180 / math.pi, "rad/s": 30 / math.pi, "%": 0.01, "cm/s2": 0.01, "mm/s2": 1e-3,
+    "kJ/m3": 1e3, "MJ/m3": 1e6, "mN": 1e-3, "mm3/(N m)": 1e-9,
+}  # fmt: skip
 """What a unit that a number may be in by mistake is in the unit of the field."""
 
 
