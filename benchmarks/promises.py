@@ -1,6 +1,6 @@
 """Promises of windows in scenes drawn from a seed, against runs at the physical Young's modulus.
 
-    python benchmarks/promises.py draw SEED PROJECT [--scenes 12]     # writes studies
+    python benchmarks/promises.py draw SEED PROJECT [--scenes 12] [--first 0] [--slowest 0.012]
     python benchmarks/promises.py targets PROJECT                     # files for snakemake to make
     python benchmarks/promises.py judge PROJECT OUT.csv               # after the runs
 
@@ -42,7 +42,9 @@ QUANTITIES = [
     "contact_force_p90",
     "sliding_distance",
 ]
-REFERENCE_PACKINGS = 2
+REFERENCE_PACKINGS = 1
+SLOWEST, FASTEST = 0.012, 0.12
+"""Bounds of the inertial number."""
 
 MATERIALS = {
     "glass": (63e9, 0.22, 2500),
@@ -55,7 +57,7 @@ MATERIALS = {
 """Young's modulus, Pa, Poisson's ratio, and density, kg/m3, of common media."""
 
 
-def draw(rng: np.random.Generator, number: int) -> dict[str, Any]:
+def draw(rng: np.random.Generator, number: int, slowest: float) -> dict[str, Any]:
     """A scene as plain data; lengths follow from the particle diameter d.
 
     Workpiece, wall and floor are at least three diameters apart: in narrower gaps, particles jam at
@@ -69,7 +71,7 @@ def draw(rng: np.random.Generator, number: int) -> dict[str, Any]:
     outer = reach + thick / 2 + gap
     height = rng.uniform(7.0, 7.6)
     depth = height - rng.uniform(3.0, 3.4)
-    inertial = math.exp(rng.uniform(math.log(0.012), math.log(0.12)))
+    inertial = math.exp(rng.uniform(math.log(slowest), math.log(FASTEST)))
     speed = inertial * math.sqrt(0.59 * 9.81 * depth * d)
     length = rng.uniform(11.0, 18.0)
     restitution, friction = rng.uniform(0.5, 0.9), rng.uniform(0.15, 0.5)
@@ -132,11 +134,11 @@ def _short(number: float) -> float:
     return float(f"{number:.4g}")
 
 
-def write_studies(seed: int, project: Project, scenes: int) -> None:
+def write_studies(seed: int, project: Project, numbers: range, slowest: float) -> None:
     """Write two studies per scene."""
     rng = np.random.default_rng(seed)
-    for number in range(scenes):
-        data = draw(rng, number)
+    for number in numbers:
+        data = draw(rng, number, slowest)
         asked = {"tolerance": TOLERANCE, "quantity": QUANTITIES}
         _write(project, f"drawn-{number:02d}", {**data, "fidelity": asked})
         (case,) = project.cases(f"drawn-{number:02d}")
@@ -301,11 +303,14 @@ def main() -> None:
     for each in commands.choices.values():
         each.add_argument("project", type=Path)
     drawing.add_argument("--scenes", type=int, default=12)
+    drawing.add_argument("--first", type=int, default=0, help="number of the first scene")
+    drawing.add_argument("--slowest", type=float, default=SLOWEST, help="least inertial number")
     commands.choices["judge"].add_argument("out", type=Path)
     given = parser.parse_args()
     project = Project(given.project.resolve())
     if given.command == "draw":
-        write_studies(given.seed, project, given.scenes)
+        numbers = range(given.first, given.first + given.scenes)
+        write_studies(given.seed, project, numbers, given.slowest)
     elif given.command == "targets":
         for name, files in targets(project):
             print(name, files)
