@@ -44,6 +44,7 @@ from dragchain.report.findings import (
 )
 from dragchain.run.kinematics import (
     drag_start_s,
+    motion_of,
     needed,
     path_passed,
     process_time,
@@ -202,12 +203,13 @@ def process_findings(run: RunData) -> ProcessFindings:
 def _own_torque(run: RunData) -> Floats:
     """Torque of the particles on the workpiece about its own axis, (N,) in N m.
 
-    It does work only if the workpiece turns in the frame of its path.
+    Unless the workpiece turns in the frame of its path, its work is negligible beside the drag's.
     """
     columns = ["step", "direction_rad", *vector("torque", "n_m")]
     step, direction, *torque = read_counted(run.folder, columns)[columns].to_numpy(np.float64).T
     rotation = workpiece_rotation(step.astype(np.int64), direction, run.case)
-    return rotation.into(np.stack(torque, axis=1))[:, 2]
+    axis = motion_of(run.case).drive.own_axis
+    return np.asarray(rotation.into(np.stack(torque, axis=1)) @ axis)
 
 
 def of_classes(

@@ -59,7 +59,7 @@ QUANTITIES = (
     Quantity("drag_std", "standard deviation of the drag", "N"),
     Quantity("lateral_mean", "mean lateral force", "N", robust=True),
     Quantity("vertical_mean", "mean vertical force", "N", robust=True),
-    Quantity("torque_mean", "mean torque about the axis of the workpiece", "N m", robust=True),
+    Quantity("torque_mean", "mean torque about the workpiece's axis", "N m", robust=True),
     Quantity("contact_force_mean", "mean contact force on the workpiece", "N"),
     Quantity("contact_force_p50", "median contact force on the workpiece", "N"),
     Quantity("contact_force_p90", "90th percentile of the contact forces", "N"),

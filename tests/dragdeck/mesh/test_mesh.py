@@ -294,7 +294,7 @@ def test_sharp_angles():
     assert problems(needle(0.6)) == []
     (doubt,) = checks.findings(needle(0.3))
     assert doubt.severity == "warning"
-    assert doubt.value.startswith("0.3 degrees at (13.33, 0, 0) mm, clamp upwards; 1 of 4 facets")
+    assert doubt.value.startswith("0.3 degrees at (13.33, 0, 0) mm, clamp upwards; 2 of 4 facets")
     assert "the angle of a facet is too sharp for LIGGGHTS" in problems(needle(0.2))
 
 

@@ -14,14 +14,7 @@ from pydantic_core import ErrorDetails
 
 from dragdeck.errors import Caution, InputError, RecordError, choices, near, together
 from dragdeck.study.base import Json, Model, flat
-from dragdeck.study.model import (
-    BUILT_IN_FIDELITIES,
-    AnyPath,
-    Fidelity,
-    Scaling,
-    Study,
-    Tolerance,
-)
+from dragdeck.study.model import BUILT_IN_FIDELITIES, AnyPath, Fidelity, Scaling, Study, Tolerance
 from dragdeck.study.plausible import implausible
 from dragdeck.study.recorded import Places, recorded_file, with_recording
 from dragdeck.study.search import Search
