@@ -91,8 +91,8 @@ def top_of_scale(values: Floats, areas: Floats) -> float:
     loaded = values > 0.0
     if not loaded.any():
         return 1.0
-    rule = {"weights": areas[loaded], "method": "inverted_cdf"}
-    return float(np.quantile(values[loaded], 0.95, **rule))
+    weights = areas[loaded]
+    return float(np.quantile(values[loaded], 0.95, weights=weights, method="inverted_cdf"))
 
 
 ABOVE_SCALE = "last colour: larger values, on at most 5 % of the loaded area"

@@ -480,6 +480,6 @@ def _every_key(model: type[Model] = Model) -> set[str]:
 
 def _blocks(annotation: object) -> set[str]:
     """The keys of all models within a type."""
-    own = isinstance(annotation, type) and issubclass(annotation, Model)
-    found = set(annotation.model_fields) if own else set()
-    return found.union(*map(_blocks, get_args(annotation)))
+    if isinstance(annotation, type) and issubclass(annotation, Model):
+        return set(annotation.model_fields)
+    return set().union(*map(_blocks, get_args(annotation)))
