@@ -273,7 +273,7 @@ def _several_bodies(mesh: Trimesh) -> list[Finding]:
     if len(facets) == 1:
         return []
     value = f"{len(facets)} bodies; the largest has {facets.max()} of {len(mesh.faces)} facets"
-    remedy = "join them into one body in CAD, or remove all others, and inner walls, then export again"
+    remedy = "unite them in CAD, or remove all others, and inner walls, then export again"
     limit = "one body: the surface leads from every facet to every other"
     return [Finding("the mesh contains several bodies", value, limit, remedy)]
 
