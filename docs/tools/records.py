@@ -21,7 +21,6 @@ import pandas as pd
 import paper_study
 from pydantic import JsonValue
 
-from dragchain.tradeoff.measures import QUANTITIES
 from dragdeck.project import Project
 from dragdeck.study.base import Json
 
@@ -31,6 +30,7 @@ DATA = ROOT / "docs/data"
 RECORDS = {
     **{name: ROOT / f"workflow/dragdeck/data/{name}.json" for name in ("tradeoff", "stability")},
     "stable_step": ROOT / "workflow/dragdeck/data/stable_step.json",
+    "quantities": ROOT / "analysis/dragchain/tradeoff/quantities.csv",
     **{
         f"scaling/{file.stem}": file
         for file in (ROOT / "analysis/dragchain/scaling/data").glob("*.json")
@@ -46,7 +46,6 @@ RECORDS = {
 COMPUTED: dict[str, Callable[[], pd.DataFrame]] = {
     "paper/contacts": paper_study.paper_contacts,
     "paper/presets": paper_study.paper_presets,
-    "quantities": lambda: pd.DataFrame({"name": x.name, "label": x.label} for x in QUANTITIES),
 }
 """Tables that the code contains."""
 
