@@ -1,18 +1,22 @@
-"""The examples of docs/examples: their studies, pictures and numbers.
+"""The examples of docs/examples, and `quickstart`: their studies, pictures and numbers.
 
 ``run_example`` runs a study to its report, then keeps its summary in ``docs/data/examples`` and
-the pictures of its page in ``docs/examples/images``. Runs that are complete are not repeated.
+the pictures of pages in ``docs/examples/images``. Runs that are complete are not repeated.
 """
 
 import re
 import subprocess
 import sys
+from io import BytesIO
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
+import numpy as np
 import pandas as pd
-import run_records
-from figures.pictures import few_colours
+from PIL import Image
 from records import DATA, ROOT
+
+import dragchain
 
 EXAMPLES: dict[str, dict[str, str]] = {
     "uhlmann2015": {},
@@ -21,7 +25,9 @@ EXAMPLES: dict[str, dict[str, str]] = {
         "load": "process/*/figures/workpiece.png",
         "forces": "process/*/figures/forces.png",
     },
+    "quickstart": {"page": "process/*/network.html"},
     "carousel": {
+        "preview": "preview.png",
         "network": "process/*count-3-????????/figures/network_xy.png",
         "forces": "process/*count-3-????????/figures/forces.png",
     },
@@ -37,7 +43,10 @@ EXAMPLES: dict[str, dict[str, str]] = {
     },
     "removal": {"load": "process/*/figures/workpiece.png"},
 }
-"""Pictures of each example: name, and place in the folder of results."""
+"""Pictures of each example: name, and place in the folder of results; of a page, how it looks."""
+
+BLOCK_S = 0.02
+"""Of which the mean force is kept."""
 
 
 def study_text(name: str) -> str:
@@ -59,6 +68,43 @@ def run_example(study: str) -> None:
     for name, place in EXAMPLES[study].items():
         (file,) = results.glob(place)
         out = ROOT / "docs/examples/images" / f"{study}_{name}.png"
-        out.write_bytes(few_colours(file))
+        out.write_bytes(few_colours(file if file.suffix == ".png" else photographed(file)))
     if study == "uhlmann2015":
-        run_records.main()
+        keep_run(DATA / "validation")
+
+
+def photographed(page: Path) -> BytesIO:
+    """A page as Chromium shows it."""
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "page.png"
+        subprocess.run(
+            ["chromium", "--headless", "--no-sandbox", "--hide-scrollbars",
+             "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
+             "--virtual-time-budget=8000", "--window-size=1366,820", f"--screenshot={file}",
+             f"--user-data-dir={folder}/profile", page.as_uri()],
+            check=True, capture_output=True,
+        )  # fmt: skip
+        return BytesIO(file.read_bytes())
+
+
+def few_colours(picture: Path | BytesIO) -> bytes:
+    """The same picture as PNG of few colours."""
+    content = BytesIO()
+    with Image.open(picture) as drawn:
+        drawn.convert("RGB").quantize(dither=Image.Dither.NONE).save(content, "png", optimize=True)
+    return content.getvalue()
+
+
+def keep_run(out: Path) -> None:
+    """Write summary, force over time and facets of the workpiece of uhlmann2015 into a folder."""
+    study = dragchain.load(str(ROOT / "results/uhlmann2015"))
+    (run,) = study.runs
+    study.summary.to_csv(out / "run.csv", index=False, float_format="%.6g")
+    force = run.force[run.force["phase"] == "drag"]
+    block = np.floor(force["time_s"] / BLOCK_S).astype(int)
+    means = force.groupby(block)[["time_s", "drag_n", "lateral_n"]].mean()
+    means["time_s"] -= force["time_s"].iloc[0]
+    means.to_csv(out / "run_force.csv", index=False, float_format="%.5g")
+    names = [*(f"centre_{axis}_m" for axis in "xyz"), "area_m2", "force_slide_n_m"]
+    facets = run.table("facets", [*names, "force_slide_pa"])
+    facets.to_csv(out / "run_facets.csv", index=False, float_format="%.5g")
