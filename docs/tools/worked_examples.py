@@ -13,37 +13,14 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import pandas as pd
+import yaml
 from PIL import Image
 from records import DATA, ROOT
 
 import dragchain
 
-EXAMPLES: dict[str, dict[str, str]] = {
-    "uhlmann2015": {},
-    "planetary_cutter": {
-        "preview": "preview.png",
-        "load": "process/*/figures/workpiece.png",
-        "forces": "process/*/figures/forces.png",
-    },
-    "quickstart": {"page": "process/*/network.html"},
-    "carousel": {
-        "preview": "preview.png",
-        "network": "process/*count-3-????????/figures/network_xy.png",
-        "forces": "process/*count-3-????????/figures/forces.png",
-    },
-    "tilted_stream": {
-        "preview": "preview.png",
-        "upright": "process/*tilt_deg-0-*/figures/workpiece.png",
-        "tilted": "process/*tilt_deg-10-*/figures/workpiece.png",
-    },
-    "mixture": {
-        "preview": "preview.png",
-        "network": "process/*/figures/network_xz.png",
-        "depth": "process/*/figures/force_depth.png",
-    },
-    "removal": {"load": "process/*/figures/workpiece.png"},
-}
-"""Pictures of each example: name, and place in the folder of results; of a page, how it looks."""
+EXAMPLES: dict[str, dict[str, str]] = yaml.safe_load((ROOT / "docs/examples.yaml").read_text())
+"""Pictures of each example by name, and their place in the folder of its results."""
 
 BLOCK_S = 0.02
 """Of which the mean force is kept."""
