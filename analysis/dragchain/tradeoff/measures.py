@@ -4,11 +4,9 @@ The counted path is cut into blocks of about one mean particle diameter; each
 quantity has one value a block. A run's value is the mean over its blocks.
 """
 
-import csv
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +14,7 @@ from pydantic import JsonValue
 
 from dragchain.arrays import Floats
 from dragdeck.documents import Document, Part
+from dragdeck.files import table_rows
 from dragdeck.records.case import FidelityOfRun
 from dragdeck.records.run import AcceptanceCheck
 
@@ -52,15 +51,15 @@ class Measurand:
         return math.sqrt(mean) if self.squared else mean
 
 
-def _read_quantities() -> Iterator[Measurand]:
-    """The rows of ``quantities.csv``, in which `|` is where a word may break."""
-    with Path(__file__).with_name("quantities.csv").open(encoding="utf-8", newline="") as file:
-        for name, label, unit, short, kind in islice(csv.reader(file), 1, None):
-            short = short.replace("|", "\N{SOFT HYPHEN}")
-            yield Measurand(name, label, unit, short, kind == "squared", kind == "signed")
+def _quantity(name: str, label: str, unit: str, short: str, kind: str) -> Measurand:
+    """A row of ``quantities.csv``, in which `|` is where a word may break."""
+    head = short.replace("|", "\N{SOFT HYPHEN}")
+    return Measurand(name, label, unit, head, kind == "squared", kind == "signed")
 
 
-QUANTITIES = tuple(_read_quantities())
+QUANTITIES = tuple(
+    _quantity(**row) for row in table_rows(Path(__file__).with_name("quantities.csv"))
+)
 """All but the last two have a value for every block of the path."""
 
 MAIN = tuple(quantity.name for quantity in QUANTITIES if quantity.short)
