@@ -225,7 +225,7 @@ def judge(projects: Sequence[Project], out: Path) -> None:
     off = table["error"].abs() > TOLERANCE
     table = table.assign(
         kept=table["reached"] & ~off,
-        off=np.where(table["reached"], table["error"].abs(), 0.0),
+        off=table["error"].abs().where(table["reached"]),
         by_chance=np.where(table["reached"], 2.0 * norm.sf(TOLERANCE / spread), 0.0),
         saving=table["plain_cpu_time_s"] / table["cpu_time_s"],
     )
