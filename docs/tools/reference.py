@@ -61,8 +61,9 @@ def command_sections(parser: argparse.ArgumentParser) -> str:
 def _commands(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
-            for command in action.choices.values():
-                yield from _commands(command)
+            for name, command in action.choices.items():
+                if name != "step":  # what only rules call
+                    yield from _commands(command)
             return
     yield parser
 
@@ -169,7 +170,9 @@ def _fields(
         path = f"{prefix}{name}"
         inner = list(_models(field.annotation))
         if not inner or any(get_args(part)[:1] == (str,) for part in _parts(field.annotation)):
-            yield path, *_usual(path, _limits(field)), _default(field), field.description or ""
+            numbers = path if not _is_row(field.annotation) else f"{path}.0"
+            usual = "" if isinstance(field.default, str) else numbers
+            yield path, *_usual(usual, _limits(field)), _default(field), field.description or ""
         known = [seen[part] for part, _ in inner if part in seen]
         if known:
             place = f"{path}.*" if inner[0][1] else path
@@ -180,6 +183,11 @@ def _fields(
             kind = f"[{_kind(part)}]" if len(inner) > 1 else ""
             seen[part] = f"{path}{kind}"
             yield from _fields(part, f"{path}{kind}.{'*.' if many else ''}", seen)
+
+
+def _is_row(annotation: Any) -> bool:
+    """Whether it is several numbers, such as x and y."""
+    return get_origin(annotation) is tuple and get_origin(get_args(annotation)[0]) is not tuple
 
 
 def _parts(annotation: Any) -> tuple[Any, ...]:
@@ -214,7 +222,7 @@ _SIGNS = {Gt: ("above", "gt"), Ge: ("at least", "ge"), Lt: ("below", "lt"), Le: 
 def _limits(field: FieldInfo) -> str:
     """Limits of a field in words; those of a model stand with its own fields."""
     if get_origin(field.annotation) is Literal:
-        return " or ".join(f"`{value}`" for value in get_args(field.annotation))
+        return ", ".join(f"`{value}`" for value in get_args(field.annotation))
     parts = [part for part in _parts(field.annotation) if part is not types.NoneType]
     if parts and all(get_origin(part) is Annotated for part in parts):
         plain = [part for part in parts if not list(_models(get_args(part)[0]))]
@@ -225,9 +233,13 @@ def _limits(field: FieldInfo) -> str:
         for words, name in [_SIGNS.get(type(item), ("", ""))]
         if name
     ]
-    lengths = [item.min_length for item in field.metadata if isinstance(item, MinLen)]
-    lengths += [item.max_length for item in field.metadata if isinstance(item, MaxLen)]
-    return ", ".join([*found, *([f"{' to '.join(map(str, lengths))} entries"] if lengths else [])])
+    low = [f"{item.min_length}" for item in field.metadata if isinstance(item, MinLen)]
+    high = [f"{item.max_length}" for item in field.metadata if isinstance(item, MaxLen)]
+    if low or high:
+        words = " to " if low and high else ""
+        ends = [*low, *high] if words else [f"{n} or more" for n in low] + [f"up to {n}" for n in high]
+        found.append(f"{words.join(ends)} entries")
+    return ", ".join(found)
 
 
 _BOUND = re.compile(r"(above|at least|below|at most) ([^ ,]+),? ?")

@@ -21,7 +21,7 @@ class RestPath(AroundBowl):
     one_direction: ClassVar[bool] = True
 
     kind: Literal["rest"] = Field(
-        description="rest: the workpiece stands still and the bowl rotates"
+        description="the workpiece stands still, the bowl rotates"
     )
     radius_m: Positive = Field(description="distance between the axes of workpiece and bowl, m")
     bowl_rpm: Number = Field(
