@@ -78,8 +78,8 @@ COMMANDS = (
                   help="overwrite an earlier export (default: refuse to)")),
             "dragchain export results/uhlmann2015/process/RUN --to paraview --every 10"),
     Command("project", "project load and removal on a mesh of your own",
-            "Project the load on the workpiece, and the removal if the study has a law, onto a mesh "
-            "of your own; sums are conserved. It reads the tables of the runs and writes "
+            "Project the load on the workpiece, and the removal if the study has a law, onto a "
+            "mesh of your own; sums are conserved. It reads the tables of the runs and writes "
             "projection.vtu, .csv and .parquet to the folder.",
             "report.projection:write_projection", (
         OUT_DIR,
@@ -100,7 +100,7 @@ COMMANDS = (
             "report.study_report:write_study_report", (
         OUT_DIR, RUN_DIRS,
         Argument("--advice", type=Path, metavar="FILE",
-                  help="advice.json of dragdeck advise, to compare forecast costs with the actual ones"),
+                  help="advice.json of dragdeck advise, to compare forecast and actual costs"),
         Argument("--preview", type=Path, metavar="FILE",
                   help="picture of the set-up: set_up.png of dragdeck preview"),
         Argument("--signal", type=Path, metavar="FILE",

@@ -233,12 +233,11 @@ def _limits(field: FieldInfo) -> str:
         for words, name in [_SIGNS.get(type(item), ("", ""))]
         if name
     ]
-    low = [f"{item.min_length}" for item in field.metadata if isinstance(item, MinLen)]
-    high = [f"{item.max_length}" for item in field.metadata if isinstance(item, MaxLen)]
+    low = [item.min_length for item in field.metadata if isinstance(item, MinLen)]
+    high = [item.max_length for item in field.metadata if isinstance(item, MaxLen)]
     if low or high:
-        words = " to " if low and high else ""
-        ends = [*low, *high] if words else [f"{n} or more" for n in low] + [f"up to {n}" for n in high]
-        found.append(f"{words.join(ends)} entries")
+        least = f"{low[0]} to {high[0]}" if low and high else f"up to {high[0]}" if high else ""
+        found.append(f"{least or f'{low[0]} or more'} entries")
     return ", ".join(found)
 
 
@@ -281,12 +280,11 @@ def _default(field: FieldInfo) -> str:
 
 
 def fidelities() -> str:
-    """The built-in fidelities and their settings."""
-    names = list(Fidelity.model_fields)
-    rows = []
-    for name, fidelity in BUILT_IN_FIDELITIES.items():
-        settings = [getattr(fidelity, field) for field in names]
-        rows.append([f"`{name}`", *("none" if one is None else f"{one:g}" for one in settings)])
+    """The built-in fidelities and the settings in which they differ."""
+    found = {name: fidelity.model_dump() for name, fidelity in BUILT_IN_FIDELITIES.items()}
+    names = [name for name in Fidelity.model_fields
+             if len({str(one.get(name)) for one in found.values()}) > 1]  # fmt: skip
+    rows = [[f"`{name}`", *(f"{one[field]:g}" for field in names)] for name, one in found.items()]
     return markdown_table(["name", *names], rows)
 
 

@@ -8,8 +8,8 @@ from dragdeck.command_line import Argument, Command, Program
 STUDY = Argument("study", metavar="STUDY", help="name of the study: a folder in studies/")
 FIDELITY = Argument(
     "--fidelity", metavar="NAME",
-    help="settings: draft, standard, fine, full, reference, or a name under fidelities in the study "
-    "(default: those of the study)",
+    help="settings: draft, standard, fine, full, reference, or a name under fidelities in the "
+    "study (default: those of the study)",
 )  # fmt: skip
 PLAN = Argument(
     "--plan", metavar="NAME",

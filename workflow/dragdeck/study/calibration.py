@@ -34,7 +34,9 @@ class Drum(Model):
     It turns about its horizontal axis.
     """
 
-    angle_deg: Measured = Field(description="angle of the moving surface to the horizontal, degrees")
+    angle_deg: Measured = Field(
+        description="angle of the moving surface to the horizontal, degrees"
+    )
     angle_std_deg: Positive = Field(description="its standard uncertainty, degrees")
     radius_m: Positive = Field(description="inner radius of the drum, under the glued layer, m")
     width_m: Positive = Field(description="distance between its end plates, m")
@@ -56,7 +58,8 @@ class Angles(Model):
         default=(0.05, 1.0), description="range of the friction coefficient, with equal probability"
     )
     rolling_friction: tuple[Positive, Positive] = Field(
-        default=(0.005, 0.4), description="range of the coefficient of rolling friction, with equal probability"
+        default=(0.005, 0.4),
+        description="range of the coefficient of rolling friction, with equal probability",
     )
     repose: Repose | None = None
     drum: Drum | None = None
@@ -106,7 +109,8 @@ class Calibration(Model):
     )
     peaks: Literal["auto", "yes", "no"] = Field(
         default="auto",
-        description="whether ratios of peak forces are fitted, too; auto: if the sensor is fast enough",
+        description="whether ratios of peak forces are fitted, too; auto: if the sensor is fast "
+        "enough",
     )
     angles: Angles | None = Field(default=None, exclude_if=lambda value: value is None)
 

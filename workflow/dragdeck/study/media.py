@@ -77,8 +77,9 @@ class Grains(Model):
     )
     sieve: Annotated[list[Sieve], Field(min_length=2, max_length=MOST_SIEVES)] | None = Field(
         default=None,
-        description="sieve analysis instead of radius_mean_m: rows [diameter in m, finer fraction of the "
-        "mass], linear in between; or a CSV file with the columns diameter_m and mass_passing",
+        description="sieve analysis instead of radius_mean_m: rows [diameter in m, finer fraction "
+        "of the mass], linear in between; or a CSV file with the columns diameter_m and "
+        "mass_passing",
         exclude_if=_none,
     )
     shape: AnyShape | None = Field(

@@ -99,14 +99,14 @@ class Motion(Superposed):
     path: Annotated[AnyPath, Field(discriminator="kind")]
     speed_m_s: Positive | None = Field(
         default=None,
-        description="speed of the workpiece's axis along the path, m/s; required except for `rest` and "
-        "`waypoints`",
+        description="speed of the workpiece's axis along the path, m/s; required except for `rest` "
+        "and `waypoints`",
     )
     ramp_s: NonNegative = Field(
         default=0.0,
         exclude_if=lambda value: value == 0,
-        description="duration of the start from rest along the path, s, with `speed_factor` 1; excluded "
-        "from all statistics; not for `rest` and `waypoints`",
+        description="duration of the start from rest along the path, s, with `speed_factor` 1; "
+        "excluded from all statistics; not for `rest` and `waypoints`",
     )
     immersion_depth_m: Positive = Field(description="depth of the tip below the settled surface, m")
     orientation: Literal["follow_path", "fixed"] = Field(
@@ -121,8 +121,8 @@ class Motion(Superposed):
     )
     plunge_at_m: tuple[Number, Number] | None = Field(
         default=None,
-        description="x and y of the immersion, m; none: the bowl's axis for a circle, otherwise the "
-        "start of the path",
+        description="x and y of the immersion, m; none: the bowl's axis for a circle, otherwise "
+        "the start of the path",
     )
     plunge_speed_m_s: Positive = Field(
         default=0.05, description="vertical speed during the plunge, m/s"
@@ -257,8 +257,7 @@ class Filling(Model):
         description="settling criterion: largest mean kinetic energy per particle / (m g d)",
     )
     max_time_s: Positive = Field(
-        default=10.0,
-        description="the run is rejected if the packing has not settled after this simulated time, s",
+        default=10.0, description="simulated time after which an unsettled packing is rejected, s"
     )
 
 
@@ -279,8 +278,8 @@ class Outputs(Model):
     )
     first_touch_fraction: Annotated[Number, Field(ge=0, le=1)] = Field(
         default=0,
-        description="fraction of the drag, at its end, in which contacts on the workpiece are written "
-        "at every step, for the velocity at first touch",
+        description="fraction of the drag, at its end, in which contacts on the workpiece are "
+        "written at every step, for the velocity at first touch",
         exclude_if=lambda value: value == 0,
     )
 
@@ -329,8 +328,8 @@ class Windows(Model):
     """Short runs at physical stiffness along the path, until quantities are known well enough."""
 
     tolerance: Annotated[Number, Field(ge=1e-4, lt=1)] = Field(
-        description="relative half-width of the 95 % confidence interval at which no further window is "
-        "run"
+        description="relative half-width of the 95 % confidence interval at which no further "
+        "window is run"
     )
     quantities: Annotated[list[Quantity], Field(min_length=1)] = Field(
         default=["drag_mean"], description="quantities to which the tolerance applies"
@@ -482,16 +481,11 @@ AnyFidelity = Annotated[
 class Scaling(Model):
     """A power law of the mean drag as a function of one sweep field."""
 
-    field: str = Field(
-        description="dotted name of the `sweep` field; its values must be above 0"
-    )
-    expected_exponent: Number | None = Field(
-        default=None, description="expected exponent"
-    )
+    field: str = Field(description="dotted name of the `sweep` field; its values must be above 0")
+    expected_exponent: Number | None = Field(default=None, description="expected exponent")
     source: str | None = Field(default=None, description="source of the expected exponent")
     fit_range: tuple[Positive, Positive] | None = Field(
-        default=None,
-        description="lowest and highest value at which it is expected; none: all",
+        default=None, description="lowest and highest value at which it is expected; none: all"
     )
 
     @model_validator(mode="after")
@@ -518,8 +512,8 @@ class Accepted(Model):
 
     unsafe_timestep: Line | None = Field(
         default=None,
-        description="reason for a time step that is forecast to be unstable, and for accepting its run; "
-        "shown in the report",
+        description="reason for a time step that is forecast to be unstable, and for accepting its "
+        "run; shown in the report",
     )
     cases: Annotated[Whole, Field(ge=1)] = Field(
         default=200, description="largest number of cases of `sweep`"

@@ -40,12 +40,17 @@ class Signal(Model):
         default=(), description="stretches without load, s: one for the offset, two for a drift too"
     )
     starts_at_s: Number | None = Field(
-        default=None, description="start of the drag, s; none: found after the first stretch of `rest_s`"
+        default=None,
+        description="start of the drag, s; none: found after the first stretch of `rest_s`",
     )
     ends_at_s: Number | None = Field(
-        default=None, description="end of the drag, s; none: the second stretch of `rest_s`, or the end of the file"
+        default=None,
+        description="end of the drag, s; none: the second stretch of `rest_s`, or the end of the "
+        "file",
     )
-    low_pass_hz: Positive = Field(description="bandwidth of the comparison, Hz: at most a fifth of both rates")
+    low_pass_hz: Positive = Field(
+        description="bandwidth of the comparison, Hz: at most a fifth of both rates"
+    )
     margin: Annotated[Number, Field(gt=0, lt=1)] = Field(
         default=0.1, description="largest relative difference that is called equivalent"
     )

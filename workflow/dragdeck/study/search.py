@@ -42,15 +42,15 @@ class SearchedMeasure(Model):
     """A quantity of a process, of the whole workpiece or of a part of its surface."""
 
     quantity: SearchedQuantity = Field(
-        description="`removal_depth` (mean over the immersed surface, um/h), `removal_variation` (its "
-        "coefficient of variation), `minutes` (to `removal.target_depth_m` on average), "
+        description="`removal_depth` (mean over the immersed surface, um/h), `removal_variation` "
+        "(its coefficient of variation), `minutes` (to `removal.target_depth_m` on average), "
         "`minutes_slowest` (on 95 % of the surface), `peak_pressure` (95th percentile over first "
         "touches, Pa), or a quantity of the report, in its unit"
     )
     heights_m: tuple[Number, Number] | None = Field(
         default=None,
-        description="for `removal_*`: two heights above the tip between which the surface counts, m; "
-        "none: all of it",
+        description="for `removal_*`: two heights above the tip between which the surface counts, "
+        "m; none: all of it",
     )
 
     @model_validator(mode="after")
@@ -75,7 +75,8 @@ class Objective(SearchedMeasure):
     """What is to be as small or large as possible, or near a value."""
 
     goal: Literal["minimise", "maximise", "target"] = Field(
-        default="minimise", description="whether the quantity is minimised, maximised, or brought to `value`"
+        default="minimise",
+        description="whether the quantity is minimised, maximised, or brought to `value`",
     )
     value: Number | None = Field(default=None, description="target value")
 

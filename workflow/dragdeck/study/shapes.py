@@ -63,7 +63,8 @@ class CylinderParticle(ParticleShape):
     aspect: _Aspect = Field(description="length / diameter")
     cut_deg: Annotated[Number, Field(ge=0, le=60)] = Field(
         default=0.0,
-        description="angle of the two parallel end faces from those of a straight cylinder, degrees",
+        description="angle of the two parallel end faces from those of a straight cylinder, "
+        "degrees",
         exclude_if=lambda value: not value,
     )
 
@@ -142,8 +143,8 @@ class MeshParticle(ParticleShape):
     points: Annotated[
         tuple[tuple[Number, Number, Number], ...], Field(min_length=4, max_length=MOST_CORNERS)
     ] = Field(
-        description="file beside the study with a closed, convex surface, for example STL; or a list of "
-        "corners"
+        description="file beside the study with a closed, convex surface, for example STL; or a "
+        "list of corners"
     )
 
     def corners(self) -> Corners:

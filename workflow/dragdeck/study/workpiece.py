@@ -26,28 +26,27 @@ class MeshShape(Model):
 
     kind: Literal["mesh"] = Field(description="part from a file")
     file: Line = Field(
-        description="file in STL, OBJ, PLY, VTK, VTU or STEP format, relative to the study or to meshes/"
+        description="file in STL, OBJ, PLY, VTK, VTU or STEP format, relative to the study or to "
+        "meshes/"
     )
-    unit: Literal["m", "cm", "mm", "um", "in"] = Field(
-        description="unit of length in the file"
-    )
+    unit: Literal["m", "cm", "mm", "um", "in"] = Field(description="unit of length in the file")
     facet_size_m: Positive | None = Field(
         default=None,
         description="target edge length of the mesh of a STEP part, m; required for STEP only",
     )
     edge_facet_size_m: Positive | None = Field(
-        default=None,
-        description="the same at sharp edges, m; none: `facet_size_m`",
+        default=None, description="the same at sharp edges, m; none: `facet_size_m`"
     )
     axis: Literal["+x", "-x", "+y", "-y", "+z", "-z"] = Field(
         default="+z",
         exclude_if=lambda value: value == "+z",
-        description="direction in the file from tip to clamp; the part is turned until it points up, "
-        "about y for x, about x for the others",
+        description="direction in the file from tip to clamp; the part is turned until it points "
+        "up, about y for x, about x for the others",
     )
     offset_m: tuple[Number, Number] | None = Field(
         default=None,
-        description="x and y of the clamping axis after this turn, m; none: centre of the bounding box",
+        description="x and y of the clamping axis after this turn, m; none: centre of the bounding "
+        "box",
     )
 
 
@@ -76,7 +75,8 @@ class Carousel(Model):
 
     count: Annotated[Whole, Field(ge=1, le=12)] | None = Field(
         default=None,
-        description="number of workpieces with `workpiece.shape` at equal angles; either this or a list",
+        description="number of workpieces with `workpiece.shape` at equal angles; either this or a "
+        "list",
     )
     each: list[Station] | None = Field(default=None, min_length=1, max_length=12)
 

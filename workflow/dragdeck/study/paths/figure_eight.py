@@ -22,8 +22,7 @@ class FigureEightPath(FromPlace):
     )
     radius_m: Positive = Field(description="radius of both circles, m")
     middle_m: tuple[Number, Number] = Field(
-        default=(0.0, 0.0),
-        description="x and y where the circles touch and the drag starts, m",
+        default=(0.0, 0.0), description="x and y where the circles touch and the drag starts, m"
     )
     direction_deg: Number = Field(
         default=0.0,

@@ -23,9 +23,7 @@ class LinePath(FromPlace):
     start_m: tuple[Number, Number] = Field(
         description="x and y of the workpiece's axis at the start of the drag, m"
     )
-    direction_deg: Number = Field(
-        default=0.0, description="direction of motion, from +x, degrees"
-    )
+    direction_deg: Number = Field(default=0.0, description="direction of motion, from +x, degrees")
     length_m: Positive = Field(description="length of the drag, m")
 
     def words(self, number: Callable[[float], str]) -> str:

@@ -16,9 +16,7 @@ class Oscillation(SuperposedMotion):
 
     kind: ClassVar[str] = "oscillation"
 
-    amplitude_m: Positive = Field(
-        description="amplitude about the immersion depth, m"
-    )
+    amplitude_m: Positive = Field(description="amplitude about the immersion depth, m")
     frequency_hz: Positive = Field(description="frequency, Hz")
 
     def faster(self, factor: float) -> Self:
