@@ -24,7 +24,7 @@ from dragdeck.cli import PROGRAM as DRAGDECK
 from dragdeck.study.model import BUILT_IN_FIDELITIES, Fidelity, Study
 from dragdeck.study.plausible import plausible_range
 
-NUMBERS = re.compile(r"[-+x ]*\d[\d., %]*(e[-+]\d+)?( \(.*\))?|")
+NUMBERS = re.compile(r"[-+\u00d7 ]*\d[\d., %]*(e[-+]\d+)?( \(.*\))?|")
 
 
 def markdown_table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -159,7 +159,8 @@ def _named(names: Sequence[str]) -> str:
     for name in names:
         stem, kind, leaf = re.fullmatch(r"(.*?)(?:\[(.*)\](.*))?", name).groups("")
         kinds.setdefault(stem + (f"[%s]{leaf}" if kind else ""), []).append(kind)
-    return ", ".join(f"`{stem.replace('%s', ','.join(found))}`" for stem, found in kinds.items())
+    several = {stem: ",".join(found) if len(found) < 4 else "any" for stem, found in kinds.items()}
+    return ", ".join(f"`{stem.replace('%s', kind)}`" for stem, kind in several.items())
 
 
 def _fields(
