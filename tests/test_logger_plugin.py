@@ -12,10 +12,11 @@ from snakemake.logging import DefaultFormatter
 from snakemake_interface_logger_plugins.common import LogEvent
 from snakemake_interface_logger_plugins.registry import LoggerPluginRegistry
 
+from dragdeck.engine.status import RunStatus
 from dragdeck.outlook.explain import Cost
 from dragdeck.outlook.runs import StudyRun
 from dragdeck.records.run import RunPart, RunRecord
-from snakemake_logger_plugin_dragdeck import LogHandler, LogHandlerSettings
+from snakemake_logger_plugin_dragdeck import LogHandler, LogHandlerSettings, _Job
 
 FLAGS = ("stdout", "nocolor", "dryrun", "printshellcmds", "verbose", "debug_dag")
 RUN = "results/small/process/a[bold]b-12345678"
@@ -133,6 +134,21 @@ def test_runs_of_no_study_do_not_end_the_display(
     assert shown.handler._overall([]) == "13 of 52 jobs done"
     shown.handler._console.print(shown.handler._screen())
     assert shown.text.splitlines()[-1].split() == ["━━━━━", "13", "of", "52", "jobs", "done"]
+
+
+def test_a_run_far_slower_than_estimated_is_told_on_a_terminal(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    status = RunStatus("running", step=40, last=1000, steps_per_s=1.0)
+    monkeypatch.setattr("dragdeck.outlook.runs.run_status", lambda folder: status)
+    shown = Shown()
+    for wall_s in (100.0, 900.0):
+        cost = Cost(1000, wall_s, "assumed")
+        plan = [StudyRun("process", Path.cwd() / RUN, None, 2, cost, 1e6)]
+        shown.log("", shown=True, plan=plan, cores=2)
+        shown.handler._jobs = {1: _Job("run_process", Path.cwd() / RUN, prints=False)}
+        shown.handler._console.print(shown.handler._screen())
+    assert shown.text.count("12345678: 10 times slower than estimated: other") == 1
 
 
 def test_a_record_that_cannot_be_shown_does_not_end_the_display(

@@ -114,6 +114,39 @@ def test_check_names_the_problems_of_all_scenes_with_their_lines(
         assert any(f"study.yaml:{line}: " in row and problem in row for row in said.splitlines())
 
 
+def test_check_ends_with_its_verdict_whatever_is_wrong(
+    case: Case, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    data = yaml.safe_load(case.file.read_text())
+    path, spun = {"path": WIDE}, {"spin_rpm": 5, "immersion_m": 1}
+    for study, motion, errors in (
+        ("small", {}, "1 error"),  # no LIGGGHTS
+        ("small", path, "1 error"),
+        ("small", spun, "2 errors"),
+        ("large", {}, "1 error"),
+    ):
+        edited(case, motion=data["motion"] | motion)
+        monkeypatch.setenv("DRAGDECK_ENGINE", "/none")
+        assert main(["check", study]) == 1
+        said = capsys.readouterr().err
+        assert said.splitlines()[-1] == f"dragdeck: {study}: {errors}; it cannot be run"
+        assert ("did you mean 'spin.rpm'?" in said) == (motion is spun)
+
+
+@pytest.mark.engine
+@pytest.mark.parametrize(
+    ("fidelity", "warned"),
+    [({"ranks": 1}, True), ({"ranks": 1, "timestep_fraction": 0.2}, False), ("draft", False)],
+)
+def test_a_block_that_drops_a_named_fidelity_is_warned_of(
+    case: Case, capsys: pytest.CaptureFixture[str], fidelity: object, warned: bool
+) -> None:
+    edited(case, fidelity=fidelity)
+    assert main(["check", "small"]) == 0
+    said = capsys.readouterr().out
+    assert ("add youngs_modulus_scale: 0.001 and timestep_fraction: 0.6" in said) == warned
+
+
 WIDE = {"kind": "circle", "radius_m": 0.0215, "revolutions": 0.1}
 
 

@@ -102,4 +102,5 @@ def _workpiece(folder: Path) -> None:
     loads = np.random.default_rng(3).random((3, mesh.n_cells)) * [[2000.0], [15000.0], [800.0]]
     names = ("force_slide_pa", "mean_pressure_pa", "friction_work_pa")
     facets = pd.DataFrame(dict(zip(names, loads, strict=True)))
-    save(facets.assign(facet_id=np.arange(mesh.n_cells)), folder, "facets")
+    area = mesh.compute_cell_sizes()["Area"]
+    save(facets.assign(facet_id=np.arange(mesh.n_cells), area_m2=area), folder, "facets")

@@ -78,6 +78,16 @@ def _scene_type(name: str) -> SceneType:
 
 def check(study: str, fidelity: str | None, verbose: bool) -> None:
     """Build every input script of a study and look for LIGGGHTS; run nothing."""
+    try:
+        _check(study, fidelity, verbose)
+    except DragdeckError as wrong:
+        say(f"dragdeck: {wrong}")
+        count = 1 + len(wrong.more if isinstance(wrong, InputError) else ())
+        errors = f"{count} error{'s' if count > 1 else ''}"
+        raise DragdeckError(f"{study}: {errors}; it cannot be run") from None
+
+
+def _check(study: str, fidelity: str | None, verbose: bool) -> None:
     project = find_project(Path.cwd())
     every = project.cases(study, fidelity)
     found = _Findings(environment(project.templates, study_templates(every[0])))
@@ -88,15 +98,11 @@ def check(study: str, fidelity: str | None, verbose: bool) -> None:
     ]
     if not found.errors:
         found.errors += idle(found.overriding - found.effective, found.templates)
-    warned = f"{len(found.warnings) or 'no'} warning{'' if len(found.warnings) == 1 else 's'}"
-    if found.errors:
-        wrong = together(found.errors)
-        say(f"dragdeck: {wrong}")
-        found.show(verbose)
-        errors = f"{1 + len(wrong.more)} error{'s' if wrong.more else ''}"
-        raise DragdeckError(f"{study}: {errors}, {warned}; it cannot be run")
     found.show(verbose)
+    if found.errors:
+        raise together(found.errors)
     engine = find_engine()
+    warned = f"{len(found.warnings) or 'no'} warning{'' if len(found.warnings) == 1 else 's'}"
     cost, *scenes = plan_in_words(runs, cores_here())
     print(*(f"  {line}" for line in scenes), sep="\n")
     print(f"{study}: no errors, {warned}; {len(every)} case(s), {cost}; LIGGGHTS {engine.version}")

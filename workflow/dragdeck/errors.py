@@ -175,6 +175,7 @@ CautionCode = Literal[
     "class",
     "cohesion",
     "facets",
+    "fidelity",
     "gap",
     "implausible",
     "mesh",

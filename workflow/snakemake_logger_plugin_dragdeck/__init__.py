@@ -201,7 +201,8 @@ class LogHandler(LogHandlerBase):
         runs = self._together(active)
         done = done_fraction(runs) if runs else self._done / max(1, self._all)
         overall.add_row(ProgressBar(1.0, done, width=_BAR), Text(self._overall(active)))
-        return Group(lines, overall) if active else Group(overall)
+        slow = [Text(f"{run.name}: {run.slow}") for run in active if run.slow]
+        return Group(lines, *slow, overall) if active else Group(overall)
 
     def _together(self, active: list[StudyRun]) -> list[StudyRun]:
         """All runs of which it is known what to expect."""

@@ -19,6 +19,7 @@ from matplotlib.text import Text
 from matplotlib.typing import RcKeyType
 from PIL import Image
 
+from dragchain.arrays import Floats
 from dragdeck.files import write_bytes
 
 COLOURS: Mapping[str, str] = json.loads(
@@ -75,6 +76,26 @@ def force_map() -> Colormap:
     """The colour map of forces and loads: the paper's where matplotlib's default is set to it."""
     paper = matplotlib.rcParams["image.cmap"] == PAPER_COLOURS.name
     return PAPER_COLOURS if paper else FORCE_COLOURS
+
+
+def top_of_scale(values: Floats, areas: Floats) -> float:
+    """Where the colour scale of a load map ends: what 95 % of the loaded area stays below.
+
+    Single facets, small or needle-like, do not set the colours of all others.
+
+    Parameters
+    ----------
+    values, areas : (N,) array
+        Load of each facet, and its area.
+    """
+    loaded = values > 0.0
+    if not loaded.any():
+        return 1.0
+    weights = areas[loaded]
+    return float(np.quantile(values[loaded], 0.95, weights=weights, method="inverted_cdf"))
+
+
+ABOVE_SCALE = "last colour: larger values, on at most 5 % of the loaded area"
 
 
 def drawing() -> AbstractContextManager[None]:

@@ -16,7 +16,7 @@ from dragchain.arrays import Floats
 from dragchain.drag import AZIMUTH_BINS, circumference, parts
 from dragchain.figures.panels import depth_bars, head, new_panels
 from dragchain.figures.rendering import Camera, Image, check_rendering, new_plotter, photograph
-from dragchain.figures.style import GREY, WIDTH_IN, force_map
+from dragchain.figures.style import ABOVE_SCALE, GREY, WIDTH_IN, force_map, top_of_scale
 from dragchain.loading.document import Loading, Profile
 from dragchain.loading.samples import Sampled, as_polydata, patches
 from dragchain.loading.summary import DEPTH_BINS
@@ -62,10 +62,11 @@ def workpiece_figure(
     widths = [1.0, 1.0, 2.8, 2.4] if cylinder else [1.0] * 4 + [1.4]
     bins = _unrolled_bins(sampled, case) if cylinder else None
     if bins is not None and not spins(case):
-        largest, mesh = float(np.quantile(bins.load_pa, 0.99)) or 1.0, _rolled(bins, case)
+        load, mesh = bins.load_pa.ravel(), _rolled(bins, case)
+        largest = top_of_scale(load, np.ones_like(load))
     else:
         shown = averaged_load(surface, facets, case)
-        largest, mesh = _largest(facets.assign(**{_QUANTITY: shown})), as_polydata(surface)
+        largest, mesh = top_of_scale(shown, surface.areas), as_polydata(surface)
         mesh.cell_data[_QUANTITY] = shown
     scale = Normalize(0.0, largest)
     height = _height_in(case, widths[0] / sum(widths))
@@ -94,7 +95,7 @@ def surface_figure(
     check_rendering()
     mesh = as_polydata(surface)
     mesh.cell_data[_QUANTITY] = values
-    scale = Normalize(0.0, _largest(pd.DataFrame({_QUANTITY: values, "area_m2": surface.areas})))
+    scale = Normalize(0.0, top_of_scale(values, surface.areas))
     figure, panels = new_panels(_height_in(case, 1 / len(_VIEWS)), len(_VIEWS), sharey=True)
     for axes, name in zip(panels, _VIEWS, strict=True):
         _view(axes, mesh, name, scale, case)
@@ -108,7 +109,7 @@ def _bar(figure: Figure, panels: Sequence[Axes], scale: Normalize, label: str) -
     """Draw the colour scale below the panels."""
     colours = ScalarMappable(scale, force_map())
     style: dict[str, Any] = {"location": "bottom", "extend": "max", "shrink": 0.6, "aspect": 40}
-    figure.colorbar(colours, ax=panels, label=label, **style)
+    figure.colorbar(colours, ax=panels, label=f"{label}\n{ABOVE_SCALE}", **style)
 
 
 def _height_in(case: CaseOfRun, fraction: float) -> float:
@@ -122,15 +123,6 @@ def _height_in(case: CaseOfRun, fraction: float) -> float:
 def _half_width(case: CaseOfRun) -> float:
     """Return half of the width that is shown, m."""
     return 1.15 * needed(case.workpiece, "workpiece").radius_m
-
-
-def _largest(facets: pd.DataFrame) -> float:
-    """The top of the colour scale: what 99 % of the loaded area stays below."""
-    loaded = facets[facets[_QUANTITY] > 0.0].sort_values(_QUANTITY)
-    if loaded.empty:
-        return 1.0
-    fraction = loaded["area_m2"].cumsum() / loaded["area_m2"].sum()
-    return float(loaded[_QUANTITY].to_numpy()[np.searchsorted(fraction, 0.99)])
 
 
 def _depths(case: CaseOfRun) -> tuple[float, float]:

@@ -20,7 +20,7 @@ from dragchain.arrays import Floats, Ints
 from dragchain.drag import drag_peaks, peak_separation_s, read_counted
 from dragchain.errors import TableError
 from dragchain.export.frames import FrameSeries
-from dragchain.figures.style import force_map
+from dragchain.figures.style import force_map, top_of_scale
 from dragchain.network.frame import KINDS, PARTICLE, NetworkFrame
 from dragchain.run.kinematics import drag_phase, needed, process_time
 from dragchain.run.workpiece import read_surface
@@ -378,13 +378,12 @@ def _loads(columns: PackedColumns, run: Run) -> list[JsonValue]:
     file = run.table("facets.parquet")
     if not file.is_file():
         return []
-    table = read_table(file, list(_LOADS))
+    table = read_table(file, [*_LOADS, "area_m2"])
     loads: list[JsonValue] = []
     for name, (label, unit) in _LOADS.items():
         values = table[name].to_numpy(np.float64)
         columns.add(name, "f24", values)
-        loaded = values[values > 0.0]
-        top = float(np.quantile(loaded, 0.99)) if loaded.size else 1.0
+        top = top_of_scale(values, table["area_m2"].to_numpy(np.float64))
         loads.append({"name": name, "label": label, "unit": unit, "top": top})
     return loads
 

@@ -191,7 +191,8 @@ class ProcessFindings(Findings):
     process_time_zero_s : float
         Simulated time at which the drag starts.
     forces : mapping of str to MeanEstimate
-        ``drag_n``, ``lateral_n`` and ``vertical_n``.
+        ``drag_n``, ``lateral_n``, ``vertical_n``; of a workpiece that spins, ``torque_n_m`` about
+        its axis.
     network : mapping of str to float
         Means of the columns of ``network.parquet``, and the number of ``frames``.
     wake : Wake or None

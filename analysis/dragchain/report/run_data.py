@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from dragchain.arrays import Floats, Ints
 from dragchain.drag import (
     FORCES,
+    TORQUE,
     ahead_behind,
     azimuth_profile,
     depth_profile,
@@ -41,12 +42,21 @@ from dragchain.report.findings import (
     ProcessFindings,
     Wake,
 )
-from dragchain.run.kinematics import drag_start_s, needed, path_passed, process_time
+from dragchain.run.kinematics import (
+    drag_start_s,
+    motion_of,
+    needed,
+    path_passed,
+    process_time,
+    spins,
+    workpiece_rotation,
+)
 from dragchain.run.reference import reference_drags
 from dragchain.statistics.correlated import estimate_mean, estimates, frame_sums
 from dragchain.statistics.estimate import CONFIDENCE, EstimateColumns
 from dragchain.tables.bed import segregation
 from dragchain.tables.by_step import read_groups, read_table
+from dragchain.tables.columns import vector
 from dragchain.tables.impacts import effective_restitution
 from dragdeck.decks.outputs import load_outputs
 from dragdeck.records.case import CaseOfRun
@@ -157,6 +167,8 @@ def process_findings(run: RunData) -> ProcessFindings:
     """Compute the findings of a process run; errors are those of `write_findings`."""
     samples = read_counted(run.folder, ("step", "time_s", *FORCES))
     forces = summarise_forces(samples)
+    if spins(run.case):
+        forces[TORQUE] = estimate_mean(_own_torque(run))
     frame, frames, contacts = _workpiece_contacts(run, samples)
     names = [one.name for one in run.case.classes]
     azimuth, depth, force = (
@@ -186,6 +198,18 @@ def process_findings(run: RunData) -> ProcessFindings:
         segregation=_segregation(run) if names else {},
         by_class=of_classes(names, frame, frames, contacts) if names else {},
     )
+
+
+def _own_torque(run: RunData) -> Floats:
+    """Torque of the particles on the workpiece about its own axis, (N,) in N m.
+
+    Unless the workpiece turns in the frame of its path, its work is negligible beside the drag's.
+    """
+    columns = ["step", "direction_rad", *vector("torque", "n_m")]
+    step, direction, *torque = read_counted(run.folder, columns)[columns].to_numpy(np.float64).T
+    rotation = workpiece_rotation(step.astype(np.int64), direction, run.case)
+    axis = motion_of(run.case).drive.own_axis
+    return np.asarray(rotation.into(np.stack(torque, axis=1)) @ axis)
 
 
 def of_classes(

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from dragchain.drag import FORCES
 from dragchain.errors import TableError
 from dragchain.report.cases import StudyRuns, cases_of
 from dragchain.report.findings import ProcessFindings
@@ -71,8 +72,8 @@ def _cell(value: object) -> Cell:
 
 def _forces(forces: Mapping[str, MeanEstimate]) -> Row:
     row: Row = {}
-    for name, force in forces.items():
-        direction = name.removesuffix("_n")
+    for name in FORCES:
+        direction, force = name.removesuffix("_n"), forces[name]
         row |= {
             f"{direction}_mean_n": force.mean,
             f"{direction}_std_n": force.std,

@@ -7,6 +7,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
+from dragchain.drag import FORCES, TORQUE
 from dragchain.loading.document import FILE as LOADING
 from dragchain.loading.document import Loading
 from dragchain.report.findings import ProcessFindings
@@ -163,7 +164,7 @@ def read_optional(run_dir: Path) -> tuple[Loading | None, Extrapolated | None]:
 # --- values --------------------------------------------------------------------------------------
 
 
-_FORCES = {"drag_mean": "drag_n", "lateral_mean": "lateral_n", "vertical_mean": "vertical_n"}
+_FORCES = {f"{name.removesuffix('_n')}_mean": name for name in FORCES} | {"torque_mean": TORQUE}
 _PER_METRE = {
     "force_slide": "force_slide_n_m",
     "sliding_distance": "sliding_m",
@@ -287,7 +288,8 @@ def _own(
     for one in extrapolated.quantities if extrapolated else ():
         yield one.name, one.measured
     for name, force in _FORCES.items():
-        yield name, found.forces[force].estimate
+        if force in found.forces:
+            yield name, found.forces[force].estimate
     yield "ahead_behind", found.ahead_behind.ratio
     if loading is not None:
         yield "workpiece_contacts", loading.mean_contacts

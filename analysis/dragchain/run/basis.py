@@ -37,7 +37,8 @@ class Quantity:
         Power of time in it. A workpiece that is f times as fast takes 1/f of the time.
     robust : bool
         Whether a reduced modulus and a faster workpiece change it so little that the run's value
-        stands for the process where there is no correction: forces on the whole workpiece.
+        stands for the process where there is no correction: force and torque on the whole
+        workpiece.
     """
 
     name: str
@@ -58,6 +59,7 @@ QUANTITIES = (
     Quantity("drag_std", "standard deviation of the drag", "N"),
     Quantity("lateral_mean", "mean lateral force", "N", robust=True),
     Quantity("vertical_mean", "mean vertical force", "N", robust=True),
+    Quantity("torque_mean", "mean torque about the workpiece's axis", "N m", robust=True),
     Quantity("contact_force_mean", "mean contact force on the workpiece", "N"),
     Quantity("contact_force_p50", "median contact force on the workpiece", "N"),
     Quantity("contact_force_p90", "90th percentile of the contact forces", "N"),

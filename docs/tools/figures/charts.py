@@ -10,6 +10,7 @@ from records import chosen, record_table
 
 from dragchain.figures.panels import log_ticks
 from dragchain.figures.style import (
+    ABOVE_SCALE,
     BLUE,
     COLOURS,
     GREEN,
@@ -20,6 +21,7 @@ from dragchain.figures.style import (
     ORANGE,
     RED,
     force_map,
+    top_of_scale,
 )
 from dragchain.scaling.fit import draw_scalings, read_scalings
 from evidence.stability.report import draw_regime
@@ -97,7 +99,8 @@ def _draw_load_map() -> Figure:
     )
     figure, axes = _panels(7.6, 3.4)
     values = np.divide(load, area, out=np.zeros_like(load), where=area > 0)
-    shown = axes.pcolormesh(edges[0], 1e3 * edges[1], values.T, cmap=force_map())
+    top = top_of_scale(values, area)
+    shown = axes.pcolormesh(edges[0], 1e3 * edges[1], values.T, cmap=force_map(), vmin=0, vmax=top)
     axes.axhline(0, color="black", lw=0.8, ls="--")
     axes.text(-176, -1, "bed surface", fontsize=8, va="bottom")
     axes.set(
@@ -107,7 +110,8 @@ def _draw_load_map() -> Figure:
     )
     axes.invert_yaxis()
     axes.grid(visible=False)
-    figure.colorbar(shown, label="load-distance integral per area\nand path length (N/m²)")
+    label = f"load-distance integral per area\nand path length (N/m²)\n{ABOVE_SCALE}"
+    figure.colorbar(shown, label=label.replace(", on", "\non"), extend="max")
     return figure
 
 

@@ -1,5 +1,6 @@
 import json
 import math
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -61,6 +62,23 @@ def test_findings_of_a_process_are_those_of_its_tables(found: ProcessFindings) -
     assert found.chains.widest_paths_per_frame == 1.0
     assert found.chains.widest_paths_to_side_fraction == 1.0
     assert found.chains.dominant_azimuth_mean_rad == pytest.approx(0.0)
+
+
+def test_the_torque_is_about_the_axis_of_a_workpiece_that_spins(
+    process: Path, tmp_path: Path
+) -> None:
+    folder = shutil.copytree(process, tmp_path / "run")
+    file = folder / "tables/workpiece_force.parquet"
+    force = pd.read_parquet(file).assign(torque_x_n_m=1.0, torque_y_n_m=2.0, torque_z_n_m=3.0)
+    force.assign(torque_z_n_m=force["step"] % 4 + 2.0).to_parquet(file)
+    path = {"kind": "line", "start_m": [-0.01, 0.0]}
+    upright, inclined = {"spin": {"rpm": 60}}, {"spin": {"rpm": 60}, "tilt_deg": 30}
+    for motion, axis in (({}, None), (upright, (0, 0, 1)), (inclined, (0.5, 0, math.cos(0.5236)))):
+        write_documents(folder, with_motion(case_json("process"), path, 0.1, **motion))
+        found = process_findings(RunData(folder, load_case(folder))).forces.get("torque_n_m")
+        assert (found is None) == (axis is None)
+        if found:
+            assert found.mean == pytest.approx(np.dot(axis, (1, 2, 3)), rel=0.01)
 
 
 def test_classes_share_contacts_and_load() -> None:

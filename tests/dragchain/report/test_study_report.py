@@ -192,6 +192,9 @@ def test_a_faster_run_says_so_first_and_gives_no_number_of_contacts(
     assert "fewer and larger contact forces" in words and "more and smaller" not in words
     row = pd.read_csv(tmp_path / "summary.csv").iloc[0]
     assert "contacts on the workpiece at a time: not available" in row["headline"]
+    own = float(row["workpiece_contacts"])
+    assert f"{own:.2f} contacts on the workpiece at a time , this run only, 95 % CI" in words
+    assert "not available" not in words
     assert row["normal_impulse_n_s_per_m"] == pytest.approx(5 * 0.856 / 0.03, rel=1e-3)
 
 
@@ -219,6 +222,25 @@ def test_forces_of_a_short_series_are_marked_everywhere(process: Path, tmp_path:
     assert "2.7 (too few)" in words
     row = words[words.index("mean vertical force (N)") :]
     assert "too few effective samples" in row[:300]
+
+
+def test_the_torque_of_a_workpiece_that_spins_stands_with_the_forces(
+    process: Path, tmp_path: Path
+) -> None:
+    write_study_report(tmp_path, [process])
+    assert "torque" not in page_of(tmp_path).words.partition("Definitions")[0]
+    assert "torque_mean_n_m" not in pd.read_csv(tmp_path / "summary.csv")
+    findings = process_findings()
+    torque = replace(findings.forces["drag_n"], mean=-0.003, ci95_low=-0.004, ci95_high=-0.002)
+    forces = {**findings.forces, "torque_n_m": torque}
+    findings.model_copy(update={"forces": forces}).write(process / FILE)
+    write_study_report(tmp_path, [process])
+    words, minus = page_of(tmp_path).words, "\N{MINUS SIGN}"
+    ends = f"{minus}0.0030 ({minus}0.0040 to {minus}0.0020)"
+    assert f"mean torque about the workpiece's axis (N m)\n{ends}" in words
+    assert f"torque about its axis (N m)\n{ends}" in words
+    row = pd.read_csv(tmp_path / "summary.csv").iloc[0]
+    assert row["torque_mean_ci95_low_n_m"] == pytest.approx(-0.004)
 
 
 # --- several packings -------------------------------------------------------------------------

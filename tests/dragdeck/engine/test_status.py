@@ -59,6 +59,14 @@ def test_the_speed_is_that_of_the_part_that_runs(process: Path) -> None:
     assert status.energy is None
 
 
+def test_the_speed_of_a_stopped_run_is_that_of_the_time_in_which_it_ran(process: Path) -> None:
+    write_state(process, "stopped", first=200, steps_per_s=125.0)
+    for after_s in (-0.1, 3600.0):  # its record is written last; a copy may be touched later
+        write_thermo(process, 1200, 1.0, after_s)
+        status = run_status(process)
+        assert (status.state, status.step, status.steps_per_s) == ("interrupted", 1200, 125.0)
+
+
 def test_a_run_without_a_row_yet_has_no_speed(process: Path) -> None:
     write_state(process, "running")
     (process / "thermo.1.txt").write_text(HEAD[:20])

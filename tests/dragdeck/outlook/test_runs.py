@@ -53,6 +53,28 @@ def test_a_running_run_needs_what_its_own_speed_says() -> None:
     assert run.basis == "measured"
 
 
+@pytest.mark.parametrize(
+    ("speed", "ranks", "said"),
+    [
+        (1.0, 2, "15 times slower than estimated: other processes may occupy the cores; MPI ranks"),
+        (1.0, 1, "15 times slower than estimated: other processes may occupy the cores"),
+        (3.8, 2, ""),  # four times slower at 3.75 steps/s
+        (None, 2, ""),
+    ],
+)
+def test_a_run_far_slower_than_estimated_is_told(
+    speed: float | None, ranks: int, said: str
+) -> None:
+    status = RunStatus("running", step=40, last=1000, steps_per_s=speed)
+    run = a_run("a", 1000 / 15, status, ranks, after="f")
+    assert run.slow.startswith(said) and bool(run.slow) == bool(said)
+    assert ("fewer fidelity.ranks" in run.slow) == (ranks > 1 and bool(said))
+    assert str(run).endswith(f"\n  {run.slow}") == bool(said)
+    ending = replace(status, step=950)
+    assert replace(run, status=ending).slow == ""  # soon over
+    assert replace(run, status=replace(status, state="interrupted")).slow == ""
+
+
 def test_where_a_filling_ends_is_an_estimate() -> None:
     status = RunStatus("running", step=250, steps_per_s=50.0, energy=3e-4, at_rest=1e-5)
     run = a_run("a", 30.0, status)

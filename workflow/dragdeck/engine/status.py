@@ -38,7 +38,7 @@ class RunStatus:
     final : bool
         It is complete, or was rejected: the same inputs are not run again.
     steps_per_s : float or None
-        As measured: of the part that runs, or of all parts of a run that has ended.
+        As measured: of the part that runs, or of all parts where none runs.
     wall_time_s : float
         Of the parts that have ended.
     energy, at_rest : float or None
@@ -91,12 +91,15 @@ def _unfinished(folder: Path, record: RunRecord, held: bool) -> RunStatus:
     sample, seconds = _newest(folder, record)
     first = record.last_part.from_step
     step = max(first, sample.step if sample else _shown_step(folder, record))
+    speed = record.steps_per_s  # of a part that runs, not known yet
+    if not speed and step > first and seconds > 0:
+        speed = (step - first) / seconds
     energy, at_rest = _rest(folder, inputs, sample)
     return RunStatus(
         state="running" if held else "interrupted",
         step=step - inputs.entry_step,
         last=inputs.phases[-1].end_step - inputs.entry_step if inputs.phases else None,
-        steps_per_s=(step - first) / seconds if step > first and seconds > 0 else None,
+        steps_per_s=speed or None,
         wall_time_s=record.wall_time_s,
         energy=energy,
         at_rest=at_rest,

@@ -205,7 +205,9 @@ def _duplicates(mesh: Trimesh) -> list[Finding]:
 
 def _sharp_angles(mesh: Trimesh) -> list[Finding]:
     smallest = np.degrees(mesh.face_angles.min(axis=1))
-    remedy, measured = "remesh with better shaped triangles", f"{smallest.min():.4g} degrees; "
+    x, y, z = 1e3 * mesh.triangles_center[smallest.argmin()]
+    at = f"at ({x:.4g}, {y:.4g}, {z:.4g}) mm, clamp upwards"
+    remedy, measured = "remesh with better shaped triangles", f"{smallest.min():.4g} degrees {at}; "
     problem = "the angle of a facet is too sharp for LIGGGHTS"
     limit = f"above the curvature of the mesh, {_CURVATURE_DEG:g} degrees"
     errors = _facets(smallest <= _CURVATURE_DEG, problem, limit, remedy, measured)
@@ -271,7 +273,7 @@ def _several_bodies(mesh: Trimesh) -> list[Finding]:
     if len(facets) == 1:
         return []
     value = f"{len(facets)} bodies; the largest has {facets.max()} of {len(mesh.faces)} facets"
-    remedy = "join them into one body, or remove all others, and inner walls, then export again"
+    remedy = "unite them in CAD, or remove all others, and inner walls, then export again"
     limit = "one body: the surface leads from every facet to every other"
     return [Finding("the mesh contains several bodies", value, limit, remedy)]
 

@@ -1,5 +1,6 @@
 """The runs of a study: what each is expected to take, how far it is, and how long all will take."""
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,6 +16,10 @@ from dragdeck.scenes.lead import led
 from dragdeck.scenes.scene import SceneType, StudyScene
 
 WAITING = RunStatus("waiting")
+
+_SLOW, _LONG_S = 4.0, 60.0
+"""A run is slow if its speed was estimated as so many times the measured one, and it still needs
+so long: the first seconds tell the start of LIGGGHTS."""
 
 
 @dataclass(frozen=True)
@@ -94,8 +99,22 @@ class StudyRun:
         about = "" if status.last else "~"  # where a filling ends is an estimate
         return f"{about}{100 * self.fraction:.0f} %", doing.strip(", "), left
 
+    @property
+    def slow(self) -> str:
+        """How far the measured speed is below the estimate, and why; empty if it is not far."""
+        measured, time = self.status.steps_per_s or math.inf, self.cost.wall_time_s
+        slower = self.cost.steps / measured / time if time else 0.0
+        if self.status.state != "running" or slower < _SLOW or self.left_s < _LONG_S:
+            return ""
+        wait = "; MPI ranks wait for each other: use fewer fidelity.ranks"
+        return (
+            f"{slower:.0f} times slower than estimated: other processes may occupy the cores"
+            f"{wait if self.ranks > 1 else ''}"
+        )
+
     def __str__(self) -> str:
-        return f"{self.name}: {', '.join(filter(None, (self.status.state, *self.cells)))}"
+        said = f"{self.name}: {', '.join(filter(None, (self.status.state, *self.cells)))}"
+        return "\n  ".join(filter(None, (said, self.slow)))
 
 
 def alike_but_for_seed(runs: Mapping[Path, Case]) -> list[dict[Path, Case]]:

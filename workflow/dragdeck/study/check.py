@@ -14,7 +14,7 @@ from pydantic_core import ErrorDetails
 
 from dragdeck.errors import Caution, InputError, RecordError, choices, near, together
 from dragdeck.study.base import Json, Model, flat
-from dragdeck.study.model import BUILT_IN_FIDELITIES, AnyPath, Scaling, Study, Tolerance
+from dragdeck.study.model import BUILT_IN_FIDELITIES, AnyPath, Fidelity, Scaling, Study, Tolerance
 from dragdeck.study.plausible import implausible
 from dragdeck.study.recorded import Places, recorded_file, with_recording
 from dragdeck.study.search import Search
@@ -356,13 +356,24 @@ def validate(data: Json, file: Path | str, *, whole: bool = False) -> Study:
 
 
 def warnings(study: Study) -> list[Caution]:
-    """Values of a valid study that are hardly meant, one line each."""
-    return [
+    """What a valid study hardly means, one line each."""
+    found = [
         Caution(
             "implausible", f"{one.field} {one.value:g} {one.problem}; {one.remedy}; {one.limit}"
         )
         for one, _ in implausible({**study.plain(), **study.motion.path.implied})
     ]
+    chosen = {"youngs_modulus_scale", "timestep_fraction", "soft_start"}
+    own, draft = study.fidelity, BUILT_IN_FIDELITIES["draft"]
+    if isinstance(own, Fidelity) and not own.model_fields_set & chosen:
+        text = (
+            "fidelity is a block without youngs_modulus_scale and timestep_fraction: it replaces "
+            "any named fidelity, and means the stiffness and time step of reference; to keep those "
+            f"of draft, add youngs_modulus_scale: {draft.youngs_modulus_scale:g} and "
+            f"timestep_fraction: {draft.timestep_fraction:g} to it"
+        )
+        found.append(Caution("fidelity", text))
+    return found
 
 
 _FORMS = (
@@ -439,7 +450,7 @@ def _problem(issue: ErrorDetails) -> InputError:
     if kind == "union_tag_invalid" and isinstance(value, Mapping):
         field, value = f"{field}.kind", value.get("kind")
     if kind == "extra_forbidden":
-        hint = near(str(issue["loc"][-1]), _every_key())
+        hint = _hint(str(issue["loc"][-1]), _every_key())
         problem, remedy = (
             "unknown key",
             f"{hint}remove it, or see docs/reference/study.md for its spelling",
@@ -452,7 +463,23 @@ def _problem(issue: ErrorDetails) -> InputError:
     return InputError(problem, field=field or None, value=shown(value), limit=limit, remedy=remedy)
 
 
+def _hint(word: str, known: set[str]) -> str:
+    """A question about the blocks that have a key, or about the key that it resembles."""
+    elsewhere = sorted({word} & set(Study.model_fields))
+    elsewhere += sorted(name for name in known if name.endswith(f".{word}"))[:3]
+    return f"did you mean {' or '.join(map(repr, elsewhere))}? " if elsewhere else near(word, known)
+
+
 def _every_key(model: type[Model] = Model) -> set[str]:
-    """Every key that some part of a study may have."""
-    inner = (_every_key(part) for part in model.__subclasses__())
-    return set(model.model_fields).union(*inner)
+    """Every key that some part of a study may have, alone and behind the name of its block."""
+    fields = model.model_fields.items()
+    blocks = {name: _blocks(field.annotation) for name, field in fields}
+    nested = {f"{name}.{key}" for name, parts in blocks.items() for key in parts}
+    return nested.union(blocks, *map(_every_key, model.__subclasses__()))
+
+
+def _blocks(annotation: object) -> set[str]:
+    """The keys of all models within a type."""
+    if isinstance(annotation, type) and issubclass(annotation, Model):
+        return set(annotation.model_fields)
+    return set().union(*map(_blocks, get_args(annotation)))
