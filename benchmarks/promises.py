@@ -2,7 +2,7 @@
 
     python benchmarks/promises.py draw SEED PROJECT [--scenes 12] [--first 0] [--slowest 0.012]
     python benchmarks/promises.py targets PROJECT                     # files for snakemake to make
-    python benchmarks/promises.py judge PROJECT OUT.csv               # after the runs
+    python benchmarks/promises.py judge PROJECT... OUT.csv            # after the runs
 
 PROJECT is a copy of the repository. Each scene is a study with one packing that asks for a
 tolerance of 10 % on six quantities, and a study of the same scene with other packings in plain
@@ -11,17 +11,19 @@ quantity alone, in the order in which they were run: what it then says is a prom
 """
 
 import argparse
-import csv
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import yaml
+from scipy.stats import norm
 
 from dragchain.report.values import Extrapolated
+from dragchain.statistics.estimate import NORMAL_QUANTILE
 from dragchain.tradeoff.measure_run import quantities_along
 from dragchain.windows.estimate import Round, WindowsRecord
 from dragchain.windows.rounds import judged
@@ -214,19 +216,42 @@ def _before(project: Project, case: Case, folder: Path) -> float:
     return sum(RunRecord.read(run / "run.json").processor_time_s for run in runs)
 
 
-def judge(project: Project, out: Path) -> None:
-    """Write one row per scene and quantity, and the counts."""
+def judge(projects: Sequence[Project], out: Path) -> None:
+    """Write one row per scene and quantity, and beside it one row per quantity."""
+    rows = [row for project in projects for row in _of_project(project)]
+    table = pd.DataFrame(rows)
+    table.to_csv(out, index=False)
+    spread = np.hypot(table["half_width"] / NORMAL_QUANTILE, table["reference_se"])
+    off = table["error"].abs() > TOLERANCE
+    table = table.assign(
+        kept=table["reached"] & ~off,
+        off=np.where(table["reached"], table["error"].abs(), 0.0),
+        by_chance=np.where(table["reached"], 2.0 * norm.sf(TOLERANCE / spread), 0.0),
+        saving=table["plain_cpu_time_s"] / table["cpu_time_s"],
+    )
+    groups = table.groupby("quantity", sort=False)
+    summary = groups.agg(
+        scenes=("scene", "size"),
+        reached=("reached", "sum"),
+        kept=("kept", "sum"),
+        by_chance=("by_chance", "sum"),
+        largest=("off", "max"),
+        error=("error", "mean"),
+        error_se=("error", "sem"),
+        covered=("covered", "sum"),
+        saving_low=("saving", "min"),
+        saving_median=("saving", "median"),
+        saving_high=("saving", "max"),
+    )
+    summary.round(4).to_csv(out.with_name(f"{out.stem}_summary.csv"))
+    print(summary.round(3).to_string())
+
+
+def _of_project(project: Project) -> Iterator[dict[str, Any]]:
     record = WindowsRecord.read(project.root / "workflow/dragdeck/data/windows.json")
-    every = [name for name in studies(project) if _finished(project, name)]
-    rows = [row for name in every for row in _rows(project, name, record)]
-    with out.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, rows[0])
-        writer.writeheader()
-        writer.writerows(rows)
-    given = [row for row in rows if row["reached"]]
-    kept = [row for row in given if abs(row["error"]) <= TOLERANCE]
-    covered = [row for row in rows if row["covered"]]
-    print(f"{len(kept)} of {len(given)} promises kept, {len(rows)} intervals, {len(covered)} cover")
+    for name in studies(project):
+        if _finished(project, name):
+            yield from _rows(project, name, record)
 
 
 def _finished(project: Project, name: str) -> bool:
@@ -296,26 +321,26 @@ def main() -> None:
     """Draw scenes, list what is to be made of them, or judge them."""
     parser = argparse.ArgumentParser(description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
-    drawing = commands.add_parser("draw")
+    drawing, listing, judging = map(commands.add_parser, ("draw", "targets", "judge"))
     drawing.add_argument("seed", type=int)
-    for name in ("targets", "judge"):
-        commands.add_parser(name)
-    for each in commands.choices.values():
+    for each in (drawing, listing):
         each.add_argument("project", type=Path)
     drawing.add_argument("--scenes", type=int, default=12)
     drawing.add_argument("--first", type=int, default=0, help="number of the first scene")
     drawing.add_argument("--slowest", type=float, default=SLOWEST, help="least inertial number")
-    commands.choices["judge"].add_argument("out", type=Path)
+    judging.add_argument("project", type=Path, nargs="+")
+    judging.add_argument("out", type=Path)
     given = parser.parse_args()
+    if given.command == "judge":
+        judge([Project(each.resolve()) for each in given.project], given.out)
+        return
     project = Project(given.project.resolve())
     if given.command == "draw":
         numbers = range(given.first, given.first + given.scenes)
         write_studies(given.seed, project, numbers, given.slowest)
-    elif given.command == "targets":
+    else:
         for name, files in targets(project):
             print(name, files)
-    else:
-        judge(project, given.out)
 
 
 if __name__ == "__main__":

@@ -11,17 +11,15 @@ expression over the columns::
 
 import json
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache
 from pathlib import Path
 from string import Formatter
 from typing import Any, TypedDict
 
 import pandas as pd
-import paper_study
 from pydantic import JsonValue
 
-from dragchain.tradeoff.measures import QUANTITIES
 from dragdeck.project import Project
 from dragdeck.study.base import Json
 
@@ -31,6 +29,7 @@ DATA = ROOT / "docs/data"
 RECORDS = {
     **{name: ROOT / f"workflow/dragdeck/data/{name}.json" for name in ("tradeoff", "stability")},
     "stable_step": ROOT / "workflow/dragdeck/data/stable_step.json",
+    "quantities": ROOT / "analysis/dragchain/tradeoff/quantities.csv",
     **{
         f"scaling/{file.stem}": file
         for file in (ROOT / "analysis/dragchain/scaling/data").glob("*.json")
@@ -43,22 +42,12 @@ RECORDS = {
 }
 """File of each record."""
 
-COMPUTED: dict[str, Callable[[], pd.DataFrame]] = {
-    "paper/contacts": paper_study.paper_contacts,
-    "paper/presets": paper_study.paper_presets,
-    "quantities": lambda: pd.DataFrame({"name": x.name, "label": x.label} for x in QUANTITIES),
-}
-"""Tables that the code contains."""
-
-
 # --- tables ------------------------------------------------------------------------------
 
 
 @cache
 def record_table(name: str) -> pd.DataFrame:
     """A record, or a part of one, as a table; KeyError if there is none."""
-    if name in COMPUTED:
-        return COMPUTED[name]()
     if name.startswith("study/"):
         study = Project(ROOT).cases(name.removeprefix("study/"))[0].study
         return pd.DataFrame(_rows(study.model_dump(mode="json")))

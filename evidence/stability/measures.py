@@ -191,18 +191,6 @@ class Contacts:
         return float((self.overlap_m / radius_m[self.bodies[0]]).max(initial=0.0))
 
 
-def _in_id_order(frame: Frame) -> Frame:
-    return frame.take(np.argsort(frame.columns["particle_id"]))
-
-
-def _centres(frame: Frame) -> Floats:
-    return frame.vectors("x_m", "y_m", "z_m")
-
-
-def _radii(frame: Frame) -> Floats:
-    return frame.vectors("radius_m")[:, 0]
-
-
 def network_frequency(case: CaseOfRun, sticks: bool, radius_m: Floats, contacts: Contacts) -> float:
     """Largest eigenfrequency of the contacts' network, rotations included, rad/s.
 
@@ -272,8 +260,8 @@ def _measure_resting(point: PointRun, run: Run) -> Row:
 
 
 def _bed(point: PointRun, case: CaseOfRun, frame: Frame) -> Row:
-    radius = _radii(frame)
-    bodies, normal, overlap = touching(_centres(frame), radius, case.bowl.radius_m)
+    radius = frame.radii
+    bodies, normal, overlap = touching(frame.centres, radius, case.bowl.radius_m)
     partner = np.where(bodies[1] == len(radius), BOWL, PARTICLE)
     contacts = Contacts(bodies, normal, overlap, partner)
     return {
@@ -318,7 +306,7 @@ def _measure_impacts(point: PointRun, run: Run) -> Row:
     """Mean, smallest and largest of the impacts of a run; speeds are over that of the impact."""
     impact = needed(point.impact, "impact")
     plate = impact.size_ratio == 0.0
-    frames = [_in_id_order(frame) for frame in run.frames("particles")]
+    frames = [frame.by_particle() for frame in run.frames("particles")]
     first, last = frames[0], frames[-1]
     striking = slice(None) if plate else slice(0, None, 2)
     velocity = last.vectors("vx_m_s", "vy_m_s", "vz_m_s")
@@ -336,7 +324,7 @@ def _measure_impacts(point: PointRun, run: Run) -> Row:
         overlap_m=np.array([overlap]),
         partner=np.array([PARTICLE]),  # a plate is of the particles' material
     )
-    radius = _radii(first)
+    radius = first.radii
     peaks = _spread("peak_force", force.max(axis=0))
     return {
         "overlap_ratio": overlap / float(radius.min()),
@@ -357,7 +345,7 @@ def _spread(name: str, values: Floats) -> dict[str, float]:
 
 
 def _overlap(frame: Frame, plate: bool) -> Floats:
-    centre, radius = _centres(frame), _radii(frame)
+    centre, radius = frame.centres, frame.radii
     if plate:
         return np.asarray(radius - centre[:, 2])
     distance = np.linalg.norm(centre[0::2] - centre[1::2], axis=1)
@@ -366,7 +354,7 @@ def _overlap(frame: Frame, plate: bool) -> Floats:
 
 def _energy(frame: Frame, density_kg_m3: float) -> Floats:
     """Kinetic energy of each particle, spin included, J."""
-    radius = _radii(frame)
+    radius = frame.radii
     mass = sphere_mass(radius, density_kg_m3)
     speed = (frame.vectors("vx_m_s", "vy_m_s", "vz_m_s") ** 2).sum(axis=1)
     spin = (frame.vectors("wx_rad_s", "wy_rad_s", "wz_rad_s") ** 2).sum(axis=1)
@@ -448,11 +436,11 @@ def _drag_contacts(point: PointRun, run: Run) -> Row:
         if on_workpiece.step not in pairs:
             continue
         workpiece = on_workpiece.join(merge=False)  # both stiffnesses of an edge act
-        frame = _in_id_order(particles[on_workpiece.step])
+        frame = particles[on_workpiece.step].by_particle()
         contacts = _engine_contacts(frame, pairs[on_workpiece.step], workpiece, run.case)
-        largest = max(largest, contacts.overlap_ratio(_radii(frame)))
+        largest = max(largest, contacts.overlap_ratio(frame.radii))
         if on_workpiece.step in some:
-            own = network_frequency(run.case, point.sticks, _radii(frame), contacts)
+            own = network_frequency(run.case, point.sticks, frame.radii, contacts)
             frequency = max(frequency, own)
     return {"overlap_ratio": largest, "frequency_rad_s": frequency}
 
@@ -467,7 +455,7 @@ def _engine_contacts(
     ids = np.asarray(frame.columns["particle_id"], dtype=np.int64)
     a = np.searchsorted(ids, rows.a_id)
     b = np.where(rows.b_id > 0, np.searchsorted(ids, rows.b_id), len(ids))
-    towards = rows.point_m - _centres(frame)[a]
+    towards = rows.point_m - frame.centres[a]
     normal = towards / np.linalg.norm(towards, axis=1, keepdims=True)
     hit = rows.overlap_m > 0.0
     bodies, partner = np.stack([a, b])[:, hit], _PARTNERS[rows.kind[hit]]

@@ -205,21 +205,15 @@ def read_recording(run_dir: Path) -> Recording:
     """
     read_accepted(run_dir)
     case = CollideCase.read(run_dir / "case.json")
-    frames = [
-        (frame.step, frame.columns, np.argsort(frame.columns["particle_id"]))
-        for frame in iter_frames(run_dir, load_outputs(run_dir)["bodies"])
-    ]
+    outputs = load_outputs(run_dir)["bodies"]
+    frames = [frame.by_particle() for frame in iter_frames(run_dir, outputs)]
 
     def stacked(names: Sequence[str]) -> Floats:
-        rows = (
-            np.column_stack([columns[name][order] for name in names])
-            for _, columns, order in frames
-        )
-        return np.array(list(rows), dtype=np.float64)
+        return np.array([frame.vectors(*names) for frame in frames])
 
     return Recording(
         case=case,
-        time_s=np.array([step for step, _, _ in frames]) * case.timestep_s,
+        time_s=np.array([frame.step for frame in frames]) * case.timestep_s,
         wall_force_n={
             wall.name: stacked([f"{wall.name}_force_{axis}_n" for axis in "xyz"])
             for wall in case.walls

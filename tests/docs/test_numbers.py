@@ -10,6 +10,11 @@ from page_parts import PageError, Parts, stale_files, table_recipes, values
 from paths import ROOT
 from records import change, record_table, shown_value
 
+from dragdeck.cases.bed import bed_rayleigh_time, bed_timestep, full_stiffness_number
+from dragdeck.physics import contact_mechanics as mechanics
+from dragdeck.project import Project
+from dragdeck.records.stability import stable_step_law
+from dragdeck.study.model import BUILT_IN_FIDELITIES
 from evidence.verification.law import limited_restitution
 
 TEXT = "".join(page.read_text(encoding="utf-8") for page in PAGES)
@@ -25,6 +30,32 @@ def test_every_name_is_short_and_on_a_page() -> None:
     assert len(set(names)) == len(names)
     assert [name for name in names if len(f"<!--{name}-->") > 25] == []
     assert [name for name in names if f"<!--{name}-->" not in TEXT] == []
+
+
+def test_the_numbers_of_the_papers_study_are_those_of_the_code() -> None:
+    study, law = Project(ROOT).cases("uhlmann2015")[0].study, stable_step_law()
+    media, motion, spread = study.media, study.motion, study.media.radius_std_m
+    particle, own = study.materials[str(media.material)], study.pair(*[str(media.material)] * 2)
+    found = []
+    for name, fidelity in BUILT_IN_FIDELITIES.items():
+        scaled = study.model_copy(update={"fidelity": fidelity})
+        step, scale = bed_timestep(scaled, "timestep_fraction"), fidelity.youngs_modulus_scale
+        stiffness = full_stiffness_number(scaled) * scale ** (2 / 3)
+        unstable = law.largest_fraction(stiffness, own.restitution, spread / media.radius_mean_m)
+        steps = motion.path_length_m / motion.axis_speed_m_s / step
+        times = 1e6 * bed_rayleigh_time(scaled), 1e6 * step, steps / 1e6
+        found.append([name, scale, fidelity.timestep_fraction, *times, unstable])
+    known = record_table("paper/presets")
+    assert found == [[row[0], *map(pytest.approx, row[1:])] for row in known.to_numpy().tolist()]
+    for _, pair, dashpot, stiffness in record_table("paper/contacts").itertuples():
+        partner = study.materials[pair.split("-")[1]]
+        shear = mechanics.effective_shear(particle, partner)
+        both = [mechanics.shear_modulus(one) for one in (particle, partner)]
+        ratio = (particle.poissons_ratio + partner.poissons_ratio) / 2
+        assert dashpot == pytest.approx(
+            math.sqrt(4 * shear / mechanics.effective_modulus(particle, partner))
+        )
+        assert stiffness == pytest.approx(sum(both) / (2 - ratio) / (4 * shear))
 
 
 # --- what the tool does -------------------------------------------------------------------

@@ -9,11 +9,12 @@ from pathlib import Path
 import pytest
 from doc_pages import PAGES, name_of
 from figures import FIGURES, IMAGES, svg
-from figures.pictures import PICTURES, drawn_picture
 from mathml import mathml
 from paths import ROOT
 from PIL import Image
+from worked_examples import EXAMPLES, few_colours
 
+PICTURES = ROOT / "docs/examples/images"
 LINK = re.compile(r"(?<!\\)\]\(([^)\s]+)\)")
 
 
@@ -65,9 +66,10 @@ def test_no_line_of_a_page_is_taken_for_a_comment() -> None:
 
 def test_every_image_is_shown_and_every_figure_is_drawn() -> None:
     text = "".join(page.read_text() for page in PAGES)
-    files = {file.name for file in IMAGES.iterdir()}
-    assert {name for name in files if f"images/{name}" not in text} == set()
-    assert files == {f"{name}.svg" for name in FIGURES} | {f"{name}.png" for name in PICTURES}
+    pictures = {f"{study}_{name}.png" for study, places in EXAMPLES.items() for name in places}
+    for folder, made in ((IMAGES, {f"{name}.svg" for name in FIGURES}), (PICTURES, pictures)):
+        assert {file.name for file in folder.iterdir()} == made
+        assert {name for name in made if f"images/{name}" not in text} == set()
 
 
 @pytest.mark.slow
@@ -77,10 +79,10 @@ def test_a_figure_can_be_drawn_from_the_records(name: str) -> None:
     assert drawn.startswith("<?xml") and len(drawn) > 5000
 
 
-@pytest.mark.slow
-def test_a_picture_can_be_drawn() -> None:
-    with Image.open(BytesIO(drawn_picture("carousel", ROOT))) as drawn:
-        assert drawn.mode == "P" and min(drawn.size) > 300
+def test_a_picture_is_kept_in_few_colours() -> None:
+    file = PICTURES / "carousel_preview.png"
+    with Image.open(BytesIO(few_colours(file))) as drawn, Image.open(file) as kept:
+        assert drawn.mode == "P" and drawn.size == kept.size
 
 
 @pytest.mark.parametrize(

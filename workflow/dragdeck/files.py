@@ -1,5 +1,6 @@
 """Files that are either whole or not there."""
 
+import csv
 import errno
 import hashlib
 import os
@@ -16,6 +17,12 @@ def file_checksum(file: Path) -> str:
     """SHA-256 of a file's bytes, as hex digits."""
     with file.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def table_rows(file: Path) -> list[dict[str, str]]:
+    """The rows of a CSV file of the packages, by the names in its first line."""
+    with file.open(encoding="utf-8", newline="") as stream:
+        return list(csv.DictReader(stream))
 
 
 @contextmanager

@@ -113,6 +113,11 @@ def tables_of(place: str, names: Iterable[str]) -> list[str]:
     return [of_run(place, f"tables/{name}") for name in names]
 
 
+def deck_files(place: str, inputs: Iterable[str]) -> list[str]:
+    """Paths of what is written of a run before it starts, as patterns."""
+    return [of_run(place, name) for name in ("in.liggghts", "case.json", "columns.json", *inputs)]
+
+
 def of_whole_run(place: str, file: str) -> FromRun[str]:
     """A file of the run that a further workpiece shares."""
     return lambda wildcards: (

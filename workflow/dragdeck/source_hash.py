@@ -17,7 +17,7 @@ _PACKAGES = ("dragdeck", "dragchain", "evidence")
 
 
 def source_hash(*modules: str) -> str:
-    """Hash of the given modules and all they import from this project.
+    """Hash of the given modules, all they import from this project, and the tables beside them.
 
     Parameters
     ----------
@@ -29,9 +29,11 @@ def source_hash(*modules: str) -> str:
     str
         12 hex digits.
     """
-    total = hashlib.sha256()
-    for name, file in sorted(source_files(*modules).items()):
+    total, files = hashlib.sha256(), source_files(*modules)
+    for name, file in sorted(files.items()):
         total.update(name.encode() + file.read_bytes())
+    for table in sorted({table for file in files.values() for table in file.parent.glob("*.csv")}):
+        total.update(table.read_bytes())
     return total.hexdigest()[:12]
 
 

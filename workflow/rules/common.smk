@@ -24,6 +24,7 @@ from dragdeck.rules import (
     of_whole_run,
     or_stop,
     checked_settings,
+    deck_files,
     tables_of,
 )
 from dragdeck.scenes.process import SCENES

@@ -12,10 +12,7 @@ for PLACE, SCENE in PLACES.items():
             packing=WORK.of_its_bed(PLACE, "tables/packing.json"),
             lead=WORK.of_its_lead(PLACE),
         output:
-            [
-                of_run(PLACE, file)
-                for file in ("in.liggghts", "case.json", "columns.json", *SCENE.inputs)
-            ],
+            deck_files(PLACE, SCENE.inputs),
         wildcard_constraints:
             run=ENGINE_RUN,
         priority: 0 if SCENE.single_particle else 1
@@ -34,10 +31,7 @@ for PLACE, SCENE in PLACES.items():
         name:
             f"run_{PLACE}"
         input:
-            [
-                of_run(PLACE, file)
-                for file in ("in.liggghts", "case.json", "columns.json", *SCENE.inputs)
-            ],
+            deck_files(PLACE, SCENE.inputs),
             advice=ancient(WORK.needed_advice(PLACE)),
             filling=WORK.of_its_bed(PLACE, "run.json"),
         output:

@@ -140,4 +140,4 @@ def read_angle(folder: Path) -> Mapping[str, str | float]:
 def _free(frame: Frame, run: AngleRun) -> tuple[Floats, Floats]:
     """Centres and radii of the particles that are not glued."""
     free = frame.take(np.flatnonzero(frame.ids("particle_id") > run.glued))
-    return free.vectors("x_m", "y_m", "z_m"), free.vectors("radius_m")[:, 0]
+    return free.centres, free.radii

@@ -1,6 +1,5 @@
 """A study's results as an RO-Crate (https://w3id.org/ro/crate/1.1), to archive and to cite."""
 
-import hashlib
 import math
 import mimetypes
 import os
@@ -14,7 +13,7 @@ from typing import Any
 
 from dragchain.errors import ExportError
 from dragchain.report.cases import read_study_runs
-from dragdeck.files import write_text
+from dragdeck.files import file_checksum, write_text
 from dragdeck.records.case import CaseOfRun, load_case
 from dragdeck.records.run import read_accepted
 
@@ -134,7 +133,7 @@ class _Crate:
         about = {
             "name": file.name,
             "contentSize": str(source.stat().st_size),
-            "sha256": sha256(source),
+            "sha256": file_checksum(source),
             "encodingFormat": guessed or "text/plain",
         }
         return self._crate.add_file(source, str(file), properties=about)
@@ -188,7 +187,7 @@ class _Crate:
         """Add the versions and the list of what was left out, and write the metadata."""
         self._software("Python", platform.python_version())
         packages = sorted({f"{one.name}=={one.version}" for one in distributions()}, key=str.lower)
-        rows = [f"{file},{file.stat().st_size},{sha256(file)}" for file in self._left_out]
+        rows = [f"{file},{file.stat().st_size},{file_checksum(file)}" for file in self._left_out]
         for name, lines in ((PACKAGES, packages), (LEFT_OUT, ["file,bytes,sha256", *rows])):
             write_text(self._folder / name, "".join(f"{line}\n" for line in lines))
             self._add(self._folder / name, Path(name))
@@ -211,9 +210,3 @@ class _Crate:
         from rocrate.model import ContextEntity
 
         return self._crate.add(ContextEntity(self._crate, identity, dict(about)))
-
-
-def sha256(file: Path) -> str:
-    """The SHA-256 of a file, as hexadecimal digits."""
-    with file.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()

@@ -8,9 +8,11 @@ what each number stands for and `notes` what the settings do; they decide nothin
 from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import StrEnum
+from pathlib import Path
 from typing import NamedTuple
 
 from dragchain.statistics.estimate import Estimate
+from dragdeck.files import table_rows
 from dragdeck.records.case import CaseOfRun, FidelityOfRun
 
 _TIMES = "\N{MULTIPLICATION SIGN}"
@@ -48,39 +50,9 @@ class Quantity:
     robust: bool = False
 
 
-QUANTITIES = (
-    Quantity("drag_mean", "mean drag", "N", robust=True),
-    Quantity("workpiece_contacts", "contacts on the workpiece at a time"),
-    Quantity(
-        "force_slide",
-        "normal force \N{MULTIPLICATION SIGN} sliding distance per metre of path",
-        "N m/m",
-    ),
-    Quantity("drag_std", "standard deviation of the drag", "N"),
-    Quantity("lateral_mean", "mean lateral force", "N", robust=True),
-    Quantity("vertical_mean", "mean vertical force", "N", robust=True),
-    Quantity("torque_mean", "mean torque about the workpiece's axis", "N m", robust=True),
-    Quantity("contact_force_mean", "mean contact force on the workpiece", "N"),
-    Quantity("contact_force_p50", "median contact force on the workpiece", "N"),
-    Quantity("contact_force_p90", "90th percentile of the contact forces", "N"),
-    Quantity("contact_force_p99", "99th percentile of the contact forces", "N"),
-    Quantity("sliding_distance", "sliding distance of all contacts per metre of path", "m/m"),
-    Quantity("friction_work", "friction work per metre of path", "J/m"),
-    Quantity("workpiece_work", "work of the workpiece per metre of path", "J/m", robust=True),
-    Quantity("normal_load", "sum of the normal forces on the workpiece", "N", robust=True),
-    Quantity("normal_impulse", "normal impulse per metre of path", "N s/m", time=1, robust=True),
-    Quantity("events", "contact events per metre of path", "1/m"),
-    Quantity("peaks", "drag peaks per metre of path", "1/m"),
-    Quantity("ahead_behind", "ratio of the normal force ahead to that behind"),
-    Quantity("coordination_number", "coordination number"),
-    Quantity("mechanical_coordination_number", "coordination number without rattlers"),
-    Quantity("network_force_mean", "mean normal force in the network", "N"),
-    Quantity("chain_count", "quasi-linear force chains per frame"),
-    Quantity("chain_length", "particles per quasi-linear chain"),
-    Quantity("path_bottleneck", "bottleneck force of the dominant path", "N"),
-    Quantity("workpiece_overlap", "mean relative overlap on the workpiece"),
-    Quantity("drag_std_short", "drag fluctuations at wavelengths below 1/4 particle diameter", "N"),
-    Quantity("overlap_p99", "99th percentile of the relative overlap between particles"),
+QUANTITIES = tuple(
+    Quantity(row["name"], row["label"], row["unit"], int(row["time"] or 0), row["robust"] == "yes")
+    for row in table_rows(Path(__file__).with_name("quantities.csv"))
 )
 """The registry: what a report tells of a process run, in its order."""
 

@@ -32,15 +32,10 @@ def describe_bed(particles: Frame, case: CaseOfRun, spheres: Frame | None = None
         raise TableError(
             f"step {particles.step}: the last frame of particles is empty, so there is no packing"
         )
-    radius = particles.vectors("radius_m")[:, 0]
+    radius = particles.radii
     bowl_radius = needed(case.bowl, "bowl").radius_m
     surface = spheres or particles
-    height = probed_height(
-        surface.vectors("x_m", "y_m", "z_m"),
-        surface.vectors("radius_m")[:, 0],
-        bowl_radius,
-        float(radius.mean()),
-    )
+    height = probed_height(surface.centres, surface.radii, bowl_radius, float(radius.mean()))
     volume = 4.0 / 3.0 * np.pi * radius**3
     density: Floats | float = case.media.density_kg_m3
     if case.classes:

@@ -38,7 +38,7 @@ class Bodies:
         TableError
             Spheres are missing, or belong to other bodies than their ids say.
         """
-        spheres = spheres.take(np.argsort(spheres.ids("particle_id")))
+        spheres = spheres.by_particle()
         ids = spheres.ids("particle_id")
         count = self.case.bodies[-1].rows.stop
         wrong = self.case.body_of(ids) != spheres.ids("body_id")

@@ -3,13 +3,14 @@
 ``columns.csv`` beside this module describes them; the end of a column's name is its unit.
 """
 
-import csv
 from collections.abc import Mapping
 from fnmatch import fnmatchcase
 from functools import cache
 from pathlib import Path
 
 import pyarrow as pa
+
+from dragdeck.files import table_rows
 
 
 def vector(name: str, unit: str) -> tuple[str, str, str]:
@@ -81,9 +82,8 @@ _UNITS: Mapping[str, str] = {
 @cache
 def _rows() -> list[tuple[str, tuple[str, ...], str]]:
     """Column, tables and description; ``*`` in a column stands for any text."""
-    with Path(__file__).with_name("columns.csv").open(newline="", encoding="utf-8") as file:
-        rows = csv.DictReader(file)
-        return [(row["column"], tuple(row["tables"].split()), row["description"]) for row in rows]
+    rows = table_rows(Path(__file__).with_name("columns.csv"))
+    return [(row["column"], tuple(row["tables"].split()), row["description"]) for row in rows]
 
 
 def descriptions(column: str) -> dict[str, str]:

@@ -115,7 +115,7 @@ def contact_rows(
             f"the next step of contacts is {contacts.step}, but that of particles is "
             f"{particles.step}"
         )
-    particles = particles.take(np.argsort(particles.ids("particle_id")))
+    particles = particles.by_particle()
     known = _Particles(
         particles.step,
         particles.ids("particle_id"),

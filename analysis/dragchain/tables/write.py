@@ -293,10 +293,9 @@ def _write_particles(run: Run, file: Path) -> None:
     own = ("step", "time_s", *moving)
     with table_writer(file, _with_classes(own, "particles", run.case)) as table:
         for frame in run.frames("particles"):
-            frame = bodies.frame(frame) if bodies else frame
+            frame = (bodies.frame(frame) if bodies else frame).by_particle()
             steps = np.full(frame.rows, frame.step)
-            order = np.argsort(frame.columns["particle_id"])
-            rows = {name: frame.columns[name][order] for name in moving}
+            rows = {name: frame.columns[name] for name in moving}
             classes = _classes("particles", run.case, rows["particle_id"].astype(np.int64))
             time = {"step": steps, "time_s": steps * run.case.timestep_s}
             table.write({**time, **rows, **classes})

@@ -22,6 +22,7 @@ from dragchain.run.case import changed_inputs
 from dragchain.statistics.bed_effects import EffectsFit, Factors, fit_effects
 from dragchain.statistics.estimate import CONFIDENCE, student_quantile
 from dragchain.tradeoff.measures import FILE, Measurand, Measures
+from dragdeck.records.tradeoff import ErrorEntry
 
 _PARAMETERS = ("youngs_modulus_scale", "timestep_fraction", "speed_factor")
 OTHER = "other"
@@ -190,36 +191,13 @@ Levels = Mapping[str, Hashable]
 
 
 @dataclass(frozen=True)
-class Error:
-    """Difference to the reference, relative to it.
-
-    Attributes
-    ----------
-    value, se : float
-    ci95_low, ci95_high : float
-        Interval of `CONFIDENCE`.
-    bound : float
-        One-sided 95 % upper bound of the absolute error.
-    significant : bool
-        Whether the interval excludes zero.
-    """
-
-    value: float
-    se: float
-    ci95_low: float
-    ci95_high: float
-    bound: float
-    significant: bool
-
-
-@dataclass(frozen=True)
 class EffectsModel:
     """Effects of settings: how they become columns of a design, and the fit of these."""
 
     factors: Factors
     fit: EffectsFit
 
-    def error(self, setting: Levels, reference: Levels, signed: bool) -> Error:
+    def error(self, setting: Levels, reference: Levels, signed: bool) -> ErrorEntry:
         """The difference of one setting to another."""
         weights = self.factors.row(setting) - self.factors.row(reference)
         return relative_error(*self.fit.contrast(weights), self.fit.degrees, signed)
@@ -240,7 +218,7 @@ class QuantityComparison:
         Relative standard deviation of one run's value over the common path.
     bed_fraction : float
         The part of its square that runs from one bed have in common.
-    errors : dict of Setting to Error
+    errors : dict of Setting to ErrorEntry
     model : EffectsModel
         What `errors` and `between` draw on.
     """
@@ -250,7 +228,7 @@ class QuantityComparison:
     se: float
     run_std: float
     bed_fraction: float
-    errors: Mapping[Setting, Error]
+    errors: Mapping[Setting, ErrorEntry]
     model: EffectsModel = field(repr=False)
 
     @property
@@ -258,7 +236,7 @@ class QuantityComparison:
         """Relative half-width of the reference's interval."""
         return self.model.fit.quantile * self.se
 
-    def between(self, setting: Setting, base: Setting) -> Error | None:
+    def between(self, setting: Setting, base: Setting) -> ErrorEntry | None:
         """Difference of one setting to another; None if the runs cannot tell it."""
         if not all(self.model.factors.tells(one.factors()) for one in (setting, base)):
             return None
@@ -327,7 +305,7 @@ def _model(
 
 def relative_error(
     difference: float, uncertainty: float, degrees: int, signed: bool = False
-) -> Error:
+) -> ErrorEntry:
     """The relative error that a difference of logarithms is.
 
     Parameters
@@ -347,7 +325,7 @@ def relative_error(
 
     low, high = relative(difference - shift), relative(difference + shift)
     ends = (relative(difference - one_sided), relative(difference + one_sided))
-    return Error(
+    return ErrorEntry(
         value=relative(difference),
         se=uncertainty * (1.0 if signed else math.exp(difference)),
         ci95_low=low,

@@ -12,9 +12,10 @@ from matplotlib.figure import Figure
 from dragchain.arrays import Floats
 from dragchain.figures.panels import key, legend_below, log_ticks, new_panels
 from dragchain.figures.style import INK, LIGHT, MARKERS, WIDE_IN
-from dragchain.tradeoff.compare import Error, Setting
+from dragchain.tradeoff.compare import Setting
 from dragchain.tradeoff.measures import MAIN
 from dragchain.tradeoff.outcome import TOLERANCES, Tradeoff
+from dragdeck.records.tradeoff import ErrorEntry
 
 FLOOR = 1e-3
 """Errors below this are drawn here."""
@@ -58,7 +59,7 @@ def draw_pareto(tradeoff: Tradeoff) -> Figure:
 def _pareto_panel(
     axes: Axes,
     tradeoff: Tradeoff,
-    errors: Mapping[Setting, Error],
+    errors: Mapping[Setting, ErrorEntry],
     shades: Mapping[float, Any],
     marks: Mapping[float, str],
 ) -> None:
@@ -85,7 +86,7 @@ def _pareto_panel(
     axes.step(*front.T, where="post", color=INK, lw=0.9, alpha=0.7, zorder=1)
 
 
-def _sizes(error: Error) -> Floats:
+def _sizes(error: ErrorEntry) -> Floats:
     """Lower end, value, upper end and bound of the error's size, not below `FLOOR`, (4,)."""
     low, high = sorted((abs(error.ci95_low), abs(error.ci95_high)))
     low = low if error.significant else FLOOR

@@ -7,12 +7,14 @@ quantity has one value a block. A run's value is the mean over its blocks.
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from pydantic import JsonValue
 
 from dragchain.arrays import Floats
 from dragdeck.documents import Document, Part
+from dragdeck.files import table_rows
 from dragdeck.records.case import FidelityOfRun
 from dragdeck.records.run import AcceptanceCheck
 
@@ -49,62 +51,14 @@ class Measurand:
         return math.sqrt(mean) if self.squared else mean
 
 
-QUANTITIES = (
-    Measurand("drag_mean", "mean drag", "N", "mean drag"),
-    Measurand("drag_std", "standard deviation of the drag", "N", "std. dev. of drag", squared=True),
-    Measurand(
-        "drag_std_long",
-        "drag fluctuations at wavelengths above 2 particle diameters",
-        "N",
-        squared=True,
-    ),
-    Measurand(
-        "drag_std_middle", "drag fluctuations at intermediate wavelengths", "N", squared=True
-    ),
-    Measurand(
-        "drag_std_short",
-        "drag fluctuations at wavelengths below 1/4 particle diameter",
-        "N",
-        squared=True,
-    ),
-    Measurand("lateral_mean", "mean lateral force", "N", signed=True),
-    Measurand("vertical_mean", "mean vertical force", "N", signed=True),
-    Measurand("workpiece_contacts", "contacts on the workpiece", short="contacts on workpiece"),
-    Measurand(
-        "contact_force_mean",
-        "mean normal force per contact on the workpiece",
-        "N",
-        "mean contact force",
-    ),
-    Measurand("contact_force_p50", "median of the contact forces on the workpiece", "N"),
-    Measurand(
-        "contact_force_p90",
-        "90th percentile of the contact forces on the workpiece",
-        "N",
-        "90th per\N{SOFT HYPHEN}centile of contact force",
-    ),
-    Measurand("contact_force_p99", "99th percentile of the contact forces on the workpiece", "N"),
-    Measurand("normal_load", "sum of the normal forces on the workpiece", "N"),
-    Measurand("sliding_distance", "sliding distance of all contacts over the path"),
-    Measurand("friction_work", "friction work on the workpiece for a metre of path", "J/m"),
-    Measurand("workpiece_overlap", "mean relative overlap on the workpiece"),
-    Measurand(
-        "coordination_number", "coordination number", short="coordi\N{SOFT HYPHEN}nation number"
-    ),
-    Measurand("mechanical_coordination_number", "coordination number without rattlers"),
-    Measurand("network_force_mean", "mean normal force in the network", "N"),
-    Measurand("overlap_p99", "99th percentile of the relative overlap between particles"),
-    Measurand("chain_count", "Peters chains per frame", short="Peters chains"),
-    Measurand("chain_length", "particles per Peters chain", short="particles per chain"),
-    Measurand("chain_alignment", "mean squared cosine of the angle between chains and motion"),
-    Measurand("path_bottleneck", "bottleneck force of the dominant path", "N"),
-    Measurand(
-        "force_slide",
-        "normal force \N{MULTIPLICATION SIGN} sliding distance per metre of path",
-        "N m/m",
-    ),
-    Measurand("bed_height", "bed height", "m"),
-    Measurand("solid_fraction", "solid fraction"),
+def _quantity(name: str, label: str, unit: str, short: str, kind: str) -> Measurand:
+    """A row of ``quantities.csv``, in which `|` is where a word may break."""
+    head = short.replace("|", "\N{SOFT HYPHEN}")
+    return Measurand(name, label, unit, head, kind == "squared", kind == "signed")
+
+
+QUANTITIES = tuple(
+    _quantity(**row) for row in table_rows(Path(__file__).with_name("quantities.csv"))
 )
 """All but the last two have a value for every block of the path."""
 

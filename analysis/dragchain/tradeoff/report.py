@@ -11,7 +11,7 @@ import pandas as pd
 from dragchain.report.campaign import write_report
 from dragchain.report.page import MINUS, number
 from dragchain.statistics.estimate import CONFIDENCE
-from dragchain.tradeoff.compare import Error, Setting, read_plan_runs
+from dragchain.tradeoff.compare import Setting, read_plan_runs
 from dragchain.tradeoff.figures import draw_pareto
 from dragchain.tradeoff.measure_run import LONG_WAVE, SHORT_WAVE
 from dragchain.tradeoff.measures import MAIN, QUANTITIES
@@ -58,14 +58,14 @@ def size_percent(value: float) -> str:
     return error_percent(value, False)
 
 
-def error_size(error: Error) -> str:
+def error_size(error: ErrorEntry) -> str:
     """An error in per cent; a large one as a multiple."""
     if error.value >= _FOLD:
         return f"{number(1.0 + error.value, 2)}-fold"
     return f"{error_percent(error.value)} %"
 
 
-def error_interval(error: Error) -> str:
+def error_interval(error: ErrorEntry) -> str:
     """The interval of an error, in per cent; that of a large one in multiples."""
     if error.value >= _FOLD:
         return f"{number(1.0 + error.ci95_low, 2)} to {number(1.0 + error.ci95_high, 2)}"
@@ -192,7 +192,7 @@ def _setting_entry(tradeoff: Tradeoff, setting: Setting) -> SettingEntry:
         breaks=breaks(tradeoff, setting),
         relative_cost=tradeoff.cost(setting),
         errors={
-            name: ErrorEntry(**vars(own.errors[setting]))
+            name: own.errors[setting]
             for name, own in tradeoff.comparisons.items()
             if setting in own.errors
         },

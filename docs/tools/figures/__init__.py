@@ -1,7 +1,4 @@
-"""The figures of the documentation: python docs/tools --figures.
-
-`charts` and `drawings` are drawn from records, the rest of `PICTURES` shows a run.
-"""
+"""The figures of the documentation, drawn from records: python docs/tools --figures."""
 
 from io import StringIO
 from pathlib import Path
@@ -10,10 +7,8 @@ import matplotlib
 from matplotlib.text import Text
 
 from dragchain.figures.style import drawing, true_minus
-from dragdeck.errors import DragdeckError
 from figures.charts import CHARTS
 from figures.drawings import draw_geometry
-from figures.pictures import PICTURES, drawn_picture, run_of_study
 
 IMAGES = Path(__file__).resolve().parents[2] / "images"
 
@@ -41,11 +36,6 @@ def svg(name: str) -> str:
 
 
 def draw_all() -> None:
-    """Draw all figures into docs/images; say which pictures cannot be drawn here, and why."""
+    """Draw all figures into docs/images."""
     for name in FIGURES:
         (IMAGES / f"{name}.svg").write_text(svg(name), encoding="utf-8")
-    for name in PICTURES:
-        try:
-            (IMAGES / f"{name}.png").write_bytes(drawn_picture(name, run_of_study()))
-        except DragdeckError as error:
-            print(f"{name}.png was not drawn: {error}")

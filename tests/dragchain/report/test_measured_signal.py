@@ -1,21 +1,18 @@
 """Two force signals of known truth: differences, their intervals and verdicts."""
 
 import math
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
+from force_signals import BANDWIDTH_HZ, synthetic
 from report_files import PICTURES, case_json, make_run, page_of, process_findings
 
 from dragchain.report.measured_signal import SIGNAL_QUANTITIES, Difference, _over_packings, compared
 from dragchain.report.study_report import write_study_report
 from dragchain.statistics.estimate import Estimate
-
-sys.path.append(str(Path(__file__).parents[3] / "benchmarks"))
-from signals import BANDWIDTH_HZ, synthetic
 
 LABELS = [quantity.label for quantity in SIGNAL_QUANTITIES]
 FORCES = [label for label in LABELS if label not in ("peak rate", "correlation time")]

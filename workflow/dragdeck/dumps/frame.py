@@ -63,6 +63,20 @@ class Frame:
         """A column of ids, shape (N,)."""
         return np.asarray(self.columns[name], dtype=np.int64)
 
+    @property
+    def centres(self) -> NDArray[np.float64]:
+        """Centres of N particles, (N, 3)."""
+        return self.vectors("x_m", "y_m", "z_m")
+
+    @property
+    def radii(self) -> NDArray[np.float64]:
+        """Radii of N particles, (N,)."""
+        return self.vectors("radius_m")[:, 0]
+
+    def by_particle(self) -> "Frame":
+        """The rows in the order of particle ids."""
+        return self.take(np.argsort(self.ids("particle_id")))
+
     def take(self, order: NDArray[np.int64]) -> "Frame":
         """Some rows, in the given order."""
         columns: Columns = {name: values[order] for name, values in self.columns.items()}

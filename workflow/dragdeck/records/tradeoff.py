@@ -63,7 +63,18 @@ class FidelityParameters(Part):
 
 
 class ErrorEntry(Part):
-    """An error relative to the reference; `significant`: its 95 % CI excludes zero."""
+    """Difference to the reference, relative to it.
+
+    Attributes
+    ----------
+    value, se : float
+    ci95_low, ci95_high : float
+        Its 95 % CI.
+    bound : float
+        One-sided 95 % upper bound of the absolute error.
+    significant : bool
+        Whether the interval excludes zero.
+    """
 
     value: SixDigits
     se: SixDigits

@@ -1,16 +1,15 @@
 """Which values are plausible: slips of a unit are named before anything is computed."""
 
 import contextlib
-import csv
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatch
 from functools import cache
-from itertools import islice
 from pathlib import Path
 
 from dragdeck.errors import InputError
+from dragdeck.files import table_rows
 from dragdeck.study.base import Json, flat
 
 _FILE = Path(__file__).parents[1] / "data" / "plausible.csv"
@@ -59,11 +58,11 @@ def _ranges() -> Sequence[PlausibleRange]:
 
     Assumptions: they span laboratory and industrial processes, and more.
     """
-    with _FILE.open(encoding="utf-8", newline="") as file:
-        return [
-            PlausibleRange(field, tuple(filter(None, slips.split("; "))), *map(float, limits))
-            for field, *limits, slips in islice(csv.reader(file), 1, None)
-        ]
+    rows = (row.values() for row in table_rows(_FILE))
+    return [
+        PlausibleRange(field, tuple(filter(None, slips.split("; "))), *map(float, limits))
+        for field, *limits, slips in rows
+    ]
 
 
 def plausible_range(field: str) -> PlausibleRange | None:
