@@ -1,8 +1,12 @@
 """Settings of Sphinx for the documentation: ./run docs."""
 
+import re
 import sys
 from importlib.metadata import version as version_of
 from pathlib import Path
+
+from docutils import nodes
+from sphinx.application import Sphinx
 
 sys.path.insert(0, str(Path(__file__).with_name("tools")))
 
@@ -41,3 +45,19 @@ html_theme_options = {
     "show_toc_level": 2,
     "secondary_sidebar_items": ["page-toc"],
 }
+
+_TOGETHER = re.compile(
+    r"(?<=\d) (?=%|(?:[kmµ]?[msNJ]|[kMG]?B|[GMk]?Pa|Hz|kg)\b)|(?<=E) (?=\u00d7)|(?<=\u00d7) (?=\d)"
+)
+
+
+def _keep_together(app: Sphinx, doctree: nodes.document, docname: str) -> None:
+    """No line ends between a number and its unit."""
+    for text in list(doctree.findall(nodes.Text)):
+        if not isinstance(text.parent, nodes.FixedTextElement | nodes.literal):
+            text.parent.replace(text, nodes.Text(_TOGETHER.sub("\u00a0", text)))
+
+
+def setup(app: Sphinx) -> None:
+    """Called by Sphinx."""
+    app.connect("doctree-resolved", _keep_together)

@@ -33,8 +33,8 @@ COMMANDS = (
             "tables.write:write_tables", (RUN_DIR,),
             "dragchain tables results/uhlmann2015/process/RUN"),
     Command("chains", "find contact networks and force chains",
-            "Find the contact network, its clusters and force chains in each frame of a process "
-            "run. It reads the tables of the run and writes network.parquet, clusters.parquet and "
+            "Find contact network, clusters and force chains in each frame of a process run. It "
+            "reads the tables of the run and writes network.parquet, clusters.parquet and "
             "chains.parquet to RUN_DIR/tables.",
             "network.write:write_chains", (RUN_DIR,)),
     Command("loading", "map the load on the workpiece",
@@ -47,17 +47,17 @@ COMMANDS = (
             "RUN_DIR/figures and their values to RUN_DIR/tables/figures.json.",
             "report.run_figures:write_figures", (RUN_DIR,)),
     Command("network", "write the interactive page on the contact network",
-            "Write network.html, an interactive page on the contact network of a process run. It "
-            "reads the tables and force chains of the run and writes the page to RUN_DIR.",
+            "Write network.html, an interactive page on the contact network of a process run, to "
+            "RUN_DIR. It reads the tables and force chains of the run.",
             "network_page.page:write_page", (RUN_DIR,)),
     Command("journal", "draw the figures of a run for a publication",
-            "Draw the figures of a process run in the format of a journal, as SVG, PDF and PNG. It "
-            "reads the tables and figures.json of the run and writes to RUN_DIR/figures/journal.",
+            "Draw the figures of a process run for a journal, as SVG, PDF and PNG in "
+            "RUN_DIR/figures/journal. It reads the tables and figures.json of the run.",
             "report.journal:write_journal_figures", (
         RUN_DIR,
         Argument("--paper-colours", action="store_true",
                   help="show forces from green to red, as in Uhlmann et al. (2015) (default: "
-                  "a map for every kind of colour vision)"))),
+                  "colours for every kind of colour vision)"))),
     Command("export", "export a run to ParaView or OVITO",
             "Export the frames of a run to other programs. It reads the tables of the run and "
             "writes one file per frame for ParaView, or one file for OVITO.",
@@ -78,10 +78,9 @@ COMMANDS = (
                   help="overwrite an earlier export (default: refuse to)")),
             "dragchain export results/uhlmann2015/process/RUN --to paraview --every 10"),
     Command("project", "project load and removal on a mesh of your own",
-            "Project the load on the workpiece, and the removal if the study has a law, on a mesh "
-            "of your own, such as a fine STL or a finite-element surface; sums are conserved. It "
-            "reads the tables of the runs and writes projection.vtu, .csv and .parquet to the "
-            "folder.",
+            "Project the load on the workpiece, and the removal if the study has a law, onto a "
+            "mesh of your own; sums are conserved. It reads the tables of the runs and writes "
+            "projection.vtu, .csv and .parquet to the folder.",
             "report.projection:write_projection", (
         OUT_DIR,
         Argument("run_dirs", type=Path, nargs="+", metavar="RUN_DIR",
@@ -101,15 +100,14 @@ COMMANDS = (
             "report.study_report:write_study_report", (
         OUT_DIR, RUN_DIRS,
         Argument("--advice", type=Path, metavar="FILE",
-                  help="advice.json, made by dragdeck advise, to compare its predicted costs "
-                  "with the actual ones"),
+                  help="advice.json of dragdeck advise, to compare forecast and actual costs"),
         Argument("--preview", type=Path, metavar="FILE",
-                  help="picture of the set-up, set_up.png of dragdeck preview, for the report"),
+                  help="picture of the set-up: set_up.png of dragdeck preview"),
         Argument("--signal", type=Path, metavar="FILE",
-                  help="measured force signal that the study names in reference.signal.file"))),
+                  help="measured force signal: reference.signal.file of the study"))),
     Command("compare", "compare cases of one study or of several",
             "Compare cases: differences with intervals over the packings, load maps on one scale, "
-            "contact networks side by side and, of a sweep over two or more fields, main effects "
+            "contact networks side by side and, for a sweep over two or more fields, main effects "
             "and interactions. It reads tables and figures of the runs and writes comparison.html, "
             "differences.csv and effects.csv to the folder.",
             "compare.report:write_comparison", (

@@ -24,7 +24,7 @@ from dragdeck.cli import PROGRAM as DRAGDECK
 from dragdeck.study.model import BUILT_IN_FIDELITIES, Fidelity, Study
 from dragdeck.study.plausible import plausible_range
 
-NUMBERS = re.compile(r"[-+x ]*\d[\d., %]*(e[-+]\d+)?( \(.*\))?|")
+NUMBERS = re.compile(r"[-+\u00d7 ]*\d[\d., %]*(e[-+]\d+)?( \(.*\))?|")
 
 
 def markdown_table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -61,8 +61,9 @@ def command_sections(parser: argparse.ArgumentParser) -> str:
 def _commands(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
-            for command in action.choices.values():
-                yield from _commands(command)
+            for name, command in action.choices.items():
+                if name != "step":  # what only rules call
+                    yield from _commands(command)
             return
     yield parser
 
@@ -158,7 +159,8 @@ def _named(names: Sequence[str]) -> str:
     for name in names:
         stem, kind, leaf = re.fullmatch(r"(.*?)(?:\[(.*)\](.*))?", name).groups("")
         kinds.setdefault(stem + (f"[%s]{leaf}" if kind else ""), []).append(kind)
-    return ", ".join(f"`{stem.replace('%s', ','.join(found))}`" for stem, found in kinds.items())
+    several = {stem: ",".join(found) if len(found) < 4 else "any" for stem, found in kinds.items()}
+    return ", ".join(f"`{stem.replace('%s', kind)}`" for stem, kind in several.items())
 
 
 def _fields(
@@ -169,7 +171,9 @@ def _fields(
         path = f"{prefix}{name}"
         inner = list(_models(field.annotation))
         if not inner or any(get_args(part)[:1] == (str,) for part in _parts(field.annotation)):
-            yield path, *_usual(path, _limits(field)), _default(field), field.description or ""
+            numbers = path if not _is_row(field.annotation) else f"{path}.0"
+            usual = "" if isinstance(field.default, str) else numbers
+            yield path, *_usual(usual, _limits(field)), _default(field), field.description or ""
         known = [seen[part] for part, _ in inner if part in seen]
         if known:
             place = f"{path}.*" if inner[0][1] else path
@@ -180,6 +184,11 @@ def _fields(
             kind = f"[{_kind(part)}]" if len(inner) > 1 else ""
             seen[part] = f"{path}{kind}"
             yield from _fields(part, f"{path}{kind}.{'*.' if many else ''}", seen)
+
+
+def _is_row(annotation: Any) -> bool:
+    """Whether it is several numbers, such as x and y."""
+    return get_origin(annotation) is tuple and get_origin(get_args(annotation)[0]) is not tuple
 
 
 def _parts(annotation: Any) -> tuple[Any, ...]:
@@ -214,7 +223,7 @@ _SIGNS = {Gt: ("above", "gt"), Ge: ("at least", "ge"), Lt: ("below", "lt"), Le: 
 def _limits(field: FieldInfo) -> str:
     """Limits of a field in words; those of a model stand with its own fields."""
     if get_origin(field.annotation) is Literal:
-        return " or ".join(f"`{value}`" for value in get_args(field.annotation))
+        return ", ".join(f"`{value}`" for value in get_args(field.annotation))
     parts = [part for part in _parts(field.annotation) if part is not types.NoneType]
     if parts and all(get_origin(part) is Annotated for part in parts):
         plain = [part for part in parts if not list(_models(get_args(part)[0]))]
@@ -225,9 +234,12 @@ def _limits(field: FieldInfo) -> str:
         for words, name in [_SIGNS.get(type(item), ("", ""))]
         if name
     ]
-    lengths = [item.min_length for item in field.metadata if isinstance(item, MinLen)]
-    lengths += [item.max_length for item in field.metadata if isinstance(item, MaxLen)]
-    return ", ".join([*found, *([f"{' to '.join(map(str, lengths))} entries"] if lengths else [])])
+    low = [item.min_length for item in field.metadata if isinstance(item, MinLen)]
+    high = [item.max_length for item in field.metadata if isinstance(item, MaxLen)]
+    if low or high:
+        least = f"{low[0]} to {high[0]}" if low and high else f"up to {high[0]}" if high else ""
+        found.append(f"{least or f'{low[0]} or more'} entries")
+    return ", ".join(found)
 
 
 _BOUND = re.compile(r"(above|at least|below|at most) ([^ ,]+),? ?")
@@ -269,12 +281,11 @@ def _default(field: FieldInfo) -> str:
 
 
 def fidelities() -> str:
-    """The built-in fidelities and their settings."""
-    names = list(Fidelity.model_fields)
-    rows = []
-    for name, fidelity in BUILT_IN_FIDELITIES.items():
-        settings = [getattr(fidelity, field) for field in names]
-        rows.append([f"`{name}`", *("none" if one is None else f"{one:g}" for one in settings)])
+    """The built-in fidelities and the settings in which they differ."""
+    found = {name: fidelity.model_dump() for name, fidelity in BUILT_IN_FIDELITIES.items()}
+    names = [name for name in Fidelity.model_fields
+             if len({str(one.get(name)) for one in found.values()}) > 1]  # fmt: skip
+    rows = [[f"`{name}`", *(f"{one[field]:g}" for field in names)] for name, one in found.items()]
     return markdown_table(["name", *names], rows)
 
 

@@ -8,8 +8,8 @@ from dragdeck.command_line import Argument, Command, Program
 STUDY = Argument("study", metavar="STUDY", help="name of the study: a folder in studies/")
 FIDELITY = Argument(
     "--fidelity", metavar="NAME",
-    help="settings for speed and accuracy: draft, standard, fine, full, reference, or a name under "
-    "fidelities in the study (default: those of the study)",
+    help="settings: draft, standard, fine, full, reference, or a name under fidelities in the "
+    "study (default: those of the study)",
 )  # fmt: skip
 PLAN = Argument(
     "--plan", metavar="NAME",
@@ -23,9 +23,8 @@ SCENE = "drop_test, filling or process"
 
 COMMANDS = (
     Command("check", "check a study without running it",
-            "Check a study: build every input script in memory, look for LIGGGHTS, and print the "
-            "expected number and cost of the runs, and warnings. It reads studies/STUDY and writes "
-            "nothing.",
+            "Check a study: build every input script in memory, look for LIGGGHTS, and print "
+            "warnings and the expected number and cost of the runs. It writes nothing.",
             "commands:check", (
         STUDY, FIDELITY,
         Argument("--verbose", action="store_true",
@@ -33,7 +32,7 @@ COMMANDS = (
             "dragdeck check uhlmann2015 --fidelity draft"),
     Command("explain", "explain what the input scripts model",
             "Explain what the input scripts of a study model, what they leave out, and what both "
-            "cost. It reads studies/STUDY and the speeds of earlier runs, and writes nothing.",
+            "cost. It writes nothing.",
             "commands:explain", (
         STUDY, FIDELITY,
         Argument("--verbose", action="store_true",
@@ -43,8 +42,8 @@ COMMANDS = (
             "dragdeck explain uhlmann2015 process"),
     Command("status", "show the progress of a study",
             "Show which runs of a study are complete, running, interrupted, failed or waiting, and "
-            "how long the remaining ones will take. It reads results/STUDY and writes nothing, so "
-            "it can be called at any time.",
+            "how long the remaining ones will take. It writes nothing and can be called at any "
+            "time.",
             "status:status", (
         STUDY, FIDELITY, PLAN,
         Argument("--verbose", action="store_true",
@@ -63,8 +62,8 @@ COMMANDS = (
                   help="case to draw, as dragdeck cases lists it (default: the first)")),
             "dragdeck preview planetary"),
     Command("new", "create a study",
-            "Create studies/STUDY/study.yaml, a study that extends another: fields that it does "
-            "not set are taken from the other study.",
+            "Create studies/STUDY/study.yaml, which takes the fields that it does not set from "
+            "another study.",
             "commands:new", (
         Argument("study", metavar="STUDY", help="name of the new study, without spaces"),
         Argument("--from", default="uhlmann2015", metavar="STUDY", dest="base",
@@ -72,12 +71,12 @@ COMMANDS = (
             "dragdeck new my-part --from uhlmann2015"),
     Command("cases", "list the cases of a study",
             "List the cases of a study with the run ids of their drop test, filling and process. "
-            "It reads studies/STUDY and writes nothing.",
+            "It writes nothing.",
             "commands:cases", (STUDY, FIDELITY, PLAN)),
     Command("shapes", "compare clumps of spheres with their bodies",
-            "List, for each shape of the media, how volume, inertia and surface of a clump of "
-            "spheres differ from the body, and what it costs, by number of spheres; * marks the "
-            "number in the study. It reads studies/STUDY and writes nothing.",
+            "List how volume, inertia and surface of clumps of spheres differ from the shapes of "
+            "the media, and what they cost, by number of spheres; * marks the number in the "
+            "study. It writes nothing.",
             "commands:shapes", (STUDY, FIDELITY),
             "dragdeck shapes cylinders"),
     Command("advise", "find settings for a tolerance",
@@ -90,14 +89,13 @@ COMMANDS = (
                   help="half-width of the 95 %% confidence interval, relative, from 0 to 1; for a "
                   "restitution the largest error (default: the study's, or 0.1)"),
         Argument("--quantity", metavar="NAME",
-                  help="quantity to which the tolerance applies, for example drag_mean, drag_std, "
-                  "workpiece_contacts or restitution; docs/reference/study.md lists all (default: "
-                  "the study's, or drag_mean)")),
+                  help="quantity to which the tolerance applies, for example drag_mean; "
+                  "docs/evidence/tradeoff.md lists all (default: the study's, or drag_mean)")),
             "dragdeck advise uhlmann2015 --tolerance 0.05 --quantity drag_mean"),
     Command("run", "run or resume one input script",
-            "Run the input script in.liggghts of a run folder with LIGGGHTS, or resume it from its "
-            "last checkpoint, and apply the acceptance checks. It writes the raw output and "
-            "state.json to that folder.",
+            "Run the input script of a run folder with LIGGGHTS, or resume it from its last "
+            "checkpoint, and apply the acceptance checks. It writes raw output and state.json "
+            "to the folder.",
             "engine.run_folder:run_command", (
         Argument("folder", type=Path, metavar="RUN_DIR",
                   help="folder of the run: results/STUDY/SCENE/RUN"),

@@ -181,14 +181,14 @@ def _draw_tradeoff(tolerance: float = 0.1) -> Figure:
         sides = [own["value"] - own["ci95_low"], own["ci95_high"] - own["value"]]
         axes.errorbar(
             1 / own["relative_cost"], 100 * own["value"], [100 * side for side in sides],
-            fmt=mark, color=shade, capsize=2, lw=1, label=f"Young's modulus x {level:g}",
+            fmt=mark, color=shade, capsize=2, lw=1, label=f"Young's modulus \u00d7 {level:g}",
         )  # fmt: skip
     best = rows[rows["bound"] < rows["bound"].cummin().shift(fill_value=np.inf)]
     words = ["Pareto-optimal by cost and\n95 % bound of the error:"]
     for count, row in enumerate(best.itertuples(), start=1):
-        speed = f", speed x {row.speed_factor:g}" if row.speed_factor != 1 else ""
-        step = f"{row.timestep_fraction:.0%}{speed}"
-        words.append(f"{count}  E x {row.youngs_modulus_scale:g}, {step}")
+        speed = f", speed \u00d7 {row.speed_factor:g}" if row.speed_factor != 1 else ""
+        step = f"{100 * row.timestep_fraction:.0f} %{speed}"
+        words.append(f"{count}  E \u00d7 {row.youngs_modulus_scale:g}, {step}")
         axes.annotate(
             str(count), (1 / row.relative_cost, 100 * row.ci95_high), (0, 3),
             textcoords="offset points", fontsize=8.5, weight="bold", color=INK, ha="center",
@@ -218,7 +218,8 @@ def _draw_validation() -> Figure:
         ends = row.drag_n_ci95_low, row.drag_n_ci95_high
         rows.append((f"packing {row.seed}", row.drag_n_mean, *ends, COLOURS["drag"]))
     for row in effects.itertuples():
-        name, colour = f"E x {row.youngs_modulus_scale:g}, {row.timestep_fraction:.0%}", ORANGE
+        step = f"{100 * row.timestep_fraction:.0f} %"
+        name, colour = f"E \u00d7 {row.youngs_modulus_scale:g}, {step}", ORANGE
         if isinstance(row.field, str):
             words = row.field.removeprefix("motion.").replace(".shape", "").replace("_m", "")
             name, colour = f"{words.replace('.', ' ')} {1e3 * row.value:g} mm", GREY

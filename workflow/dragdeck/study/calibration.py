@@ -34,12 +34,14 @@ class Drum(Model):
     It turns about its horizontal axis.
     """
 
-    angle_deg: Measured = Field(description="angle of the moving surface to the horizontal")
+    angle_deg: Measured = Field(
+        description="angle of the moving surface to the horizontal, degrees"
+    )
     angle_std_deg: Positive = Field(description="its standard uncertainty, degrees")
     radius_m: Positive = Field(description="inner radius of the drum, under the glued layer, m")
     width_m: Positive = Field(description="distance between its end plates, m")
     fill_fraction: Annotated[Number, Field(ge=0.1, le=0.4)] = Field(
-        description="volume of the bed over that of the drum, inside the glued layer"
+        description="volume of the bed / volume of the drum inside the glued layer"
     )
     rpm: Positive = Field(description="rotational speed of the drum, 1/min")
 
@@ -53,10 +55,11 @@ class Angles(Model):
     """Measured angles, from which friction and rolling friction of the media are found."""
 
     friction: tuple[Positive, Positive] = Field(
-        default=(0.05, 1.0), description="range of the friction coefficient: equally likely in it"
+        default=(0.05, 1.0), description="range of the friction coefficient, with equal probability"
     )
     rolling_friction: tuple[Positive, Positive] = Field(
-        default=(0.005, 0.4), description="range of the coefficient of rolling friction, likewise"
+        default=(0.005, 0.4),
+        description="range of the coefficient of rolling friction, with equal probability",
     )
     repose: Repose | None = None
     drum: Drum | None = None
@@ -102,12 +105,12 @@ class Calibration(Model):
         description="CSV file of force against time in a drop test; relative to the study",
     )
     height_std_m: Positive = Field(
-        default=1e-4, description="standard uncertainty of drop_test.height_m in the test, m"
+        default=1e-4, description="standard uncertainty of `drop_test.height_m`, m"
     )
     peaks: Literal["auto", "yes", "no"] = Field(
         default="auto",
-        description="whether to fit the ratios of the peak forces too; auto: if the "
-        "sensor is fast enough",
+        description="whether ratios of peak forces are fitted, too; auto: if the sensor is fast "
+        "enough",
     )
     angles: Angles | None = Field(default=None, exclude_if=lambda value: value is None)
 

@@ -108,8 +108,8 @@ class Pair(Model):
     ] = 0.0  # fmt: skip
     rolling_damping: Annotated[
         Number,
-        Field(ge=0, le=10, description="damping ratio of the rolling spring, of the model epsd "
-              "only", exclude_if=lambda value: value == 0),
+        Field(ge=0, le=10, description="damping ratio of the rolling spring; for `epsd` only",
+              exclude_if=lambda value: value == 0),
         Coefficient("coefficientRollingViscousDamping", "damping of rolling"),
     ] = 0.0  # fmt: skip
     cohesion_j_m3: Annotated[

@@ -72,13 +72,13 @@ class Grains(Model):
     )
     distribution: Literal["normal", "log_normal", "uniform"] = Field(
         default="normal",
-        description="distribution of the radii that has this mean and standard deviation",
+        description="distribution of the radii",
         exclude_if=lambda value: value == "normal",
     )
     sieve: Annotated[list[Sieve], Field(min_length=2, max_length=MOST_SIEVES)] | None = Field(
         default=None,
-        description="sieve analysis instead of radius_mean_m: rows [diameter in m, fraction of the "
-        "mass that is finer], linear between them; or a CSV file with the columns diameter_m and "
+        description="sieve analysis instead of radius_mean_m: rows [diameter in m, finer fraction "
+        "of the mass], linear in between; or a CSV file with the columns diameter_m and "
         "mass_passing",
         exclude_if=_none,
     )
@@ -198,7 +198,7 @@ class MediaClass(Grains):
     """One of several classes of particles."""
 
     fraction: Annotated[Number, Field(gt=0, le=1)] = Field(
-        description="fraction of the class; those of all classes sum to 1"
+        description="fraction of the class; all fractions sum to 1"
     )
 
 
@@ -213,8 +213,8 @@ class Media(Grains):
     )
     fill_height_m: Positive | None = Field(
         default=None,
-        description="expected height of the bed, m, instead of count: an estimate with the solid "
-        "fraction of a poured bed; the height obtained is in the report",
+        description="expected height of the bed, m, instead of count; the report states the height "
+        "obtained",
         exclude_if=_none,
     )
     classes: dict[Name, MediaClass] = Field(
@@ -225,7 +225,7 @@ class Media(Grains):
     )
     fractions_of: Literal["number", "mass", "volume"] = Field(
         default="mass",
-        description="what the fractions of the classes refer to",
+        description="quantity to which the fractions of the classes refer",
         exclude_if=lambda value: value == "mass",
     )
 

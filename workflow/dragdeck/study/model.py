@@ -66,7 +66,7 @@ class Compound(Model):
     density_kg_m3: Positive = Field(description="density of the liquid, kg/m3")
     level_m: Positive | None = Field(
         default=None,
-        description="height of the liquid's surface above the floor, m; none: the rim of the bowl",
+        description="height of the liquid above the floor, m; none: up to the rim of the bowl",
     )
 
 
@@ -99,14 +99,14 @@ class Motion(Superposed):
     path: Annotated[AnyPath, Field(discriminator="kind")]
     speed_m_s: Positive | None = Field(
         default=None,
-        description="speed of the workpiece's axis along the path, m/s; required except for the "
-        "paths `rest` and `waypoints`",
+        description="speed of the workpiece's axis along the path, m/s; required except for `rest` "
+        "and `waypoints`",
     )
     ramp_s: NonNegative = Field(
         default=0.0,
         exclude_if=lambda value: value == 0,
-        description="time in which the workpiece starts from rest along its path, in seconds at "
-        "the study's own speed; no statistic includes it; not for `rest` and `waypoints`",
+        description="duration of the start from rest along the path, s, with `speed_factor` 1; "
+        "excluded from all statistics; not for `rest` and `waypoints`",
     )
     immersion_depth_m: Positive = Field(description="depth of the tip below the settled surface, m")
     orientation: Literal["follow_path", "fixed"] = Field(
@@ -115,28 +115,28 @@ class Motion(Superposed):
     )
     tilt_deg: Annotated[Number, Field(ge=-45, le=45)] | None = Field(
         default=None,
-        description="angle between the workpiece's axis and the vertical, degrees; positive: its "
-        "upper end leans in the direction of motion, with orientation fixed in the first "
-        "direction; with `spin` the workpiece turns about its inclined axis",
+        description="inclination of the workpiece, degrees; positive: its upper end leans in the "
+        "direction of motion, with orientation fixed in the first one; `spin` is then about the "
+        "inclined axis",
     )
     plunge_at_m: tuple[Number, Number] | None = Field(
         default=None,
-        description="x and y at which the workpiece is immersed, m; none: the bowl's axis for a "
-        "circle, else the start of the path",
+        description="x and y of the immersion, m; none: the bowl's axis for a circle, otherwise "
+        "the start of the path",
     )
     plunge_speed_m_s: Positive = Field(
-        default=0.05, description="vertical speed of the workpiece during the plunge, m/s"
+        default=0.05, description="vertical speed during the plunge, m/s"
     )
     approach_speed_m_s: Positive = Field(
-        default=0.02, description="speed of the workpiece from the plunge position to the path, m/s"
+        default=0.02, description="speed from the place of immersion to the start of the path, m/s"
     )
     transient_m: NonNegative = Field(
         description="initial path length excluded from all statistics, m"
     )
     counted_from_revolution: Annotated[Whole, Field(ge=1)] | None = Field(
         default=None,
-        description="first revolution of a circle that the statistics include, from 1; none: all "
-        "after `transient_m`",
+        description="first revolution of a circle that the statistics include; none: all after "
+        "`transient_m`",
     )
 
     @model_validator(mode="after")
@@ -239,13 +239,13 @@ class DropTest(Model):
     """The drop test: one mean particle on a plate of the workpiece's material."""
 
     height_m: Positive = Field(
-        default=0.010, description="drop height: gap between particle and plate at the start, m"
+        default=0.010, description="gap between particle and plate at the start, m"
     )
     impacts: Annotated[Whole, Field(ge=1, le=20)] = Field(
-        default=3, description="number of impacts that the drop test simulates"
+        default=3, description="number of impacts"
     )
     timestep_fraction: Annotated[Number, Field(gt=0, le=1)] = Field(
-        default=0.02, description="time step of the drop test as a fraction of the Rayleigh time"
+        default=0.02, description="time step as a fraction of the Rayleigh time"
     )
 
 
@@ -254,12 +254,10 @@ class Filling(Model):
 
     energy_ratio: Annotated[Number, Field(gt=0, le=1e-3)] = Field(
         default=1e-5,
-        description="settling criterion: largest mean kinetic energy per particle / (m g d); "
-        "0.001 lifts a particle by a thousandth of its diameter",
+        description="settling criterion: largest mean kinetic energy per particle / (m g d)",
     )
     max_time_s: Positive = Field(
-        default=10.0,
-        description="the run fails if the packing has not settled within this simulated time, s",
+        default=10.0, description="simulated time after which an unsettled packing is rejected, s"
     )
 
 
@@ -280,8 +278,8 @@ class Outputs(Model):
     )
     first_touch_fraction: Annotated[Number, Field(ge=0, le=1)] = Field(
         default=0,
-        description="part of the drag, at its end, in which the contacts on the workpiece are "
-        "written at every step, for the velocity at first touch; 0: none",
+        description="fraction of the drag, at its end, in which contacts on the workpiece are "
+        "written at every step, for the velocity at first touch",
         exclude_if=lambda value: value == 0,
     )
 
@@ -330,7 +328,7 @@ class Windows(Model):
     """Short runs at physical stiffness along the path, until quantities are known well enough."""
 
     tolerance: Annotated[Number, Field(ge=1e-4, lt=1)] = Field(
-        description="half-width of the 95 % confidence interval, relative, at which no further "
+        description="relative half-width of the 95 % confidence interval at which no further "
         "window is run"
     )
     quantities: Annotated[list[Quantity], Field(min_length=1)] = Field(
@@ -384,14 +382,14 @@ class Fidelity(Model):
         exclude_if=lambda value: value is None,
     )
     speed_factor: Annotated[Number, Field(ge=1, le=100)] = Field(
-        default=1.0, description="multiplier of the speed of the workpiece; 1: real speed"
+        default=1.0, description="multiplier of the speed of the workpiece"
     )
     skin_m: Positive | None = Field(
         default=None, description="neighbour skin, m; none: 10 % of the mean particle radius"
     )
     ranks: Ranks = Field(
         default=2,
-        description="number of MPI ranks; auto: chosen from particles, cases and cores "
+        description="number of MPI ranks; auto: from particles, cases and cores "
         "(docs/howto/running.md)",
     )
 
@@ -451,12 +449,12 @@ class Tolerance(Model):
     """A tolerance instead of settings: runs go on until the results are inside it."""
 
     tolerance: Annotated[Number, Field(ge=1e-4, lt=1)] = Field(
-        description="half-width of the 95 % confidence interval at the physical Young's modulus, "
-        "relative"
+        description="relative half-width of the 95 % confidence interval at the physical Young's "
+        "modulus"
     )
     quantity: Quantity | Annotated[list[Quantity], Field(min_length=1, max_length=8)] = Field(
         default="drag_mean",
-        description="quantity, or list of those, to which the tolerance applies",
+        description="quantity, or list of up to eight, to which the tolerance applies",
     )
 
     @property
@@ -483,16 +481,11 @@ AnyFidelity = Annotated[
 class Scaling(Model):
     """A power law of the mean drag as a function of one sweep field."""
 
-    field: str = Field(
-        description="dotted name of the `sweep` field of the power law; its values must be above 0"
-    )
-    expected_exponent: Number | None = Field(
-        default=None, description="exponent with which the fitted exponent is compared"
-    )
+    field: str = Field(description="dotted name of the `sweep` field; its values must be above 0")
+    expected_exponent: Number | None = Field(default=None, description="expected exponent")
     source: str | None = Field(default=None, description="source of the expected exponent")
     fit_range: tuple[Positive, Positive] | None = Field(
-        default=None,
-        description="lowest and highest value at which the exponent is expected; none: all",
+        default=None, description="lowest and highest value at which it is expected; none: all"
     )
 
     @model_validator(mode="after")
@@ -519,11 +512,11 @@ class Accepted(Model):
 
     unsafe_timestep: Line | None = Field(
         default=None,
-        description="reason for a process time step that is forecast to be unstable, and "
-        "for accepting its run; shown among assumptions and acceptance checks of the report",
+        description="reason for a time step that is forecast to be unstable, and for accepting its "
+        "run; shown in the report",
     )
     cases: Annotated[Whole, Field(ge=1)] = Field(
-        default=200, description="largest accepted number of cases of `sweep`"
+        default=200, description="largest number of cases of `sweep`"
     )
 
 
@@ -542,8 +535,7 @@ class Study(Model):
     title: Line = Field(description="title of the study in one line, used in headings")
     licence: Line | None = Field(
         default=None,
-        description="licence under which the results may be used, as an SPDX name or an address; "
-        "the RO-Crate states it",
+        description="licence of the results, as an SPDX name or an address; the RO-Crate states it",
     )
     gravity_m_s2: Positive = Field(
         default=9.81, description="gravitational acceleration along -z, m/s2"
@@ -565,12 +557,12 @@ class Study(Model):
     outputs: Outputs = Outputs()
     fidelity: AnyFidelity = Field(
         default="standard",
-        description="settings for speed and accuracy: a name, a block, or a tolerance to meet",
+        description="settings for speed and accuracy: a name, a block, or a tolerance",
     )
     fidelities: dict[Name, Fidelity] = Field(default_factory=dict)
     seed: Annotated[Whole, Field(ge=0, lt=2**32)] = Field(
         default=1,
-        description="random seed of the initial positions and velocities (one seed = one packing)",
+        description="random seed of the initial positions and velocities; one seed is one packing",
     )
     sweep: dict[str, list[Any]] = Field(
         default_factory=dict,

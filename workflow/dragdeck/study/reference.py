@@ -31,7 +31,7 @@ class Signal(Model):
         default=None, description="sampling rate, Hz; none: a column `time_s`, `_ms` or `_us`"
     )
     component: Literal["drag", "lateral", "vertical"] = Field(
-        default="drag", description="axis: along the motion, to its left, or upwards"
+        default="drag", description="axis of the force: along the motion, to its left, or upwards"
     )
     sign: Literal[1, -1] = Field(
         default=1, description="1: force on the workpiece along this axis; -1: resistance"
@@ -40,12 +40,17 @@ class Signal(Model):
         default=(), description="stretches without load, s: one for the offset, two for a drift too"
     )
     starts_at_s: Number | None = Field(
-        default=None, description="start of the drag in the file, s; none: found after `rest_s`"
+        default=None,
+        description="start of the drag, s; none: found after the first stretch of `rest_s`",
     )
     ends_at_s: Number | None = Field(
-        default=None, description="end of the drag in the file, s; none: of the file, or rest_s.1"
+        default=None,
+        description="end of the drag, s; none: the second stretch of `rest_s`, or the end of the "
+        "file",
     )
-    low_pass_hz: Positive = Field(description="bandwidth, Hz: at most a fifth of both rates")
+    low_pass_hz: Positive = Field(
+        description="bandwidth of the comparison, Hz: at most a fifth of both rates"
+    )
     margin: Annotated[Number, Field(gt=0, lt=1)] = Field(
         default=0.1, description="largest relative difference that is called equivalent"
     )
@@ -54,7 +59,7 @@ class Signal(Model):
 class Reference(Model):
     """Published values with which the results are compared."""
 
-    source: str = Field(description="publication from which the values are taken")
+    source: str = Field(description="source of the values")
     experiment: Drag | None = Field(default=None, description="values measured in an experiment")
     simulation: Drag | None = Field(default=None, description="values simulated by others")
     signal: Signal | None = Field(

@@ -47,13 +47,13 @@ class Removal(Model):
         default=None, description="weighed trial of this process, or a list of those"
     )
     impact_ratio: Positive | None = Field(
-        default=None, description="of a sum: coefficient of the impact law over that of sliding"
+        default=None, description="of a sum: coefficient of the impact law / that of sliding"
     )
     hardness_pa: Positive | None = Field(
-        default=None, description="Vickers hardness of the workpiece, Pa; of `oka` only"
+        default=None, description="Vickers hardness of the workpiece, Pa; for `oka` only"
     )
     target_depth_m: Positive | None = Field(
-        default=None, description="depth of removal whose time is reported, m"
+        default=None, description="removal depth for which the time is reported, m"
     )
 
     @field_validator("calibrate", mode="before")

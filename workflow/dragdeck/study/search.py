@@ -43,14 +43,14 @@ class SearchedMeasure(Model):
 
     quantity: SearchedQuantity = Field(
         description="`removal_depth` (mean over the immersed surface, um/h), `removal_variation` "
-        "(coefficient of variation of it), `minutes` (to `removal.target_depth_m` on average) or "
+        "(its coefficient of variation), `minutes` (to `removal.target_depth_m` on average), "
         "`minutes_slowest` (on 95 % of the surface), `peak_pressure` (95th percentile over first "
         "touches, Pa), or a quantity of the report, in its unit"
     )
     heights_m: tuple[Number, Number] | None = Field(
         default=None,
-        description="of `removal_*`: part of the surface between two heights above the tip, m; "
-        "none: all of it",
+        description="for `removal_*`: two heights above the tip between which the surface counts, "
+        "m; none: all of it",
     )
 
     @model_validator(mode="after")
@@ -75,9 +75,10 @@ class Objective(SearchedMeasure):
     """What is to be as small or large as possible, or near a value."""
 
     goal: Literal["minimise", "maximise", "target"] = Field(
-        default="minimise", description="what is wanted of it: minimise, maximise or target"
+        default="minimise",
+        description="whether the quantity is minimised, maximised, or brought to `value`",
     )
-    value: Number | None = Field(default=None, description="of the goal `target`: the value")
+    value: Number | None = Field(default=None, description="target value")
 
     @model_validator(mode="after")
     def _wanted(self) -> "Objective":
@@ -113,16 +114,16 @@ class Search(Model):
     objective: Objective
     limits: list[SearchLimit] = Field(default_factory=list, description="limits on quantities")
     runs: Annotated[Whole, Field(ge=4, le=200)] = Field(
-        default=20, description="number of settings that are tried before the confirmation"
+        default=20, description="number of settings tried before the confirmation"
     )
     start: Annotated[Whole, Field(ge=3, le=100)] = Field(
-        default=6, description="those of the first round, spread evenly"
+        default=6, description="settings of the first round, spread evenly"
     )
     at_once: Annotated[Whole, Field(ge=1, le=16)] = Field(
         default=1, description="settings per further round"
     )
     confirm: Name = Field(
-        default="full", description="fidelity at which the best setting is run again"
+        default="full", description="fidelity of the confirmation of the best setting"
     )
     seed: Annotated[Whole, Field(ge=0, lt=2**31)] = Field(
         default=1, description="random seed of the search"

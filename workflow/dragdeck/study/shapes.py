@@ -59,11 +59,11 @@ def _ring(height: float, cut: float = 0.0) -> Corners:
 class CylinderParticle(ParticleShape):
     """A cylinder, its ends straight or cut at an angle."""
 
-    kind: Literal["cylinder"] = Field(description="cylinder: ends straight or cut at an angle")
-    aspect: _Aspect = Field(description="ratio of length to diameter")
+    kind: Literal["cylinder"] = Field(description="cylinder with straight ends, or cut at an angle")
+    aspect: _Aspect = Field(description="length / diameter")
     cut_deg: Annotated[Number, Field(ge=0, le=60)] = Field(
         default=0.0,
-        description="angle between the two parallel end faces and those of a straight cylinder, "
+        description="angle of the two parallel end faces from those of a straight cylinder, "
         "degrees",
         exclude_if=lambda value: not value,
     )
@@ -77,8 +77,8 @@ class CylinderParticle(ParticleShape):
 class ConeParticle(ParticleShape):
     """A circular cone."""
 
-    kind: Literal["cone"] = Field(description="cone: a circular cone")
-    aspect: _Aspect = Field(description="ratio of height to diameter of the base")
+    kind: Literal["cone"] = Field(description="circular cone")
+    aspect: _Aspect = Field(description="height / diameter of the base")
 
     def corners(self) -> Corners:
         """The rim of the base and the tip."""
@@ -88,7 +88,7 @@ class ConeParticle(ParticleShape):
 class TetrahedronParticle(ParticleShape):
     """A regular tetrahedron."""
 
-    kind: Literal["tetrahedron"] = Field(description="tetrahedron: a regular tetrahedron, pyramid")
+    kind: Literal["tetrahedron"] = Field(description="regular tetrahedron")
 
     def corners(self) -> Corners:
         """Four corners of a cube."""
@@ -99,9 +99,9 @@ class PrismParticle(ParticleShape):
     """A straight prism on an equilateral triangle."""
 
     kind: Literal["triangular_prism"] = Field(
-        description="triangular_prism: a straight prism on an equilateral triangle"
+        description="straight prism on an equilateral triangle"
     )
-    aspect: _Aspect = Field(description="ratio of length to the side of the triangle")
+    aspect: _Aspect = Field(description="length / side of the triangle")
 
     def corners(self) -> Corners:
         """Three corners of each end."""
@@ -113,10 +113,9 @@ class PrismParticle(ParticleShape):
 class EllipsoidParticle(ParticleShape):
     """An ellipsoid."""
 
-    kind: Literal["ellipsoid"] = Field(description="ellipsoid: three half-axes")
+    kind: Literal["ellipsoid"] = Field(description="ellipsoid")
     axes: tuple[Positive, Positive, Positive] = Field(
-        description="proportion of the three half-axes, such as [2, 1, 1]; the largest is at most "
-        "5 times the smallest"
+        description="proportions of the half-axes, such as [2, 1, 1]; ratio at most 5"
     )
 
     @model_validator(mode="after")
@@ -140,12 +139,12 @@ class EllipsoidParticle(ParticleShape):
 class MeshParticle(ParticleShape):
     """A body of the user's; its size in the file is of no importance."""
 
-    kind: Literal["mesh"] = Field(description="mesh: a convex body from a mesh file")
+    kind: Literal["mesh"] = Field(description="convex body from a mesh file")
     points: Annotated[
         tuple[tuple[Number, Number, Number], ...], Field(min_length=4, max_length=MOST_CORNERS)
     ] = Field(
-        description="name of a file beside the study with a closed, convex surface, such as an STL "
-        "file; or a list of its corners"
+        description="file beside the study with a closed, convex surface, for example STL; or a "
+        "list of corners"
     )
 
     def corners(self) -> Corners:

@@ -11,9 +11,7 @@ from dragdeck.study.base import Line, Model, Number, Positive, Whole
 class CylinderShape(Model):
     """A generated round workpiece with flat ends."""
 
-    kind: Literal["cylinder"] = Field(
-        description="cylinder: dragdeck generates the mesh of a cylinder"
-    )
+    kind: Literal["cylinder"] = Field(description="cylinder, meshed by dragdeck")
     radius_m: Positive = Field(description="radius of the cylinder, m")
     facet_size_m: Positive = Field(
         default=0.0015, description="mesh size of the cylinder around its axis, m"
@@ -26,36 +24,29 @@ class CylinderShape(Model):
 class MeshShape(Model):
     """A workpiece from a mesh or CAD file, turned upright, its lowest point the tip."""
 
-    kind: Literal["mesh"] = Field(description="mesh: the workpiece is read from a file")
+    kind: Literal["mesh"] = Field(description="part from a file")
     file: Line = Field(
-        description="mesh file in STL, OBJ, PLY, VTK, VTU or STEP format; its "
-        "path is relative to the study "
-        "or to meshes/"
+        description="file in STL, OBJ, PLY, VTK, VTU or STEP format, relative to the study or to "
+        "meshes/"
     )
-    unit: Literal["m", "cm", "mm", "um", "in"] = Field(
-        description="unit of length in the mesh file"
-    )
+    unit: Literal["m", "cm", "mm", "um", "in"] = Field(description="unit of length in the file")
     facet_size_m: Positive | None = Field(
         default=None,
-        description="target edge length of the mesh of a STEP part, m; required for STEP and for "
-        "no other format",
+        description="target edge length of the mesh of a STEP part, m; required for STEP only",
     )
     edge_facet_size_m: Positive | None = Field(
-        default=None,
-        description="target edge length of the mesh at sharp edges of a STEP part, m; none: "
-        "`facet_size_m`",
+        default=None, description="the same at sharp edges, m; none: `facet_size_m`"
     )
     axis: Literal["+x", "-x", "+y", "-y", "+z", "-z"] = Field(
         default="+z",
         exclude_if=lambda value: value == "+z",
-        description="direction of the clamping axis in the mesh file, from tip to clamp; "
-        "the mesh is "
-        "turned until this axis is vertical, about y for x, about x for the others",
+        description="direction in the file from tip to clamp; the part is turned until it points "
+        "up, about y for x, about x for the others",
     )
     offset_m: tuple[Number, Number] | None = Field(
         default=None,
-        description="x and y of the clamping axis in the file after this turn, m; none: the centre "
-        "of the bounding box",
+        description="x and y of the clamping axis after this turn, m; none: centre of the bounding "
+        "box",
     )
 
 
@@ -73,8 +64,8 @@ class Station(Model):
     """A workpiece of a carousel."""
 
     angle_deg: Number = Field(
-        description="angle about the bowl's axis by which its path and motion are turned, degrees; "
-        "positive: counter-clockwise seen from above"
+        description="angle of its path and motion about the bowl's axis, degrees; positive: "
+        "counter-clockwise seen from above"
     )
     shape: Shape | None = None
 
@@ -84,8 +75,8 @@ class Carousel(Model):
 
     count: Annotated[Whole, Field(ge=1, le=12)] | None = Field(
         default=None,
-        description="number of workpieces at equal angles, all of the shape `workpiece.shape`; "
-        "either this or a list of them",
+        description="number of workpieces with `workpiece.shape` at equal angles; either this or a "
+        "list",
     )
     each: list[Station] | None = Field(default=None, min_length=1, max_length=12)
 

@@ -24,15 +24,13 @@ from dragdeck.study.paths.path import AroundBowl, Point, StartAngle
 class CirclePath(AroundBowl):
     """A circle about the bowl's axis."""
 
-    kind: Literal["circle"] = Field(
-        description="circle: the path is a circle about the bowl's axis"
-    )
+    kind: Literal["circle"] = Field(description="circle about the bowl's axis")
     radius_m: Positive = Field(description="radius of the path of the workpiece's axis, m")
     start_deg: StartAngle = 0.0
     revolutions: Positive = Field(default=1.0, description="length of the path in revolutions")
     direction: Literal["ccw", "cw"] = Field(
         default="ccw",
-        description="direction of motion seen from above: ccw (counter-clockwise) or cw",
+        description="direction of motion seen from above: counter-clockwise or clockwise",
     )
 
     @property

@@ -18,18 +18,15 @@ class FigureEightPath(FromPlace):
     place_field: ClassVar[str] = "middle_m"
 
     kind: Literal["figure_eight"] = Field(
-        description="figure_eight: the path is two circles that touch, one gone round "
-        "counter-clockwise and the other clockwise, in turn"
+        description="two touching circles in turn, one counter-clockwise, the other clockwise"
     )
     radius_m: Positive = Field(description="radius of both circles, m")
     middle_m: tuple[Number, Number] = Field(
-        default=(0.0, 0.0),
-        description="x and y of the point where the circles touch and the drag begins, m",
+        default=(0.0, 0.0), description="x and y where the circles touch and the drag starts, m"
     )
     direction_deg: Number = Field(
         default=0.0,
-        description="angle of the direction of motion at that point from +x, degrees; the first "
-        "circle is to the left",
+        description="direction of motion there, from +x, degrees; the first circle is to the left",
     )
     loops: Positive = Field(default=1.0, description="length of the path in figures eight")
 

@@ -19,13 +19,11 @@ class LinePath(FromPlace):
     place_field: ClassVar[str] = "start_m"
     one_direction: ClassVar[bool] = True
 
-    kind: Literal["line"] = Field(description="line: the path is a straight line")
+    kind: Literal["line"] = Field(description="straight line")
     start_m: tuple[Number, Number] = Field(
         description="x and y of the workpiece's axis at the start of the drag, m"
     )
-    direction_deg: Number = Field(
-        default=0.0, description="angle of the direction of motion from +x, degrees"
-    )
+    direction_deg: Number = Field(default=0.0, description="direction of motion, from +x, degrees")
     length_m: Positive = Field(description="length of the drag, m")
 
     def words(self, number: Callable[[float], str]) -> str:

@@ -20,9 +20,7 @@ class RestPath(AroundBowl):
 
     one_direction: ClassVar[bool] = True
 
-    kind: Literal["rest"] = Field(
-        description="rest: the workpiece stands still and the bowl rotates"
-    )
+    kind: Literal["rest"] = Field(description="the workpiece stands still, the bowl rotates")
     radius_m: Positive = Field(description="distance between the axes of workpiece and bowl, m")
     bowl_rpm: Number = Field(
         description="rotational speed of the bowl, 1/min; positive: counter-clockwise seen from "

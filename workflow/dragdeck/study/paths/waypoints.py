@@ -72,8 +72,8 @@ class WaypointsPath(WorkpiecePath):
     length_field: ClassVar[str] = "fraction"
 
     kind: Literal["waypoints"] = Field(
-        description="waypoints: a recorded path with its own speed and rotation. Lengths along the "
-        "path refer to its mean speed; `orientation` has no effect"
+        description="recorded path with its own speed and rotation; lengths along it refer to its "
+        "mean speed; `orientation` has no effect"
     )
     file: Line | None = Field(
         default=None,
@@ -82,8 +82,8 @@ class WaypointsPath(WorkpiecePath):
     )
     points: Annotated[list[Waypoint], Field(min_length=2, max_length=MOST_POINTS)] = Field(
         default_factory=list,
-        description="rows [time, x, y, z, turn, pitch, roll] in s, m and degrees, as the columns "
-        "of the file; the last four may be left out (0)",
+        description="rows of the same columns, in s, m and degrees; the last four may be left out "
+        "(0)",
     )
     fraction: Annotated[Number, Field(gt=0, le=1)] = Field(
         default=1.0, description="fraction of the recorded time that is simulated, from its start"

@@ -28,8 +28,8 @@ class SuperposedMotion(Model):
 
     ramp_s: NonNegative = Field(
         default=0.1,
-        description="time in which the motion starts from rest, in seconds at the study's own "
-        "speed; no statistic includes it",
+        description="duration of the start from rest, s, with `speed_factor` 1; excluded from all "
+        "statistics",
     )
 
     @abstractmethod

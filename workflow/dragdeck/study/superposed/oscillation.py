@@ -16,10 +16,8 @@ class Oscillation(SuperposedMotion):
 
     kind: ClassVar[str] = "oscillation"
 
-    amplitude_m: Positive = Field(
-        description="amplitude of the vertical oscillation about the immersion depth, m"
-    )
-    frequency_hz: Positive = Field(description="frequency of the vertical oscillation, Hz")
+    amplitude_m: Positive = Field(description="amplitude about the immersion depth, m")
+    frequency_hz: Positive = Field(description="frequency, Hz")
 
     def faster(self, factor: float) -> Self:
         """A higher frequency at the same amplitude."""

@@ -31,8 +31,8 @@ class SpinStage(Model):
     """A stretch of constant spin."""
 
     until_s: Positive = Field(
-        description="end of the stage, in seconds from the start of the drag at the study's own "
-        "speed; the last stage lasts to the end of the drag"
+        description="end of the stage, s from the start of the drag, with `speed_factor` 1; the "
+        "last stage lasts to the end of the drag"
     )
     rpm: Number = Field(description="rotational speed, 1/min; positive: counter-clockwise")
 
