@@ -363,13 +363,11 @@ def _of_packings(values: Values) -> Iterator[str]:
 
 def _plain(one: Standing) -> str:
     """Name and value with interval and, where it differs, that of the run."""
-    name, unit, found = one.quantity.label, f" {one.quantity.unit}".rstrip(), one.value
+    name, unit, found = one.quantity.label, f" {one.quantity.unit}".rstrip(), one.shown
     what = one.reason.partition(":")[0]
-    if found is None:
-        return f"{name}: not available, {what}"
     doubt = "" if one.reliable or one.corrected else ", too short for a reliable interval"
     ends = f"95 % CI {found.ci95_low:#.3g} to {found.ci95_high:#.3g}{unit}{doubt}"
     text = f"{name} {found.value:#.3g}{unit}" + (f" ({ends})" if found.known else "")
     if one.corrected:
         return f"{text} {one.rests_on}, {one.run.value:#.3g}{unit} as simulated"
-    return f"{text}, {what}" if what else text
+    return ", ".join(filter(None, (text, "" if one.value else "this run only", what)))
