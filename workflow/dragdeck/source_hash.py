@@ -32,7 +32,8 @@ def source_hash(*modules: str) -> str:
     total, files = hashlib.sha256(), source_files(*modules)
     for name, file in sorted(files.items()):
         total.update(name.encode() + file.read_bytes())
-    for table in sorted({table for file in files.values() for table in file.parent.glob("*.csv")}):
+    folders = {file.parent for file in files.values()}
+    for table in sorted(table for folder in folders for table in folder.glob("*.csv")):
         total.update(table.read_bytes())
     return total.hexdigest()[:12]
 

@@ -12,8 +12,17 @@ from numpy.typing import ArrayLike
 from dragchain.arrays import Floats, Ints
 from dragchain.errors import TableError
 from dragchain.loading.contact_events import AMOUNTS, LIMITS, POINT, SLIP
-from dragchain.run import kinematics
 from dragchain.run.case import attracts, friction_with
+from dragchain.run.kinematics import (
+    axis_speed,
+    bowl_velocity,
+    counted_mask,
+    needed,
+    spins,
+    workpiece_frame,
+    workpiece_rotation,
+    workpiece_velocity,
+)
 from dragchain.run.workpiece import Surface, off_facet
 from dragchain.statistics.correlated import slow_waves
 from dragchain.tables.by_step import read_groups, read_table
@@ -103,7 +112,7 @@ def sample(run_dir: Path, case: CaseOfRun, table: str = "workpiece_contacts") ->
             "the drag that enters the statistics"
         )
     impulse = workpiece[_ALONG].to_numpy().sum(axis=0) * interval_s
-    path = kinematics.axis_speed(case) * interval_s * len(steps)
+    path = axis_speed(case) * interval_s * len(steps)
     return Sampled(pd.concat(parts, ignore_index=True), len(steps), interval_s, path, impulse)
 
 
@@ -151,9 +160,9 @@ def _loaded(contacts: pd.DataFrame) -> pd.Series:
 def _counted_steps(run_dir: Path, case: CaseOfRun, table: str) -> tuple[Ints, float]:
     """The counted steps of a table of contacts on the workpiece and the time between two, s."""
     output = load_outputs(run_dir)[TOUCHES[1] if table == TOUCHED else table]
-    last = kinematics.needed(output.last_step, f"last_step of {output.name}")
+    last = needed(output.last_step, f"last_step of {output.name}")
     steps = np.arange(output.first_step, last + 1, output.period_steps, dtype=np.int64)
-    counted = kinematics.counted_mask(steps, case)
+    counted = counted_mask(steps, case)
     file = run_dir / "tables" / f"{table}.parquet"
     for rows in read_groups(file, ["step", "in_statistics"]):
         counted &= ~np.isin(steps, rows.loc[~rows["in_statistics"], "step"].unique())
@@ -169,18 +178,18 @@ def _with_amounts(
     reference = workpiece[_REFERENCE].to_numpy()
     heading = workpiece["direction_rad"].to_numpy()
     steps = rows["step"].to_numpy()
-    rotation = kinematics.workpiece_rotation(steps, heading, case)
+    rotation = workpiece_rotation(steps, heading, case)
     speed = np.linalg.norm(slip, axis=1)
     ids = rows["particle_id"].to_numpy()
     limit = friction_with(case, "workpiece").at(ids, ids)
     most = limit.friction * (normal + rows.get(ATTRACTION, 0.0))
     mobilisation = np.divide(tangential, most, out=np.full_like(most, np.inf), where=most > 0.0)
     mobilised = mobilisation >= LIMITS.mobilised
-    velocity = kinematics.workpiece_velocity(steps, point, reference, case)
-    velocity -= kinematics.bowl_velocity(point, case)
-    drag = kinematics.workpiece_frame(force, heading) * interval_s
+    velocity = workpiece_velocity(steps, point, reference, case)
+    velocity -= bowl_velocity(point, case)
+    drag = workpiece_frame(force, heading) * interval_s
     in_body = {}
-    if kinematics.spins(case):
+    if spins(case):
         in_body = dict(zip(BODY, (rotation.into(force) * interval_s).T, strict=True))
     added = rows.assign(
         **in_body,
@@ -229,7 +238,7 @@ def check_facets(sampled: Sampled, surface: Surface, case: CaseOfRun) -> float:
     point = sampled.rows[POINT].to_numpy()
     parts = np.array_split(np.arange(len(facet)), 1 + len(facet) // _BLOCK_ROWS)
     off = np.concatenate([off_facet(point[part], surface.corners[facet[part]]) for part in parts])
-    limit = _OFF_FACET * kinematics.needed(case.workpiece, "workpiece").length_m
+    limit = _OFF_FACET * needed(case.workpiece, "workpiece").length_m
     worst = int(off.argmax())
     if off[worst] > limit:
         raise TableError(

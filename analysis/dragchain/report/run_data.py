@@ -165,10 +165,11 @@ def write_findings(run: RunData) -> Findings:
 
 def process_findings(run: RunData) -> ProcessFindings:
     """Compute the findings of a process run; errors are those of `write_findings`."""
-    samples = read_counted(run.folder, ("step", "time_s", *FORCES))
+    turning = (_HEADING, *_TORQUES) if spins(run.case) else ()
+    samples = read_counted(run.folder, ("step", "time_s", *FORCES, *turning))
     forces = summarise_forces(samples)
-    if spins(run.case):
-        forces[TORQUE] = estimate_mean(_own_torque(run))
+    if turning:
+        forces[TORQUE] = estimate_mean(_own_torque(samples, run.case))
     frame, frames, contacts = _workpiece_contacts(run, samples)
     names = [one.name for one in run.case.classes]
     azimuth, depth, force = (
@@ -200,16 +201,18 @@ def process_findings(run: RunData) -> ProcessFindings:
     )
 
 
-def _own_torque(run: RunData) -> Floats:
+_HEADING, _TORQUES = "direction_rad", vector("torque", "n_m")
+
+
+def _own_torque(samples: pd.DataFrame, case: CaseOfRun) -> Floats:
     """Torque of the particles on the workpiece about its own axis, (N,) in N m.
 
     Unless the workpiece turns in the frame of its path, its work is negligible beside the drag's.
     """
-    columns = ["step", "direction_rad", *vector("torque", "n_m")]
-    step, direction, *torque = read_counted(run.folder, columns)[columns].to_numpy(np.float64).T
-    rotation = workpiece_rotation(step.astype(np.int64), direction, run.case)
-    axis = motion_of(run.case).drive.own_axis
-    return np.asarray(rotation.into(np.stack(torque, axis=1)) @ axis)
+    step, heading = samples["step"].to_numpy(np.int64), samples[_HEADING].to_numpy(np.float64)
+    torque = samples[[*_TORQUES]].to_numpy(np.float64)
+    axis = motion_of(case).drive.own_axis
+    return np.asarray(workpiece_rotation(step, heading, case).into(torque) @ axis)
 
 
 def of_classes(

@@ -172,8 +172,8 @@ def join_workpiece_frames(
             )
     frames = (*particles, *contacts)
     above = 1 + max(int(frame.ids("particle_id").max(initial=0)) for frame in frames)
-    moved, touching = _one_frame(particles, above).by_particle(), _one_frame(contacts, above)
-    pushed = moved.take(np.flatnonzero((moved.vectors(*FORCES) != 0.0).any(axis=1)))
+    moved, touching = _one_frame(particles, above), _one_frame(contacts, above)
+    pushed = moved.take(np.flatnonzero((moved.vectors(*FORCES) != 0.0).any(axis=1))).by_particle()
     known = pushed.ids("particle_id")
     twice = known[1:][np.diff(known) == 0]
     if twice.size:
