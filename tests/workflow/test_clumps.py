@@ -1,5 +1,6 @@
 """Clumps of spheres on LIGGGHTS: one sphere, free rotation, rest, resumption, a whole study."""
 
+import math
 import re
 import subprocess
 from collections.abc import Callable
@@ -19,6 +20,7 @@ from dragdeck.decks.render import deck_text
 from dragdeck.decks.templates import environment
 from dragdeck.dumps.frame import Frame
 from dragdeck.engine.process import find_engine
+from dragdeck.physics.contact_mechanics import pull_off_force
 from dragdeck.project import Project
 from dragdeck.records.case import FillingCase
 from dragdeck.scenes.filling import filling_scene
@@ -38,8 +40,10 @@ FAST = {
 class Filled:
     """The filling of a study in a folder, and its frames of bodies."""
 
-    def __init__(self, made: Made, folder: Path, templates: Path, media: dict[str, Any]) -> None:
-        case = made({"media": media, "fidelity": FAST, "bowl": {"radius_m": 0.02}})
+    def __init__(
+        self, made: Made, folder: Path, templates: Path, media: dict[str, Any], **more: Any
+    ) -> None:
+        case = made({"media": media, "fidelity": FAST, "bowl": {"radius_m": 0.02}} | more)
         self.scene = filling_scene(case)
         assert isinstance(self.scene.case, FillingCase)
         self.case, self.folder = self.scene.case, folder
@@ -64,13 +68,13 @@ class Filled:
         return list(iter_frames(self.folder, part))
 
 
-Fill = Callable[[dict[str, Any]], Filled]
+Fill = Callable[..., Filled]
 
 
 @pytest.fixture
 def fill(made: Made, project: Project, tmp_path: Path) -> Fill:
     """The filling of the small study with these media."""
-    return lambda media: Filled(made, tmp_path, project.templates, media)
+    return lambda media, **more: Filled(made, tmp_path, project.templates, media, **more)
 
 
 def _one_class(count: int) -> dict[str, Any]:
@@ -185,3 +189,44 @@ def test_a_resumed_run_goes_on_with_the_same_bodies(fill: Fill) -> None:
         turned = np.abs(bodies.vectors(*ORIENTATION) - again.vectors(*ORIENTATION)).max(axis=1)
         assert apart.max() < 1e-5 and turned.max() < 0.01
         assert np.count_nonzero(apart == 0) > 20
+
+
+LIFT = """
+variable start equal step
+variable settled string ${start}
+variable pull equal 9.81*(1-20*(step-${settled})/160000)
+variable block loop 200
+label lift
+run ${next_check} upto
+variable moving string ${ratio}
+variable now string ${pull}
+if "${moving} > 1" then "jump SELF away"
+next block
+jump SELF lift
+label away
+print "LIFTED AT ${now}"
+"""
+"""Gravity falls by 0.11 g per check; a body rolls until it leaves the floor, and then flies."""
+
+
+def test_a_cohesive_clump_opens_at_the_sum_of_its_tensions(fill: Fill) -> None:
+    """A body touches the floor with two spheres and is pulled off slowly."""
+    media = _one_class(1) | {"shape": {"kind": "cylinder", "aspect": 1.4, "spheres": 2}}
+    filled = fill(media, **{"pairs.ceramic-steel.cohesion_j_m3": 7e7})
+    deck, (of_run,) = filled.scene.deck, filled.case.bodies
+    law = deck.materials  # type: ignore[attr-defined]
+    (cohesion,) = (one.values for one in law.law.tables if one.engine == "cohesionEnergyDensity")
+    modulus = 1 / sum(
+        (1 - nu**2) / modulus
+        for nu, modulus in zip(law.poissons_ratios, law.youngs_moduli_pa, strict=True)
+    )
+    tension = sum(
+        pull_off_force(2 * math.pi * cohesion[1] * radius, modulus, radius)
+        for radius in of_run.radii_m
+    )
+    text = filled.text.replace("gravity all gravity 9.81 ", "gravity all gravity v_pull ")
+    text = text.replace("fix gravity", "variable pull equal 9.81\nfix gravity")
+    marker = 'print "DRAGDECK SETTLED'
+    printed = filled.run(text.replace(marker, LIFT + marker))
+    pull = -float(re.findall(r"LIFTED AT (\S+)", printed)[-1]) * of_run.mass_kg
+    assert pull == pytest.approx(tension, rel=0.03)
