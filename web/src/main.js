@@ -132,6 +132,7 @@ class Page {
       view.look(new Vector3(...data.target), new Vector3(...data.place).sub(new Vector3(...data.target)), data.zoom);
       last = JSON.stringify(told());
     });
+    parent.postMessage({ ...told(), opens: true }, "*");
   }
 
   /** What is to be seen: the bowl, or the surroundings of the workpiece in a wide one. */
