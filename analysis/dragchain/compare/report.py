@@ -270,7 +270,7 @@ def draw_maps(cases: Sequence[ComparedCase]) -> Figure:
 def _patches(axes: Axes, values: Floats, **style: Any) -> Any:
     azimuths = np.degrees(circumference(MAP_AZIMUTHS))
     axes.set(
-        xticks=np.arange(-180, 181, 90), xticklabels=["back", "right", "ahead", "left", "back"]
+        xticks=np.arange(-180, 181, 90), xticklabels=["back", "\nright", "ahead", "\nleft", "back"]
     )
     axes.set_ylim(1.0, 0.0)
     axes.grid(False)
