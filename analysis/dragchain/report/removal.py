@@ -217,6 +217,8 @@ def removal_of(case: ReportedCase) -> RemovalOfCase | None:
     facets = _facets(wears, coefficient.value * factor, rate.coefficient)
     own = facets[facets["immersed"]]
     _, variation, ends = depth_spread(own)
+    removed = facets["depth_m_s"] * facets["area_m2"]
+    share = float(removed[facets["immersed"]].sum() / removed.sum())
     edges = wears[0].edges
     return RemovalOfCase(
         removal=removal,
@@ -230,7 +232,7 @@ def removal_of(case: ReportedCase) -> RemovalOfCase | None:
             corrected=load.corrected and not removal.laws[-1].impact,
         ),
         impact_share=_over_packings([one.impact_share for one in wears]),
-        depth_um_h=rate.times(UM_PER_H / float(own["area_m2"].sum())),
+        depth_um_h=rate.times(UM_PER_H * share / float(own["area_m2"].sum())),
         mass_mg_h=rate.times(UM_PER_H * density),
         coefficient_m2_n=coefficient,
         variation=variation,

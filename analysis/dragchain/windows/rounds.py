@@ -30,6 +30,9 @@ _FEWEST = 2
 _MOST_MORE = 2.0
 """A round has at most so many times the windows of the one before."""
 
+_LONGER = ("drag_std_long", "drag_std_middle")
+"""Waves that a window is too short for."""
+
 _NONE = Estimate(math.nan, math.nan, math.nan)
 
 _PLATEAU = 0.15
@@ -144,16 +147,30 @@ def _joined(
     record: WindowsRecord,
 ) -> Iterator[tuple[Measurand, Joined | None]]:
     """Each quantity of the soft run at physical stiffness, None if not all windows have it."""
+    each = _about_the_mean(windows)
     for quantity in QUANTITIES:
         if quantity.name not in values:
             continue
-        own = [one.values[quantity.name] for one in windows if quantity.name in one.values]
+        own = [one[quantity.name] for one in each if quantity.name in one]
         if len(own) < max(_FEWEST, len(windows)):
             yield quantity, None
         else:
             known = record.quantities.get(quantity.name, UNKNOWN)
             stretches = _stretches(soft, quantity, windows[0].arc_m)
             yield quantity, joined(own, stretches, known)
+
+
+def _about_the_mean(windows: Sequence[WindowOfRun]) -> list[dict[str, float]]:
+    """Values of windows with the deviation of the drag from its mean in all of them.
+
+    A sample of about one particle diameter has no longer waves.
+    """
+    each = [{k: v for k, v in one.values.items() if k not in _LONGER} for one in windows]
+    drags = [one.get("drag_mean", 0.0) for one in each]
+    for one, drag in zip(each, drags, strict=True):
+        if "drag_std" in one:
+            one["drag_std"] = math.hypot(one["drag_std"], drag - np.mean(drags))
+    return each
 
 
 def _stretches(soft: PathQuantities, quantity: Measurand, arc_m: float) -> Floats:

@@ -140,3 +140,17 @@ def test_the_area_along_edges_is_that_of_strips() -> None:
     """Within 1 mm of the 12 edges of a cube of 20 mm lies all but six squares of 18 mm."""
     near = edge_distance(sharp_edges(box(), 0.03)[0], strewn(box()), 5e-5) <= 1e-3
     assert near.mean() * 6 * 4e-4 == pytest.approx(6 * (4e-4 - 0.018**2), rel=0.01)
+
+
+def test_the_area_along_the_rim_of_a_long_rod_is_that_of_its_strips() -> None:
+    """The strip from 0.4 to 0.8 mm is a hundredth of the surface of the rod."""
+    import pyvista as pv
+
+    mesh = pv.Cylinder(
+        center=(0, 0, 0.038), direction=(0, 0, 1), radius=0.005, height=0.076, resolution=48
+    ).triangulate()
+    rod = Surface(mesh.points[mesh.regular_faces].astype(np.float64))
+    away = edge_distance(sharp_edges(rod, 0.01)[0], strewn(rod), 4e-5)
+    near = ((away >= 4e-4) & (away < 8e-4)).mean() * rod.areas.sum()
+    strips = np.pi * (0.01 * 4e-4 + 4.6e-3**2 - 4.2e-3**2)
+    assert near == pytest.approx(strips, rel=0.015)

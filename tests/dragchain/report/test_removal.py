@@ -131,6 +131,7 @@ def report(
     seeds: int = 1,
     wear: bool = True,
     corrected: float | None = None,
+    told: dict[str, Any] | None = None,
 ) -> Path:
     """The report on runs whose contacts are those made by hand, 50 % more with each seed."""
     runs = []
@@ -148,6 +149,9 @@ def report(
         run = make_run(tmp_path / "results", case, process_findings(), PICTURES)
         for file in ("tables/loading.json", *(["tables/wear.json"] if wear else [])):
             (run / file).write_bytes((made / file).read_bytes())
+        if told:
+            whole = json.loads((run / file).read_text())
+            (run / file).write_text(json.dumps(whole | told))
         (run / "workpiece.stl").write_text(PLATE)
         if corrected:
             write_quantities(run, corrected)
@@ -171,6 +175,14 @@ def test_the_report_has_depth_mass_and_minutes(tmp_path: Path) -> None:
     assert "min (mean depth)" in page.words
     assert "Young's modulus \N{MULTIPLICATION SIGN} 0.01" in page.words
     assert "not corrected" in page.words
+
+
+def test_the_mean_depth_is_without_what_is_removed_above_the_bed(tmp_path: Path) -> None:
+    """Of two equal facets one is in the bed, and two thirds of the action are on it."""
+    out = report(tmp_path, GIVEN, told={"immersed": [True, False], "patch_w_m2": [2.0, 1.0]})
+    load = Loading.read(tmp_path / "made-0/tables/loading.json").per_metre["force_slide_n_m"]
+    depth_m_s = 2 / 3 * 2e-11 * load.value * 0.01 / 2e-4
+    assert f"over the immersed surface: {3600e6 * depth_m_s:.3g} " in page_of(out).words
 
 
 def test_windows_correct_the_load_of_a_soft_run(tmp_path: Path) -> None:

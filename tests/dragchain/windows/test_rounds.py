@@ -47,6 +47,22 @@ def test_a_round_asks_for_the_windows_that_would_do_but_at_most_twice_as_many() 
     assert far.wanted == 6 < far.tolerance.needed.windows
 
 
+def test_the_drag_deviates_from_its_mean_in_all_windows_and_long_waves_are_unknown() -> None:
+    squares = {name: (0.04, 0.05) * 6 for name in ("drag_std", "drag_std_long")}
+    soft = PathQuantities(
+        arc_m=0.1, block_m=0.01, blocks={"drag_mean": (-2.0, -2.1) * 6, **squares}
+    )
+    own = [
+        WindowOfRun(run="w", values={"drag_mean": mean, "drag_std": 0.3, "drag_std_long": 1e-16},
+                    arc_m=0.01, cpu_time_s=1.0)  # fmt: skip
+        for mean in (-2.4, -2.0, -1.6)
+    ]
+    found = {one.name: one for one in judged(soft, own, 0.1, [], 16, RECORD).quantities}
+    assert found["drag_std_long"].value is None
+    value = found["drag_std"].value
+    assert value and value.value == pytest.approx((0.5 + 0.3 + 0.5) / 3)
+
+
 def test_the_last_window_is_the_last() -> None:
     found = judge([15.0, 19.0, 11.0], 0.01, most=3)
     assert (
