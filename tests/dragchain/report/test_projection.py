@@ -97,6 +97,18 @@ def test_a_contact_is_shared_by_a_cone_among_the_facets_of_its_side() -> None:
     np.testing.assert_allclose(found, np.outer(shares / shares.sum(), [5.0, 10.0]), atol=1e-15)
 
 
+def test_rounding_gives_a_face_at_a_right_angle_nothing() -> None:
+    """A contact at the edge of two faces, which is turned in steps about the vertical."""
+    corner = [[0, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 0, 0], [-1, 0, 0], [0, 0, 1]]
+    rows = pd.DataFrame([[0.0, 0.0, 0.0, 0]], columns=[*POINT, "facet_id"])
+    for angle in np.linspace(0.01, 6.0, 50):
+        cos, sin = np.cos(angle), np.sin(angle)
+        turn = 1e-3 * np.array([[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]])
+        surface = Surface(np.array(corner) @ turn)
+        (own, other) = Target(surface, 3e-3).receive(rows, surface.normals, np.ones((1, 1)))
+        assert (own, other) == (1.0, 0.0)
+
+
 FLIPPED = stl([facet[::-1] for facet in [
     ((0.0, -0.01, 0.0), (0.0, 0.01, 0.0), (0.0, 0.01, 0.02)),
     ((0.0, -0.01, 0.0), (0.0, 0.01, 0.02), (0.0, -0.01, 0.02)),
