@@ -53,8 +53,12 @@ def test_the_drag_deviates_from_its_mean_in_all_windows_and_long_waves_are_unkno
         arc_m=0.1, block_m=0.01, blocks={"drag_mean": (-2.0, -2.1) * 6, **squares}
     )
     own = [
-        WindowOfRun(run="w", values={"drag_mean": mean, "drag_std": 0.3, "drag_std_long": 1e-16},
-                    arc_m=0.01, cpu_time_s=1.0)  # fmt: skip
+        WindowOfRun(
+            run="w",
+            values={"drag_mean": mean, "drag_std": 0.3, "drag_std_long": 1e-16},
+            arc_m=0.01,
+            cpu_time_s=1.0,
+        )
         for mean in (-2.4, -2.0, -1.6)
     ]
     found = {one.name: one for one in judged(soft, own, 0.1, [], 16, RECORD).quantities}
