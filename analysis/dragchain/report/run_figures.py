@@ -153,6 +153,8 @@ def force_around_workpiece(run: RunData, found: ProcessFindings) -> Figure:
 def _ratio(ratio: Estimate) -> str:
     if not np.isfinite(ratio.value):
         return "no contact behind"
+    if not np.isfinite(ratio.ci95_low):
+        return f"ratio {ratio.value:.1f} (no interval)"
     high = f"{ratio.ci95_high:.1f}" if np.isfinite(ratio.ci95_high) else "unbounded"
     return f"ratio {ratio.value:.1f} (95 % CI {ratio.ci95_low:.1f} to {high}){_doubt(ratio)}"
 
