@@ -20,6 +20,7 @@ from dragchain.windows.estimate import (
     WindowsRecord,
     corrected_map,
     joined,
+    joined_squares,
     windows_needed,
 )
 from dragdeck.records.case import load_case
@@ -29,9 +30,6 @@ _FEWEST = 2
 
 _MOST_MORE = 2.0
 """A round has at most so many times the windows of the one before."""
-
-_LONGER = ("drag_std_long", "drag_std_middle")
-"""Waves that a window is too short for."""
 
 _NONE = Estimate(math.nan, math.nan, math.nan)
 
@@ -147,39 +145,38 @@ def _joined(
     record: WindowsRecord,
 ) -> Iterator[tuple[Measurand, Joined | None]]:
     """Each quantity of the soft run at physical stiffness, None if not all windows have it."""
-    each = _about_the_mean(windows)
     for quantity in QUANTITIES:
         if quantity.name not in values:
             continue
-        own = [one[quantity.name] for one in each if quantity.name in one]
-        if len(own) < max(_FEWEST, len(windows)):
+        if any(quantity.name not in one.values for one in windows) or len(windows) < _FEWEST:
             yield quantity, None
         else:
+            join = joined_squares if quantity.squared else joined
             known = record.quantities.get(quantity.name, UNKNOWN)
-            stretches = _stretches(soft, quantity, windows[0].arc_m)
-            yield quantity, joined(own, stretches, known)
+            stretches = _stretches(soft, quantity.name, windows[0].arc_m)
+            yield quantity, join(_of_windows(quantity, windows), stretches, known)
 
 
-def _about_the_mean(windows: Sequence[WindowOfRun]) -> list[dict[str, float]]:
-    """Values of windows with the deviation of the drag from its mean in all of them.
+def _of_windows(quantity: Measurand, windows: Sequence[WindowOfRun]) -> Floats:
+    """A quantity in each window, its square where its blocks hold squares.
 
-    A sample of about one particle diameter has no longer waves.
+    In a window, the drag deviates from a mean of its own. What waves longer than its sample add to
+    the variance is how far that mean is from that of all windows.
     """
-    each = [{k: v for k, v in one.values.items() if k not in _LONGER} for one in windows]
-    drags = [one.get("drag_mean", 0.0) for one in each]
-    for one, drag in zip(each, drags, strict=True):
-        if "drag_std" in one:
-            one["drag_std"] = math.hypot(one["drag_std"], drag - np.mean(drags))
-    return each
+    own = np.array([one.values[quantity.name] for one in windows]) ** (1 + quantity.squared)
+    if quantity.name != "drag_std":
+        return own
+    means = np.array([one.values["drag_mean"] for one in windows])
+    away = (means - means.mean()) ** 2 * len(means) / (len(means) - 1)
+    return np.asarray(own + away)
 
 
-def _stretches(soft: PathQuantities, quantity: Measurand, arc_m: float) -> Floats:
-    """Values of a quantity over stretches of the soft run as long as a window's sample."""
-    blocks = soft.of_blocks(quantity.name)
+def _stretches(soft: PathQuantities, name: str, arc_m: float) -> Floats:
+    """Means of a quantity's blocks over stretches of the soft run as long as a window's sample."""
+    blocks = soft.of_blocks(name)
     each = max(1, round(arc_m / soft.block_m))
     count = max(1, len(blocks) // each)
-    means = [one.mean() for one in np.array_split(blocks, count)]
-    return quantity.rooted(np.array(means))
+    return np.array([one.mean() for one in np.array_split(blocks, count)])
 
 
 def _measured(folder: Path) -> WindowOfRun:

@@ -47,26 +47,6 @@ def test_a_round_asks_for_the_windows_that_would_do_but_at_most_twice_as_many() 
     assert far.wanted == 6 < far.tolerance.needed.windows
 
 
-def test_the_drag_deviates_from_its_mean_in_all_windows_and_long_waves_are_unknown() -> None:
-    squares = {name: (0.04, 0.05) * 6 for name in ("drag_std", "drag_std_long")}
-    soft = PathQuantities(
-        arc_m=0.1, block_m=0.01, blocks={"drag_mean": (-2.0, -2.1) * 6, **squares}
-    )
-    own = [
-        WindowOfRun(
-            run="w",
-            values={"drag_mean": mean, "drag_std": 0.3, "drag_std_long": 1e-16},
-            arc_m=0.01,
-            cpu_time_s=1.0,
-        )
-        for mean in (-2.4, -2.0, -1.6)
-    ]
-    found = {one.name: one for one in judged(soft, own, 0.1, [], 16, RECORD).quantities}
-    assert found["drag_std_long"].value is None
-    value = found["drag_std"].value
-    assert value and value.value == pytest.approx((0.5 + 0.3 + 0.5) / 3)
-
-
 def test_the_last_window_is_the_last() -> None:
     found = judge([15.0, 19.0, 11.0], 0.01, most=3)
     assert (
@@ -102,6 +82,20 @@ def test_an_asked_quantity_that_the_run_lacks_is_never_reached() -> None:
         "workpiece_contacts",
         "drag_mean",
     )
+
+
+def test_the_drag_fluctuates_between_windows_as_within_them() -> None:
+    blocks = {"drag_mean": (-2.0,) * 12, "drag_std": (2.0, 1.9, 2.1) * 4}
+    some = [
+        WindowOfRun(
+            run=f"w-{mean}", values={"drag_mean": mean, "drag_std": 1.0}, arc_m=0.01, cpu_time_s=1
+        )
+        for mean in (-1.0, -2.0, -3.0)
+    ]
+    soft = SOFT.model_copy(update={"blocks": blocks})
+    found = {one.name: one.value for one in judged(soft, some, 0.5, [], 3, RECORD).quantities}
+    within, between = 1.0, 1.0
+    assert found["drag_std"] and found["drag_std"].value == pytest.approx((within + between) ** 0.5)
 
 
 @pytest.mark.parametrize(("early", "settled"), [(3.4, True), (0.3, False), (4.5, False)])
