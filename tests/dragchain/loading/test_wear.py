@@ -105,6 +105,14 @@ def test_a_sum_adds_sliding_and_weighted_impacts(tmp_path: Path) -> None:
     assert density @ area == pytest.approx(found.action_w.value, rel=1e-9)
 
 
+def test_without_an_impact_all_is_from_sliding(tmp_path: Path) -> None:
+    law = {"law": "archard+finnie", "coefficient_m2_n": 1e-15, "impact_ratio": 50.0}
+    parting = [hit(frame, normal_velocity_m_s=-0.1) for frame in (50, 200)]
+    found = worn(tmp_path, law, made_contacts(), parting)
+    assert found.impact_share.value == 0.0
+    assert found.action_w.value * TIME_S == pytest.approx(1.0 * 0.04 * 200 * DT, rel=1e-6)
+
+
 def test_an_ordinary_run_has_no_wear(tmp_path: Path) -> None:
     write_run(tmp_path, made_contacts())
     write_loading(tmp_path)
