@@ -39,10 +39,14 @@ _ROUNDED_S = 1800.0
 
 
 def joined_half_width(scatter: ArrayLike, known: ArrayLike, degrees: float) -> Floats:
-    """Half-widths of 95 % intervals, (...,), of which one has such degrees of freedom, as one."""
+    """Half-widths of 95 % intervals, (...,), of which one has such degrees of freedom, as one.
+
+    With few degrees, the approximation adds too many: not narrower than the scatter alone.
+    """
     square = np.maximum(np.asarray(scatter) / student_quantile(degrees), 1e-60) ** 2
     total = square + (np.asarray(known) / NORMAL_QUANTILE) ** 2
-    return np.asarray(stdtrit(degrees * (total / square) ** 2, 0.5 + CONFIDENCE / 2) * total**0.5)
+    half = stdtrit(degrees * (total / square) ** 2, 0.5 + CONFIDENCE / 2) * total**0.5
+    return np.maximum(half, scatter)
 
 
 class Parted(NamedTuple):

@@ -52,14 +52,24 @@ def test_a_trial_gives_the_volume_and_with_the_load_the_coefficient() -> None:
 
 
 def test_intervals_join_by_welch_and_satterthwaite() -> None:
-    """Equal standard errors, one with 2 degrees of freedom: 8 in all."""
-    halves = student_quantile(2) * 0.1, Z * 0.1
+    """The smaller standard error has 2 degrees of freedom: 200 in all."""
+    halves = student_quantile(2) * 0.1, Z * 0.3
     assert joined_half_width(*halves, 2) == pytest.approx(
-        student_quantile(8) * 0.1 * math.sqrt(2), rel=1e-6
+        student_quantile(200) * 0.1 * math.sqrt(10), rel=1e-6
     )
     assert joined_half_width(halves[0], 0.0, 2) == pytest.approx(halves[0])
     assert joined_half_width(0.0, halves[1], 2) == pytest.approx(halves[1])
     np.testing.assert_allclose(joined_half_width([0.3, 0.0], [0.4, 0.4], math.inf), [0.5, 0.4])
+
+
+@pytest.mark.parametrize("packings", [2, 3])
+def test_the_joint_interval_of_few_packings_covers(packings: int) -> None:
+    random, degrees = np.random.default_rng(7), packings - 1
+    loads = random.normal(0.0, 1.0, (4000, packings))
+    scatter = student_quantile(degrees) * loads.std(axis=1, ddof=1) / packings**0.5
+    known = 0.3 / packings**0.5
+    off = np.abs(loads.mean(axis=1) + random.normal(0.0, known, 4000))
+    assert (off < joined_half_width(scatter, Z * known, degrees)).mean() > 0.94
 
 
 @pytest.mark.parametrize(("off", "birge"), [(0.5, 1.0), (6.0, 6.0)])
