@@ -46,7 +46,7 @@ def joined_half_width(scatter: ArrayLike, known: ArrayLike, degrees: float) -> F
     square = np.maximum(np.asarray(scatter) / student_quantile(degrees), 1e-60) ** 2
     total = square + (np.asarray(known) / NORMAL_QUANTILE) ** 2
     half = stdtrit(degrees * (total / square) ** 2, 0.5 + CONFIDENCE / 2) * total**0.5
-    return np.maximum(half, scatter)
+    return np.asarray(np.maximum(half, scatter))
 
 
 class Parted(NamedTuple):
