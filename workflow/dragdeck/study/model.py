@@ -6,11 +6,13 @@ run.
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
+from dragdeck.files import table_rows
 from dragdeck.study.base import (
+    QUANTITIES_FILE,
     Line,
     MaterialName,
     Model,
@@ -293,27 +295,11 @@ class Outputs(Model):
         return self
 
 
-Quantity = Literal[
-    "drag_mean",
-    "drag_std",
-    "vertical_mean",
-    "workpiece_contacts",
-    "contact_force_mean",
-    "contact_force_p50",
-    "contact_force_p90",
-    "contact_force_p99",
-    "normal_load",
-    "sliding_distance",
-    "friction_work",
-    "force_slide",
-    "coordination_number",
-    "mechanical_coordination_number",
-    "network_force_mean",
-    "chain_count",
-    "chain_length",
-    "path_bottleneck",
-    "restitution",
-]
+if TYPE_CHECKING:
+    Quantity = str
+else:
+    _ROWS = table_rows(QUANTITIES_FILE)
+    Quantity = Literal[tuple(row["name"] for row in _ROWS if row["tolerance"])]
 """Quantities to which a tolerance can apply; docs/evidence/tradeoff.md defines each."""
 
 RESTITUTION = "restitution"
