@@ -59,7 +59,7 @@ def poses(way: DrivenMotion) -> tuple[np.ndarray, np.ndarray]:
 
 def test_every_kind_has_an_example() -> None:
     kinds = {get_args(kind.model_fields["kind"].annotation)[0] for kind in get_args(AnyPath)}
-    assert kinds == set(EXAMPLES)
+    assert kinds == set(EXAMPLES), "EXAMPLES of this file needs an example of each kind"
 
 
 @pytest.mark.parametrize("path", PATHS, ids=lambda path: path["kind"])

@@ -438,7 +438,11 @@ class Tolerance(Model):
         description="relative half-width of the 95 % confidence interval at the physical Young's "
         "modulus"
     )
-    quantity: Quantity | Annotated[list[Quantity], Field(min_length=1, max_length=8)] = Field(
+    quantity: Annotated[
+        Annotated[Quantity, Tag("a-name")]
+        | Annotated[list[Quantity], Field(min_length=1, max_length=8), Tag("a-list")],
+        Discriminator(lambda value: "a-list" if isinstance(value, list) else "a-name"),
+    ] = Field(
         default="drag_mean",
         description="quantity, or list of up to eight, to which the tolerance applies",
     )
