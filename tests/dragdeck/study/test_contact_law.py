@@ -288,4 +288,6 @@ def test_a_cohesive_contact_opens_at_its_tension(
     assert run(folder, lambda line: None).state == "complete"
     frames = list(iter_frames(folder, load_outputs(folder)["bodies"]))
     moved = frames[-1].columns["z_m"].max() - places[-1]
-    assert (moved < 0.01 * radius) == (share < 1)
+    assert (moved < 0.01 * radius) == (share < 1), (
+        f"{name}: `attraction` in study/contact_law.py differs from the force of LIGGGHTS's model"
+    )

@@ -24,8 +24,8 @@ _PUSHING = ("hertz", "hertz/stiffness", "hooke", "hooke/stiffness")
 
 Floats = NDArray[np.float64]
 Attraction = Callable[[Floats | float, Floats, Floats, bool], Floats]
-"""Attractive force of (N,) contacts, N, from the coefficient, reduced radii and overlaps, m, and
-whether the other body is a wall."""
+"""Attractive force of (N,) contacts, N, from the coefficient, reduced radii and overlaps, m, to
+which it is proportional, and whether the other body is a wall."""
 
 RollingModel = Literal["epsd2", "cdt", "epsd"]
 
