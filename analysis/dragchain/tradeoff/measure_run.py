@@ -182,6 +182,8 @@ def _of_force(force: pd.DataFrame, path: CountedPath) -> dict[str, Floats]:
         )
         for name, (low, high) in bands.items()
     }
+    if path.length_m < 2.0 * LONG_WAVE * path.diameter_m:
+        squares["drag_std_long"][:] = math.nan  # a window is no longer than its waves
     return {
         "drag_mean": path.mean(steps, drag),
         "drag_std": path.mean(steps, deviation**2),

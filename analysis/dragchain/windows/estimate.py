@@ -133,6 +133,8 @@ which only the windows count. Both keep the level in scenes like no other (bench
 
 _MOST_PACKINGS = 999
 
+_RELATIVE = ("ratio_log", "ratio_log_std", "packing_std")
+
 
 @dataclass(frozen=True)
 class Joined:
@@ -167,7 +169,7 @@ class Joined:
         return Estimate.around(self.value, self.half_width(windows))
 
 
-def joined(windows: Sequence[float], stretches: Floats, known: Known) -> Joined:
+def joined(windows: Sequence[float] | Floats, stretches: Floats, known: Known) -> Joined:
     """The value from K windows and the soft run.
 
     Parameters
@@ -192,6 +194,23 @@ def joined(windows: Sequence[float], stretches: Floats, known: Known) -> Joined:
     weight = len(windows) / own
     mean = (weight * value + precision * other) / (weight + precision) if precision else value
     return Joined(mean, own, precision, (mean * known.packing_std) ** 2, degrees)
+
+
+def joined_squares(windows: Floats, stretches: Floats, known: Known) -> Joined:
+    """The root of a mean square, from the squares of windows and of the soft run's stretches.
+
+    `known` is of the root, whose relative errors are half of those of the square.
+    """
+    doubled = {name: 2.0 * getattr(known, name) for name in _RELATIVE}
+    found = joined(windows, stretches, known.model_copy(update=doubled))
+    scale = 4.0 * found.value  # the square of the derivative of the square by its root
+    return Joined(
+        math.sqrt(found.value),
+        found.window_variance / scale,
+        found.other_precision * scale,
+        found.packing_variance / scale,
+        found.degrees,
+    )
 
 
 def of_one_run(blocks: Floats, value: float, known: Known) -> Estimate:

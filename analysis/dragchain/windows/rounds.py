@@ -20,6 +20,7 @@ from dragchain.windows.estimate import (
     WindowsRecord,
     corrected_map,
     joined,
+    joined_squares,
     windows_needed,
 )
 from dragdeck.records.case import load_case
@@ -147,22 +148,35 @@ def _joined(
     for quantity in QUANTITIES:
         if quantity.name not in values:
             continue
-        own = [one.values[quantity.name] for one in windows if quantity.name in one.values]
-        if len(own) < max(_FEWEST, len(windows)):
+        if any(quantity.name not in one.values for one in windows) or len(windows) < _FEWEST:
             yield quantity, None
         else:
+            join = joined_squares if quantity.squared else joined
             known = record.quantities.get(quantity.name, UNKNOWN)
-            stretches = _stretches(soft, quantity, windows[0].arc_m)
-            yield quantity, joined(own, stretches, known)
+            stretches = _stretches(soft, quantity.name, windows[0].arc_m)
+            yield quantity, join(_of_windows(quantity, windows), stretches, known)
 
 
-def _stretches(soft: PathQuantities, quantity: Measurand, arc_m: float) -> Floats:
-    """Values of a quantity over stretches of the soft run as long as a window's sample."""
-    blocks = soft.of_blocks(quantity.name)
+def _of_windows(quantity: Measurand, windows: Sequence[WindowOfRun]) -> Floats:
+    """A quantity in each window, its square where its blocks hold squares.
+
+    In a window, the drag deviates from a mean of its own. What waves longer than its sample add to
+    the variance is how far that mean is from that of all windows.
+    """
+    own = np.array([one.values[quantity.name] for one in windows]) ** (1 + quantity.squared)
+    if quantity.name != "drag_std":
+        return own
+    means = np.array([one.values["drag_mean"] for one in windows])
+    away = (means - means.mean()) ** 2 * len(means) / (len(means) - 1)
+    return np.asarray(own + away)
+
+
+def _stretches(soft: PathQuantities, name: str, arc_m: float) -> Floats:
+    """Means of a quantity's blocks over stretches of the soft run as long as a window's sample."""
+    blocks = soft.of_blocks(name)
     each = max(1, round(arc_m / soft.block_m))
     count = max(1, len(blocks) // each)
-    means = [one.mean() for one in np.array_split(blocks, count)]
-    return quantity.rooted(np.array(means))
+    return np.array([one.mean() for one in np.array_split(blocks, count)])
 
 
 def _measured(folder: Path) -> WindowOfRun:

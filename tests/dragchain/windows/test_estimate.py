@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 from dragchain.statistics.estimate import Estimate, student_quantile
-from dragchain.windows.estimate import UNKNOWN, Known, corrected_map, joined, windows_needed
+from dragchain.windows.estimate import (
+    UNKNOWN,
+    Known,
+    corrected_map,
+    joined,
+    joined_squares,
+    windows_needed,
+)
 
 DRAG = Known(ratio_log=0.1, ratio_log_std=0.05, variance_ratio=1.0, degrees=10.0, packing_std=0.0)
 
@@ -18,6 +25,14 @@ def test_without_knowledge_it_is_the_mean_with_students_interval() -> None:
     assert found.value == pytest.approx(-2.3)
     assert found.half_width(4) == pytest.approx(half)
     assert found.estimate(4).ci95_low == pytest.approx(-2.3 - half)
+
+
+def test_the_root_of_a_mean_square_has_half_its_relative_errors() -> None:
+    squares = np.array([0.98, 1.0, 1.02, 1.0]) * 9.0
+    root = joined_squares(squares, squares, DRAG.model_copy(update={"ratio_log": 0.0}))
+    linear = joined(np.sqrt(squares), np.sqrt(squares), DRAG.model_copy(update={"ratio_log": 0.0}))
+    assert root.value == pytest.approx(3.0, rel=1e-3)
+    assert root.half_width(4) == pytest.approx(linear.half_width(4), rel=1e-2)
 
 
 def test_other_scenes_narrow_the_interval_if_they_agree() -> None:

@@ -84,6 +84,20 @@ def test_an_asked_quantity_that_the_run_lacks_is_never_reached() -> None:
     )
 
 
+def test_the_drag_fluctuates_between_windows_as_within_them() -> None:
+    blocks = {"drag_mean": (-2.0,) * 12, "drag_std": (2.0, 1.9, 2.1) * 4}
+    some = [
+        WindowOfRun(
+            run=f"w-{mean}", values={"drag_mean": mean, "drag_std": 1.0}, arc_m=0.01, cpu_time_s=1
+        )
+        for mean in (-1.0, -2.0, -3.0)
+    ]
+    soft = SOFT.model_copy(update={"blocks": blocks})
+    found = {one.name: one.value for one in judged(soft, some, 0.5, [], 3, RECORD).quantities}
+    within, between = 1.0, 1.0
+    assert found["drag_std"] and found["drag_std"].value == pytest.approx((within + between) ** 0.5)
+
+
 @pytest.mark.parametrize(("early", "settled"), [(3.4, True), (0.3, False), (4.5, False)])
 def test_a_bed_that_is_still_moving_is_refused(early: float, settled: bool, tmp_path: Path) -> None:
     (tmp_path / "tables").mkdir()
