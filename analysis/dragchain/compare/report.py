@@ -251,9 +251,11 @@ def draw_maps(cases: Sequence[ComparedCase]) -> Figure:
         axes.set_title(one.name)
     figure.colorbar(drawn, ax=panels[: len(cases)], label="normal load (N per patch)")
     panels[len(cases)].set_visible(False)
+    panels[0].tick_params(labelbottom=True)
     changes = [mean - means[0] for mean in means[1:]]
     largest = max(float(np.abs(change).max()) for change in changes)
     below = panels[len(cases) + 1 :]
+    below[0].tick_params(labelleft=True)
     for axes, one, change in zip(below, others, changes, strict=True):
         drawn = _patches(axes, change, cmap="RdBu_r", norm=Normalize(-largest, largest))
         axes.set(title=f"{one.name}\nminus {first.name}", xlabel="azimuth from motion")
