@@ -253,9 +253,11 @@ def draw_maps(cases: Sequence[ComparedCase]) -> Figure:
         axes.set_title(fill(one.name, width))
     figure.colorbar(drawn, ax=panels[: len(cases)], label="normal load (N per patch)")
     panels[len(cases)].set_visible(False)
+    panels[0].tick_params(labelbottom=True)
     changes = [mean - means[0] for mean in means[1:]]
     largest = max(float(np.abs(change).max()) for change in changes)
     below = panels[len(cases) + 1 :]
+    below[0].tick_params(labelleft=True)
     for axes, one, change in zip(below, others, changes, strict=True):
         drawn = _patches(axes, change, cmap="RdBu_r", norm=Normalize(-largest, largest))
         title = f"{fill(one.name, width)}\nminus the first"
