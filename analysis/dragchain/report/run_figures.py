@@ -26,13 +26,7 @@ from dragchain.figures.panels import (
     row_names,
 )
 from dragchain.figures.style import BLUE, COLOURS, HALF_IN, RED, drawing, save
-from dragchain.report.findings import (
-    FIGURES,
-    DropFindings,
-    DropImpacts,
-    FillingFindings,
-    ProcessFindings,
-)
+from dragchain.report.findings import DropFindings, DropImpacts, FillingFindings, ProcessFindings
 from dragchain.report.run_data import RunData, write_findings
 from dragchain.run.kinematics import process_time
 from dragchain.run.reference import ReferenceDrag
@@ -41,6 +35,7 @@ from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import Estimate
 from dragdeck.decks.outputs import load_outputs
 from dragdeck.records.case import CaseOfRun, load_case
+from dragdeck.records.run import figures_of
 
 # --- panels --------------------------------------------------------------------------------------
 
@@ -328,7 +323,7 @@ def write_figures(run_dir: Path) -> list[Path]:
     Returns
     -------
     list of Path
-        The pictures, ``figures/<name>.png`` for each of the `FIGURES` of its scene; a filling
+        The pictures, ``figures/<name>.png`` for each of the figures of its scene; a filling
         without a thermo table has none.
 
     Raises
@@ -340,7 +335,7 @@ def write_figures(run_dir: Path) -> list[Path]:
     findings = write_findings(run)
     written = []
     with drawing():
-        for name in FIGURES[run.case.scene]:
+        for name in figures_of(run.case.scene):
             if (figure := _DRAW[name](run, findings)) is not None:
                 written.append(save(figure, run_dir / "figures" / f"{name}.png"))
     return written

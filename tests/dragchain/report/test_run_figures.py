@@ -18,12 +18,13 @@ from dragchain.errors import TableError
 from dragchain.figures import network_picture as scene
 from dragchain.figures.rendering import RenderError, check_rendering
 from dragchain.network.frame import SIDE, NetworkFrame
-from dragchain.report.findings import FIGURES, FILE, FillingFindings, ProcessFindings
+from dragchain.report.findings import FILE, FillingFindings, ProcessFindings
 from dragchain.report.run_data import RunData, dominant_bottlenecks, of_classes, process_findings
 from dragchain.report.run_figures import energy_ratio, write_figures
 from dragchain.run.reference import reference_drags
 from dragchain.statistics.estimate import Estimate
 from dragdeck.records.case import CaseOfRun, load_case
+from dragdeck.records.run import figures_of
 from dragdeck.study.drive import Rotation
 from dragdeck.study.reference import Drag, Reference
 
@@ -121,7 +122,7 @@ def test_a_reference_of_zero_is_refused() -> None:
 
 
 def test_process_figures_are_whole_pictures(process: Path, drawn: list[Path]) -> None:
-    names = list(FIGURES["process"])
+    names = list(figures_of("process"))
     assert [path.stem for path in drawn] == names
     assert sorted(path.name for path in (process / "figures").iterdir()) == sorted(
         f"{name}.png" for name in names
