@@ -30,7 +30,7 @@ rule all:
     input:
         rules.write_report.output,
         [
-            WORK.every(name, *(f"figures/{figure}.png" for figure in scene.figures))
+            WORK.every(name, *(f"figures/{figure}.png" for figure in figures_of(name)))
             for name, scene in SCENES.items()
         ],
 

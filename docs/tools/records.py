@@ -29,7 +29,7 @@ DATA = ROOT / "docs/data"
 RECORDS = {
     **{name: ROOT / f"workflow/dragdeck/data/{name}.json" for name in ("tradeoff", "stability")},
     "stable_step": ROOT / "workflow/dragdeck/data/stable_step.json",
-    "quantities": ROOT / "analysis/dragchain/tradeoff/quantities.csv",
+    "quantities": ROOT / "workflow/dragdeck/study/quantities.csv",
     **{
         f"scaling/{file.stem}": file
         for file in (ROOT / "analysis/dragchain/scaling/data").glob("*.json")

@@ -9,7 +9,6 @@ from made_run import made_case, run_json, write_documents
 from pages import Page
 
 from dragchain.report.findings import (
-    FIGURES,
     FILE,
     AheadBehind,
     AzimuthProfile,
@@ -28,11 +27,12 @@ from dragchain.run.basis import QUANTITIES
 from dragchain.run.reference import ReferenceDrag
 from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import Estimate, EstimateColumns
+from dragdeck.records.run import figures_of
 
 PNG = base64.b64decode(
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="
 )
-PICTURES = list(FIGURES["process"])
+PICTURES = list(figures_of("process"))
 
 ASKED = {
     "tolerance": 0.05, "quantities": ["drag_mean"], "error": None, "relative_cost": 0.04,

@@ -298,7 +298,7 @@ def cases(study: str, fidelity: str | None, plan: str | None) -> None:
     show([table])
 
 
-_NUMBERS_OF_SPHERES = (2, 3, 4, 6, 8, 12, 16, 24, 32)
+_NUMBERS_OF_SPHERES = (2, 3, 4, 6, 8, 12, 16)
 """For which `shapes` lists errors, beside those of the study."""
 
 

@@ -13,6 +13,7 @@ from dragdeck.engine.space import free_bytes
 from dragdeck.outlook.runs import plan_in_words
 from dragdeck.outlook.timestep import largest_of_case
 from dragdeck.project import OUTCOMES, PLACES, POINTS, WINDOWS, Project, by_run, run_path
+from dragdeck.records.run import figures_of
 from dragdeck.rules import (
     ENGINE_RUN,
     FURTHER_WORKPIECE,

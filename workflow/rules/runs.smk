@@ -107,7 +107,7 @@ for PLACE, SCENE in SCENES.items():
                     name,
                     run="{run}",
                 )
-                for name in SCENE.figures
+                for name in figures_of(SCENE.name)
             ],
             of_run(PLACE, "tables/figures.json"),
         params:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -243,20 +244,24 @@ def draw_maps(cases: Sequence[ComparedCase]) -> Figure:
     A dot marks a patch whose 95 % interval over the packings excludes zero.
     """
     first, *others = cases
+    width = max(12, 88 // len(cases))
     means = [np.mean([*one.load_maps.values()], axis=0) for one in cases]
     figure, panels = new_panels(4.2, 2 * len(cases), WIDE_IN, len(cases), sharex=True, sharey=True)
     scale = Normalize(0.0, max(float(mean.max()) for mean in means))
     for axes, one, mean in zip(panels, cases, means, strict=False):
         drawn = _patches(axes, mean, cmap=force_map(), norm=scale)
-        axes.set_title(one.name)
+        axes.set_title(fill(one.name, width))
     figure.colorbar(drawn, ax=panels[: len(cases)], label="normal load (N per patch)")
     panels[len(cases)].set_visible(False)
+    panels[0].tick_params(labelbottom=True)
     changes = [mean - means[0] for mean in means[1:]]
     largest = max(float(np.abs(change).max()) for change in changes)
     below = panels[len(cases) + 1 :]
+    below[0].tick_params(labelleft=True)
     for axes, one, change in zip(below, others, changes, strict=True):
         drawn = _patches(axes, change, cmap="RdBu_r", norm=Normalize(-largest, largest))
-        axes.set(title=f"{one.name}\nminus {first.name}", xlabel="azimuth from motion")
+        title = f"{fill(one.name, width)}\nminus the first"
+        axes.set(title=title, xlabel="azimuth from motion")
         if len(one.load_maps) > 1 and one.load_maps.keys() == first.load_maps.keys():
             _mark_certain(
                 axes, [one.load_maps[seed] - first.load_maps[seed] for seed in first.load_maps]

@@ -17,7 +17,7 @@ _BANDS = (0.0, 0.0625, 0.125, 0.25, 0.5, 1.0)
 """Edges of the bands along sharp edges, in mean radii of a particle."""
 
 _SPREAD = 400_000
-"""Points that are strewn over a surface to tell the area of bands."""
+"""Points that are spread over a surface to tell the area of bands."""
 
 
 class EdgeBands(Part):
@@ -75,10 +75,14 @@ def edge_distance(ends_m: Floats, points_m: Floats, spacing_m: float) -> Floats:
 
 
 def strewn(surface: Surface, count: int = _SPREAD) -> Floats:
-    """Points at random over a surface, (count, 3); always the same ones."""
-    random = np.random.default_rng(0)
-    facet = random.choice(len(surface.areas), count, p=surface.areas / surface.areas.sum())
-    weights = random.dirichlet(np.ones(3), count)
+    """Points spread evenly over a surface, (count, 3): a Halton sequence, always the same."""
+    from scipy.stats.qmc import Halton
+
+    place, far, side = Halton(3, scramble=False).random(count).T
+    until = surface.areas.cumsum()
+    facet = np.searchsorted(until, place * until[-1])
+    root = np.sqrt(far)
+    weights = np.column_stack([1 - root, root * (1 - side), root * side])
     return np.asarray(np.einsum("ij,ijk->ik", weights, surface.corners[facet]))
 
 

@@ -208,6 +208,8 @@ def _share(one: Estimate, others: Sequence[Estimate]) -> Estimate:
     if not others:
         return Estimate(1.0, 1.0, 1.0)
     rest = _sum(others)
+    if not one.value or not rest.value:
+        return Estimate(float(one.value > 0.0), math.nan, math.nan)
     half = math.hypot(one.relative_half_width, rest.relative_half_width)
     return Estimate(*(1 / (1 + rest.value / one.value * math.exp(half * s)) for s in (0, 1, -1)))
 

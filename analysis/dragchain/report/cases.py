@@ -76,7 +76,10 @@ def _workpiece(case: CaseOfRun) -> Iterator[str]:
     own, inputs = needed(case.workpiece, "workpiece"), case.inputs
     material = _text(inputs.get("workpiece.material"))
     if inputs.get("workpiece.shape.kind", own.kind) == "cylinder":
-        yield f"{material} cylinder, diameter {_mm(2 * own.radius_m)}".strip()
+        radius = inputs.get("workpiece.shape.radius_m")
+        if own.kind == "cylinder" or not isinstance(radius, float | int):
+            radius = own.radius_m  # of an inclined one, that is how far it reaches
+        yield f"{material} cylinder, diameter {_mm(2 * radius)}".strip()
     else:
         file = _text(inputs.get("workpiece.shape.file")) or own.mesh
         yield f"{material} part {file}, up to {_mm(own.radius_m)} from its axis".strip()
@@ -89,6 +92,8 @@ def _path(case: CaseOfRun) -> Iterator[str]:
     end_s = np.array([drag_phase(case).end_step * case.timestep_s])
     yield f"{_mm(float(path_passed(end_s, case)[0]))} long"
     yield f"immersed {_mm(needed(case.workpiece, 'workpiece').immersion_depth_m)}"
+    if tilt := case.inputs.get("motion.tilt_deg"):
+        yield f"inclined by {tilt:g}\N{DEGREE SIGN}"
     yield from (f"with {one.kind}" for one in case.superposed)
 
 

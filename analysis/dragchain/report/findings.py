@@ -12,14 +12,6 @@ from dragdeck.documents import Document, Part, omitted
 
 FILE = Path("tables") / "figures.json"
 
-_PICTURES = ("network_xy", "network_xz")
-FIGURES: Mapping[str, tuple[str, ...]] = {
-    "process": ("forces", *_PICTURES, "force_around_workpiece", "force_depth", "chains_peaks"),
-    "filling": ("filling",),
-    "drop_test": ("drop_test",),
-}
-"""The figures of each scene in the order of the report; it has their captions."""
-
 
 class Peaks(Part):
     """Peaks of the drag force magnitude.

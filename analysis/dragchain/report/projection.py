@@ -32,6 +32,9 @@ from dragdeck.mesh.files import read
 _BLOCK_ROWS = 20_000
 """Contacts of a block, which bounds the memory of the weights."""
 
+_FACES = 1e-3
+"""Least cosine between facets that face the same side: rounding must not open a right angle."""
+
 NAME = "projection"
 
 
@@ -108,7 +111,7 @@ class Target:
             block = KDTree(points[part])
             near = block.sparse_distance_matrix(tree, self.length_m, output_type="ndarray")
             at, to = near["i"], near["j"]
-            same = np.einsum("ij,ij->i", sides[part][at], facing[to]) > 0.0
+            same = np.einsum("ij,ij->i", sides[part][at], facing[to]) > _FACES
             weight = self.surface.areas[to] * (1 - near["v"] / self.length_m) * same
             total = np.bincount(at, weight, len(part))
             if (lost := np.flatnonzero(total == 0.0)).size:

@@ -39,10 +39,14 @@ _ROUNDED_S = 1800.0
 
 
 def joined_half_width(scatter: ArrayLike, known: ArrayLike, degrees: float) -> Floats:
-    """Half-widths of 95 % intervals, (...,), of which one has such degrees of freedom, as one."""
+    """Half-widths of 95 % intervals, (...,), of which one has such degrees of freedom, as one.
+
+    With few degrees, the approximation adds too many: not narrower than the scatter alone.
+    """
     square = np.maximum(np.asarray(scatter) / student_quantile(degrees), 1e-60) ** 2
     total = square + (np.asarray(known) / NORMAL_QUANTILE) ** 2
-    return np.asarray(stdtrit(degrees * (total / square) ** 2, 0.5 + CONFIDENCE / 2) * total**0.5)
+    half = stdtrit(degrees * (total / square) ** 2, 0.5 + CONFIDENCE / 2) * total**0.5
+    return np.asarray(np.maximum(half, scatter))
 
 
 class Parted(NamedTuple):
@@ -217,6 +221,8 @@ def removal_of(case: ReportedCase) -> RemovalOfCase | None:
     facets = _facets(wears, coefficient.value * factor, rate.coefficient)
     own = facets[facets["immersed"]]
     _, variation, ends = depth_spread(own)
+    removed = facets["depth_m_s"] * facets["area_m2"]
+    share = float(removed[facets["immersed"]].sum() / removed.sum())
     edges = wears[0].edges
     return RemovalOfCase(
         removal=removal,
@@ -230,7 +236,7 @@ def removal_of(case: ReportedCase) -> RemovalOfCase | None:
             corrected=load.corrected and not removal.laws[-1].impact,
         ),
         impact_share=_over_packings([one.impact_share for one in wears]),
-        depth_um_h=rate.times(UM_PER_H / float(own["area_m2"].sum())),
+        depth_um_h=rate.times(UM_PER_H * share / float(own["area_m2"].sum())),
         mass_mg_h=rate.times(UM_PER_H * density),
         coefficient_m2_n=coefficient,
         variation=variation,

@@ -218,7 +218,7 @@ def _own_torque(samples: pd.DataFrame, case: CaseOfRun) -> Floats:
 def of_classes(
     names: Sequence[str], frame: Ints, frames: int, contacts: pd.DataFrame
 ) -> dict[str, OfClass]:
-    """What each class of the media does to the workpiece.
+    """What each class of the media does to the workpiece, with contacts that carry force.
 
     Parameters
     ----------
@@ -230,8 +230,9 @@ def of_classes(
     contacts : DataFrame
         ``class`` and ``normal_force_n`` of c contacts.
     """
-    own = (contacts["class"].to_numpy()[:, None] == np.array(names)).astype(np.float64)
-    load = own * contacts["normal_force_n"].to_numpy(np.float64)[:, None]
+    force = contacts["normal_force_n"].to_numpy(np.float64)[:, None]
+    own = (contacts["class"].to_numpy()[:, None] == np.array(names)) * (force != 0.0).astype(float)
+    load = own * force
 
     def statistic(sums: Floats) -> Floats:
         count, force = np.split(sums, 2, axis=-1)
@@ -245,9 +246,9 @@ def of_classes(
 
 def _segregation(run: RunData) -> dict[str, tuple[float, float]]:
     file = run.folder / "tables" / "particles.parquet"
-    steps = [int(run.network["step"].iloc[at]) for at in (0, -1)]
+    steps = read_table(file, ["step"])["step"].iloc[[0, -1]].to_numpy()
     columns = ["step", "z_m", "radius_m", "class"]
-    rows = pd.concat(read_groups(file, columns, np.array(steps)))
+    rows = pd.concat(read_groups(file, columns, steps))
     first, last = (segregation(rows[rows["step"] == step]) for step in steps)
     return {name: (first[name], last[name]) for name in first}
 

@@ -26,13 +26,7 @@ from dragchain.figures.panels import (
     row_names,
 )
 from dragchain.figures.style import BLUE, COLOURS, HALF_IN, RED, drawing, save
-from dragchain.report.findings import (
-    FIGURES,
-    DropFindings,
-    DropImpacts,
-    FillingFindings,
-    ProcessFindings,
-)
+from dragchain.report.findings import DropFindings, DropImpacts, FillingFindings, ProcessFindings
 from dragchain.report.run_data import RunData, write_findings
 from dragchain.run.kinematics import process_time
 from dragchain.run.reference import ReferenceDrag
@@ -41,6 +35,7 @@ from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import Estimate
 from dragdeck.decks.outputs import load_outputs
 from dragdeck.records.case import CaseOfRun, load_case
+from dragdeck.records.run import figures_of
 
 # --- panels --------------------------------------------------------------------------------------
 
@@ -153,6 +148,8 @@ def force_around_workpiece(run: RunData, found: ProcessFindings) -> Figure:
 def _ratio(ratio: Estimate) -> str:
     if not np.isfinite(ratio.value):
         return "no contact behind"
+    if not np.isfinite(ratio.ci95_low):
+        return f"ratio {ratio.value:.1f} (no interval)"
     high = f"{ratio.ci95_high:.1f}" if np.isfinite(ratio.ci95_high) else "unbounded"
     return f"ratio {ratio.value:.1f} (95 % CI {ratio.ci95_low:.1f} to {high}){_doubt(ratio)}"
 
@@ -328,7 +325,7 @@ def write_figures(run_dir: Path) -> list[Path]:
     Returns
     -------
     list of Path
-        The pictures, ``figures/<name>.png`` for each of the `FIGURES` of its scene; a filling
+        The pictures, ``figures/<name>.png`` for each of the figures of its scene; a filling
         without a thermo table has none.
 
     Raises
@@ -340,7 +337,7 @@ def write_figures(run_dir: Path) -> list[Path]:
     findings = write_findings(run)
     written = []
     with drawing():
-        for name in FIGURES[run.case.scene]:
+        for name in figures_of(run.case.scene):
             if (figure := _DRAW[name](run, findings)) is not None:
                 written.append(save(figure, run_dir / "figures" / f"{name}.png"))
     return written

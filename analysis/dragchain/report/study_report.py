@@ -20,7 +20,7 @@ from dragchain.report.cases import (
     read_study_runs,
 )
 from dragchain.report.cost_check import CostRow, answers, cost_rows, prediction_for, read_advice
-from dragchain.report.findings import FIGURES, Findings
+from dragchain.report.findings import Findings
 from dragchain.report.page import NETWORK_PAGE, data_uri, file_uri, render_page, write_bundle
 from dragchain.report.removal import UM_PER_H, RemovalOfCase, removal_of, touch_rows
 from dragchain.report.spreadsheet import summary_workbook
@@ -33,7 +33,7 @@ from dragdeck.errors import DragdeckError
 from dragdeck.files import write_bytes
 from dragdeck.records.advice import OptionEntry
 from dragdeck.records.case import AssumptionOfRun, load_case
-from dragdeck.records.run import RunRecord
+from dragdeck.records.run import FIGURES, RunRecord, figures_of
 
 if TYPE_CHECKING:
     from dragchain.report.measured_signal import SignalComparison
@@ -302,7 +302,7 @@ def _pictures(run: ReportedRun[Findings]) -> Iterator[tuple[str, str]]:
     Only a filling may lack one of the others, as it may have no thermo table.
     """
     scene = run.case.scene
-    for name in (*([_FROM_LOADING] if scene == "process" else []), *FIGURES[scene]):
+    for name in (*([_FROM_LOADING] if scene == "process" else []), *figures_of(scene)):
         file = run.folder / "figures" / f"{name}.png"
         if (uri := file_uri(file)) is not None:
             yield name, uri
@@ -331,6 +331,7 @@ def _render(
         cases=cases,
         network_pages=_network_pages(sections),
         missing=missing,
+        captions=FIGURES,
         runs=runs,
         checks=[(run, check) for run in runs for check in run.record.checks],
         costs=[(one, row) for one in sections for row in one.costs],

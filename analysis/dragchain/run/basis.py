@@ -8,12 +8,12 @@ what each number stands for and `notes` what the settings do; they decide nothin
 from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import StrEnum
-from pathlib import Path
 from typing import NamedTuple
 
 from dragchain.statistics.estimate import Estimate
 from dragdeck.files import table_rows
 from dragdeck.records.case import CaseOfRun, FidelityOfRun
+from dragdeck.study.base import QUANTITIES_FILE
 
 _TIMES = "\N{MULTIPLICATION SIGN}"
 
@@ -51,9 +51,13 @@ class Quantity:
 
 
 QUANTITIES = tuple(
-    Quantity(row["name"], row["label"], row["unit"], int(row["time"] or 0), row["robust"] == "yes")
-    for row in table_rows(Path(__file__).with_name("quantities.csv"))
-)
+    Quantity(
+        row["name"], row["report"] or row["label"], row["report_unit"] or row["unit"],
+        int(row["time"] or 0), row["robust"] == "yes",
+    )
+    for row in sorted(table_rows(QUANTITIES_FILE), key=lambda row: int(row["place"] or 0))
+    if row["place"]
+)  # fmt: skip
 """The registry: what a report tells of a process run, in its order."""
 
 

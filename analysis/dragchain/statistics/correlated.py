@@ -230,6 +230,8 @@ def _checked(series: ArrayLike) -> Floats:
 _STEP = 1e-6
 """Step of the numerical slopes, over the root mean square of a column."""
 
+_ROUNDING = 1e-9
+
 LARGEST_REACH = 0.6
 """An interval that reaches further, over a sum that is never negative, is not reliable.
 
@@ -244,7 +246,8 @@ def estimates(
 
     The ends of an interval are the values of the statistic where the means are moved as far as
     the interval of its series reaches, each column in proportion to its covariance with that
-    series. A ratio thus keeps its skewness. Sums that are never negative stay so.
+    series. A ratio thus keeps its skewness. Sums that are never negative stay so. An interval that
+    does not contain its value is not known: that of a ratio whose lower sum may be zero.
 
     Parameters
     ----------
@@ -280,6 +283,8 @@ def estimates(
         low, high = (
             np.diagonal(statistic(np.maximum(means + sign * moves, least))) for sign in (-1.0, 1.0)
         )
+        beyond = np.maximum(low - values, values - high) > _ROUNDING * np.abs(values)
+    low, high = (np.where(beyond, np.nan, end) for end in (low, high))
     few = ((least == 0.0) & (np.abs(moves) > LARGEST_REACH * means)).any(axis=1)
     reliable = [one is not None and one.reliable for one in found] & ~few
     ends = zip(values.tolist(), low.tolist(), high.tolist(), reliable.tolist(), strict=True)

@@ -66,8 +66,8 @@ class Estimate:
 
     @property
     def relative_half_width(self) -> float:
-        """Half-width of the interval over the magnitude of the value."""
-        return abs(self.half_width / self.value)
+        """Half-width of the interval over the magnitude of the value, infinite if that is zero."""
+        return abs(self.half_width / self.value) if self.value else math.inf
 
     def contains(self, value: float) -> bool:
         """Whether a value is within the interval."""

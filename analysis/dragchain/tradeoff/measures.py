@@ -7,7 +7,6 @@ quantity has one value a block. A run's value is the mean over its blocks.
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from pydantic import JsonValue
@@ -17,6 +16,7 @@ from dragdeck.documents import Document, Part
 from dragdeck.files import table_rows
 from dragdeck.records.case import FidelityOfRun
 from dragdeck.records.run import AcceptanceCheck
+from dragdeck.study.base import QUANTITIES_FILE
 
 
 @dataclass(frozen=True)
@@ -51,16 +51,15 @@ class Measurand:
         return math.sqrt(mean) if self.squared else mean
 
 
-def _quantity(name: str, label: str, unit: str, short: str, kind: str) -> Measurand:
-    """A row of ``quantities.csv``, in which `|` is where a word may break."""
-    head = short.replace("|", "\N{SOFT HYPHEN}")
-    return Measurand(name, label, unit, head, kind == "squared", kind == "signed")
-
-
 QUANTITIES = tuple(
-    _quantity(**row) for row in table_rows(Path(__file__).with_name("quantities.csv"))
-)
-"""All but the last two have a value for every block of the path."""
+    Measurand(
+        row["name"], row["label"], row["unit"], row["short"].replace("|", "\N{SOFT HYPHEN}"),
+        row["kind"] == "squared", row["kind"] == "signed",
+    )
+    for row in table_rows(QUANTITIES_FILE)
+    if row["kind"]
+)  # fmt: skip
+"""All but those of the packing, which are last, have a value for every block of the path."""
 
 MAIN = tuple(quantity.name for quantity in QUANTITIES if quantity.short)
 """The quantities that figures and the tables of settings show."""

@@ -105,6 +105,14 @@ def test_a_sum_adds_sliding_and_weighted_impacts(tmp_path: Path) -> None:
     assert density @ area == pytest.approx(found.action_w.value, rel=1e-9)
 
 
+def test_without_an_impact_all_is_from_sliding(tmp_path: Path) -> None:
+    law = {"law": "archard+finnie", "coefficient_m2_n": 1e-15, "impact_ratio": 50.0}
+    parting = [hit(frame, normal_velocity_m_s=-0.1) for frame in (50, 200)]
+    found = worn(tmp_path, law, made_contacts(), parting)
+    assert found.impact_share.value == 0.0
+    assert found.action_w.value * TIME_S == pytest.approx(1.0 * 0.04 * 200 * DT, rel=1e-6)
+
+
 def test_an_ordinary_run_has_no_wear(tmp_path: Path) -> None:
     write_run(tmp_path, made_contacts())
     write_loading(tmp_path)
@@ -140,3 +148,17 @@ def test_the_area_along_edges_is_that_of_strips() -> None:
     """Within 1 mm of the 12 edges of a cube of 20 mm lies all but six squares of 18 mm."""
     near = edge_distance(sharp_edges(box(), 0.03)[0], strewn(box()), 5e-5) <= 1e-3
     assert near.mean() * 6 * 4e-4 == pytest.approx(6 * (4e-4 - 0.018**2), rel=0.01)
+
+
+def test_the_area_along_the_rim_of_a_long_rod_is_that_of_its_strips() -> None:
+    """The strip from 0.4 to 0.8 mm is a hundredth of the surface of the rod."""
+    import pyvista as pv
+
+    mesh = pv.Cylinder(
+        center=(0, 0, 0.038), direction=(0, 0, 1), radius=0.005, height=0.076, resolution=48
+    ).triangulate()
+    rod = Surface(mesh.points[mesh.regular_faces].astype(np.float64))
+    away = edge_distance(sharp_edges(rod, 0.01)[0], strewn(rod), 4e-5)
+    near = ((away >= 4e-4) & (away < 8e-4)).mean() * rod.areas.sum()
+    strips = np.pi * (0.01 * 4e-4 + 4.6e-3**2 - 4.2e-3**2)
+    assert near == pytest.approx(strips, rel=0.015)

@@ -10,6 +10,7 @@ import pytest
 from loading_files import SIZE, case_json, made_contacts, write_run
 from made_run import run_json, stl
 from report_files import process_findings
+from scipy.spatial.transform import Rotation
 
 from dragchain.cli import main
 from dragchain.errors import TableError
@@ -95,6 +96,16 @@ def test_a_contact_is_shared_by_a_cone_among_the_facets_of_its_side() -> None:
     found = target.receive(rows, np.array([[1.0, 0.0, 0.0]]), np.array([[5.0, 10.0]]))
     shares = np.array([1.0, 2 * (1 - 1 / 1.5), 0.0, 0.0])
     np.testing.assert_allclose(found, np.outer(shares / shares.sum(), [5.0, 10.0]), atol=1e-15)
+
+
+def test_rounding_gives_a_face_at_a_right_angle_nothing() -> None:
+    """A contact at the edge of two faces that are turned at random."""
+    corner = [[0, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 0, 0], [-1, 0, 0], [0, 0, 1]]
+    rows = pd.DataFrame([[0.0, 0.0, 0.0, 0]], columns=[*POINT, "facet_id"])
+    for turn in Rotation.random(50, np.random.default_rng(0)).as_matrix():
+        surface = Surface(1e-3 * np.array(corner) @ turn)
+        found = Target(surface, 3e-3).receive(rows, turn[:1], np.ones((1, 1)))
+        np.testing.assert_array_equal(found, [[1.0], [0.0]])
 
 
 FLIPPED = stl([facet[::-1] for facet in [

@@ -52,14 +52,24 @@ def test_a_trial_gives_the_volume_and_with_the_load_the_coefficient() -> None:
 
 
 def test_intervals_join_by_welch_and_satterthwaite() -> None:
-    """Equal standard errors, one with 2 degrees of freedom: 8 in all."""
-    halves = student_quantile(2) * 0.1, Z * 0.1
+    """The smaller standard error has 2 degrees of freedom: 200 in all."""
+    halves = student_quantile(2) * 0.1, Z * 0.3
     assert joined_half_width(*halves, 2) == pytest.approx(
-        student_quantile(8) * 0.1 * math.sqrt(2), rel=1e-6
+        student_quantile(200) * 0.1 * math.sqrt(10), rel=1e-6
     )
     assert joined_half_width(halves[0], 0.0, 2) == pytest.approx(halves[0])
     assert joined_half_width(0.0, halves[1], 2) == pytest.approx(halves[1])
     np.testing.assert_allclose(joined_half_width([0.3, 0.0], [0.4, 0.4], math.inf), [0.5, 0.4])
+
+
+@pytest.mark.parametrize("packings", [2, 3])
+def test_the_joint_interval_of_few_packings_covers(packings: int) -> None:
+    random, degrees = np.random.default_rng(7), packings - 1
+    loads = random.normal(0.0, 1.0, (4000, packings))
+    scatter = student_quantile(degrees) * loads.std(axis=1, ddof=1) / packings**0.5
+    known = 0.3 / packings**0.5
+    off = np.abs(loads.mean(axis=1) + random.normal(0.0, known, 4000))
+    assert (off < joined_half_width(scatter, Z * known, degrees)).mean() > 0.94
 
 
 @pytest.mark.parametrize(("off", "birge"), [(0.5, 1.0), (6.0, 6.0)])
@@ -131,6 +141,7 @@ def report(
     seeds: int = 1,
     wear: bool = True,
     corrected: float | None = None,
+    told: dict[str, Any] | None = None,
 ) -> Path:
     """The report on runs whose contacts are those made by hand, 50 % more with each seed."""
     runs = []
@@ -148,6 +159,9 @@ def report(
         run = make_run(tmp_path / "results", case, process_findings(), PICTURES)
         for file in ("tables/loading.json", *(["tables/wear.json"] if wear else [])):
             (run / file).write_bytes((made / file).read_bytes())
+        if told:
+            whole = json.loads((run / file).read_text())
+            (run / file).write_text(json.dumps(whole | told))
         (run / "workpiece.stl").write_text(PLATE)
         if corrected:
             write_quantities(run, corrected)
@@ -171,6 +185,14 @@ def test_the_report_has_depth_mass_and_minutes(tmp_path: Path) -> None:
     assert "min (mean depth)" in page.words
     assert "Young's modulus \N{MULTIPLICATION SIGN} 0.01" in page.words
     assert "not corrected" in page.words
+
+
+def test_the_mean_depth_is_without_what_is_removed_above_the_bed(tmp_path: Path) -> None:
+    """Of two equal facets one is in the bed, and two thirds of the action are on it."""
+    out = report(tmp_path, GIVEN, told={"immersed": [True, False], "patch_w_m2": [2.0, 1.0]})
+    load = Loading.read(tmp_path / "made-0/tables/loading.json").per_metre["force_slide_n_m"]
+    depth_m_s = 2 / 3 * 2e-11 * load.value * 0.01 / 2e-4
+    assert f"over the immersed surface: {3600e6 * depth_m_s:.3g} " in page_of(out).words
 
 
 def test_windows_correct_the_load_of_a_soft_run(tmp_path: Path) -> None:

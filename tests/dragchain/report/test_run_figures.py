@@ -18,12 +18,13 @@ from dragchain.errors import TableError
 from dragchain.figures import network_picture as scene
 from dragchain.figures.rendering import RenderError, check_rendering
 from dragchain.network.frame import SIDE, NetworkFrame
-from dragchain.report.findings import FIGURES, FILE, FillingFindings, ProcessFindings
+from dragchain.report.findings import FILE, FillingFindings, ProcessFindings
 from dragchain.report.run_data import RunData, dominant_bottlenecks, of_classes, process_findings
 from dragchain.report.run_figures import energy_ratio, write_figures
 from dragchain.run.reference import reference_drags
 from dragchain.statistics.estimate import Estimate
 from dragdeck.records.case import CaseOfRun, load_case
+from dragdeck.records.run import figures_of
 from dragdeck.study.drive import Rotation
 from dragdeck.study.reference import Drag, Reference
 
@@ -82,14 +83,44 @@ def test_the_torque_is_about_the_axis_of_a_workpiece_that_spins(
 
 
 def test_classes_share_contacts_and_load() -> None:
-    """In each of 40 frames, three contacts of the coarse class, 2 N each, one of the fine, 1 N."""
-    frame = np.repeat(np.arange(40), 4)
-    kinds = pd.Categorical(["coarse", "coarse", "fine", "coarse"] * 40, ["coarse", "fine", "none"])
-    contacts = pd.DataFrame({"class": kinds, "normal_force_n": [2.0, 2.0, 1.0, 2.0] * 40})
+    """In each of 40 frames, three contacts of the coarse class, 2 N each, one of the fine, 1 N.
+
+    Another of the fine class overlaps without a force.
+    """
+    frame = np.repeat(np.arange(40), 5)
+    classes = ["coarse", "coarse", "fine", "coarse", "fine"]
+    kinds = pd.Categorical(classes * 40, ["coarse", "fine", "none"])
+    contacts = pd.DataFrame({"class": kinds, "normal_force_n": [2.0, 2.0, 1.0, 2.0, 0.0] * 40})
     found = of_classes(["coarse", "fine", "absent"], frame, 40, contacts)
     assert [value.value for value in found["coarse"]] == pytest.approx([3, 2, 6 / 7])
     assert [value.value for value in found["fine"]] == pytest.approx([1, 1, 1 / 7])
     assert [value.known for value in found["absent"]] == [True, False, True]
+
+
+def test_segregation_starts_with_the_drag_and_not_with_the_statistics(
+    process: Path, tmp_path: Path
+) -> None:
+    """Of two classes of equal volumes, one lies on top in the first frame, and is mixed later."""
+    folder = shutil.copytree(process, tmp_path / "run")
+    case = json.loads((folder / "case.json").read_text())
+    of_class = {"material": "ceramic", "volume_m3": 1e-6, "radius_mean_m": R, "radius_std_m": 0.0,
+                "density_kg_m3": 2656.0, "contact_moduli": {}}  # fmt: skip
+    case["classes"] = [
+        {"name": name, "first_id": first, "count": 10} | of_class
+        for name, first in (("upper", 1), ("lower", 11))
+    ]
+    (folder / "case.json").write_text(json.dumps(case))
+    frame = {"particle_id": [1, 11], "radius_m": R, "class": ["upper", "lower"]}
+    steps = sorted(pd.read_parquet(folder / "tables/particles.parquet")["step"].unique())
+    rows = [
+        pd.DataFrame(frame | {"step": step, "z_m": [0.03, 0.01] if step == steps[0] else 0.02})
+        for step in steps
+    ]
+    pd.concat(rows).to_parquet(folder / "tables/particles.parquet")
+    file = folder / "tables/workpiece_contacts.parquet"
+    pd.read_parquet(file).assign(**{"class": "upper"}).to_parquet(file)
+    found = process_findings(RunData(folder, load_case(folder))).segregation
+    assert found["upper"] == pytest.approx((0.5, 0.0))
 
 
 def test_a_frame_without_a_path_has_no_bottleneck() -> None:
@@ -121,7 +152,7 @@ def test_a_reference_of_zero_is_refused() -> None:
 
 
 def test_process_figures_are_whole_pictures(process: Path, drawn: list[Path]) -> None:
-    names = list(FIGURES["process"])
+    names = list(figures_of("process"))
     assert [path.stem for path in drawn] == names
     assert sorted(path.name for path in (process / "figures").iterdir()) == sorted(
         f"{name}.png" for name in names

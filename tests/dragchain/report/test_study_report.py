@@ -244,6 +244,18 @@ def test_the_torque_of_a_workpiece_that_spins_stands_with_the_forces(
     assert row["torque_mean_ci95_low_n_m"] == pytest.approx(-0.004)
 
 
+def test_an_inclined_rod_has_the_diameter_of_its_study(process: Path, tmp_path: Path) -> None:
+    reach = {"kind": "mesh", "radius_m": 0.0137, "length_m": 0.08, "immersion_depth_m": 0.05}
+    inputs = {"workpiece.shape.kind": "cylinder", "workpiece.shape.radius_m": 0.005}
+    case = case_json("process", "run-1", workpiece=reach, inputs=inputs)
+    case = with_motion(case, {"kind": "circle", "radius_m": 0.02}, 0.01, tilt_deg=10)
+    run = make_run(process.parents[2], case, process_findings(), PICTURES)
+    write_study_report(tmp_path, [run])
+    words = page_of(tmp_path).words
+    assert "cylinder, diameter 10 mm" in words
+    assert "inclined by 10\N{DEGREE SIGN}" in words
+
+
 # --- several packings -------------------------------------------------------------------------
 
 

@@ -172,6 +172,15 @@ def test_a_ratio_of_uncertain_sums_reaches_further_up_than_down() -> None:
     assert found.ci95_high - found.value > 1.2 * (found.value - found.ci95_low) > 0.0
 
 
+def test_a_ratio_to_a_sum_that_may_be_zero_has_no_interval() -> None:
+    """With cohesion, normal forces behind the workpiece may pull more than they push."""
+    random = np.random.default_rng(3)
+    sums = np.column_stack([random.normal(1.0, 0.1, 400), random.normal(0.01, 1.0, 400)])
+    (ratio,) = estimates(sums, lambda means: means[..., :1] / means[..., 1:])
+    assert math.isfinite(ratio.value)
+    assert not ratio.known
+
+
 def test_what_never_changes_and_what_is_short_are_not_reliable() -> None:
     assert not interval_of_mean(np.ones(100)).reliable
     assert not interval_of_mean(np.linspace(0.0, 1.0, 100)).reliable

@@ -12,6 +12,7 @@ from dragchain.windows.estimate import (
     corrected_map,
     joined,
     joined_squares,
+    of_one_run,
     windows_needed,
 )
 
@@ -25,6 +26,12 @@ def test_without_knowledge_it_is_the_mean_with_students_interval() -> None:
     assert found.value == pytest.approx(-2.3)
     assert found.half_width(4) == pytest.approx(half)
     assert found.estimate(4).ci95_low == pytest.approx(-2.3 - half)
+
+
+def test_a_quantity_that_is_zero_all_along_has_no_interval() -> None:
+    found = of_one_run(np.zeros(3), 0.0, DRAG)
+    assert found.value == 0.0
+    assert not found.known
 
 
 def test_the_root_of_a_mean_square_has_half_its_relative_errors() -> None:

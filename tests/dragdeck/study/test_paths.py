@@ -13,6 +13,7 @@ from dragdeck.project import Project
 from dragdeck.study.drive import rotated
 from dragdeck.study.driven import DrivenMotion
 from dragdeck.study.model import AnyPath, Motion
+from dragdeck.study.paths.figure_eight import FigureEightPath
 from dragdeck.sweep.cases import load_cases
 
 POINTS = [[2, 0.001, 0, 0.002], [2.2, 0.006, 0.002], [2.3, 0.006, 0.002], [2.7, 0.001, 0.003]]
@@ -59,7 +60,7 @@ def poses(way: DrivenMotion) -> tuple[np.ndarray, np.ndarray]:
 
 def test_every_kind_has_an_example() -> None:
     kinds = {get_args(kind.model_fields["kind"].annotation)[0] for kind in get_args(AnyPath)}
-    assert kinds == set(EXAMPLES)
+    assert kinds == set(EXAMPLES), "EXAMPLES of this file needs an example of each kind"
 
 
 @pytest.mark.parametrize("path", PATHS, ids=lambda path: path["kind"])
@@ -96,6 +97,22 @@ def test_a_path_may_be_turned_and_have_another_length(path: dict[str, Any]) -> N
     _, places = poses(way)
     _, elsewhere = poses(DrivenMotion.of(turned, STEP_S, 1.0))
     np.testing.assert_allclose(elsewhere, rotated(places, math.radians(35)), atol=1e-11)
+
+
+class Parabola(FigureEightPath):
+    """``y = x^2`` from x = 0 to `loops`: its length is not proportional to that."""
+
+    def place(self, share: Any) -> tuple[Any, Any, Any]:
+        return self.loops * share, (self.loops * share) ** 2, 0.0
+
+    def tangent(self, share: Any) -> tuple[Any, Any, Any]:
+        return self.loops, 2 * self.loops**2 * share, 0.0
+
+
+def test_a_path_whose_length_is_not_proportional_gets_another_length() -> None:
+    path = Parabola(kind="figure_eight", radius_m=1.0, loops=1.0)
+    x = path.with_length(4.0).loops
+    assert x / 2 * math.hypot(1, 2 * x) + math.asinh(2 * x) / 4 == pytest.approx(4.0, rel=1e-8)
 
 
 MORE: list[dict[str, Any]] = [

@@ -3,12 +3,13 @@
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import Literal, Self
+from typing import Literal, NamedTuple, Self
 
 from pydantic import Field, PositiveFloat, model_validator
 
 from dragdeck.documents import Document, Part, omitted
 from dragdeck.errors import RejectedRunError
+from dragdeck.files import table_rows
 from dragdeck.physics.run_limits import RunLimits
 
 
@@ -363,3 +364,35 @@ def read_accepted(run_dir: Path) -> RunRecord:
     if (reason := refusal(record)) is not None:
         raise RejectedRunError(f"{run_dir} cannot be used: {reason}")
     return record
+
+
+# --- figures -------------------------------------------------------------------------------------
+
+
+class FigureOfRun(NamedTuple):
+    """A figure of a run, ``figures/<name>.png``.
+
+    Attributes
+    ----------
+    scene : str
+        Whose runs have it; that of the loading of the workpiece is drawn apart.
+    caption : str
+    seen : str
+        What is seen in it, for those who do not see it.
+    """
+
+    scene: str
+    caption: str
+    seen: str
+
+
+FIGURES: Mapping[str, FigureOfRun] = {
+    row.pop("name"): FigureOfRun(**row)
+    for row in table_rows(Path(__file__).with_name("figures.csv"))
+}
+"""The registry of figures by name, in the order of the report."""
+
+
+def figures_of(scene: str) -> Sequence[str]:
+    """Names of the figures of a scene's runs."""
+    return [name for name, figure in FIGURES.items() if figure.scene == scene]

@@ -168,7 +168,6 @@ DROP_TEST = SceneType(
     build=lambda case, _: drop_scene(case),
     inputs=("particle.data",),
     tables=("impacts.parquet",),
-    figures=("drop_test",),
     regime="impact",
     impact_speed=lambda case: fall_speed(case.study.drop_test.height_m, case.study.gravity_m_s2),
     partners=lambda case: [("plate", case.study.workpiece.material, math.inf)],

@@ -472,7 +472,6 @@ FILLING = SceneType(
     build=lambda case, _: filling_scene(case.of_filling),
     inputs=("particles.data",),
     tables=("packing.json", "thermo.parquet"),
-    figures=("filling",),
     regime="settle",
     impact_speed=_impact_speed,
     partners=partners_in_bed,

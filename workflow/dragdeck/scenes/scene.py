@@ -73,9 +73,9 @@ class SceneType:
         The scene of a case; the settled bed matters to those that start from one.
     inputs : tuple of str
         Files of a run's folder beside deck, case.json and columns.json.
-    tables, network, loading, figures : tuple of str
+    tables, network, loading : tuple of str
         Files that dragchain makes of a run: tables of its raw output, of the contact network
-        and its chains, of the loading of the workpiece, and figures.
+        and its chains, and of the loading of the workpiece.
     needs_bed : bool
         Whether it starts from the bed of a filling.
     single_particle : bool
@@ -96,7 +96,6 @@ class SceneType:
     build: Callable[[Case, Bed | None], StudyScene]
     inputs: tuple[str, ...]
     tables: tuple[str, ...]
-    figures: tuple[str, ...]
     regime: Regime
     impact_speed: Callable[[Case], float]
     partners: Callable[[Case], Sequence[tuple[str, str, float]]]

@@ -376,18 +376,8 @@ def warnings(study: Study) -> list[Caution]:
     return found
 
 
-_FORMS = (
-    *(get_args(path.model_fields["kind"].annotation)[0] for path in get_args(AnyPath)),
-    "cylinder",
-    "mesh",
-    "a-name",
-    "a-number",
-    "a-word",
-    "settings",
-    "a-tolerance",
-    "[key]",
-)
-"""Names of alternatives, which are no part of a field's dotted name."""
+_FORMS = ("a-name", "a-list", "a-number", "a-word", "settings", "a-tolerance", "[key]")
+"""Names of alternatives, which are no part of a field's dotted name; nor are kinds."""
 
 _OUT_OF_RANGE = "the value is out of range"
 _ENTRIES = "the list has {actual_length} entries"
@@ -440,7 +430,9 @@ def _problems(error: ValidationError) -> list[InputError]:
 def _problem(issue: ErrorDetails) -> InputError:
     """One problem that a model found."""
     kind = issue["type"]
-    field = ".".join(str(part) for part in issue["loc"] if part not in _FORMS)
+    places = zip(("", *issue["loc"]), issue["loc"], strict=False)
+    named = (part for above, part in places if above not in ("path", "shape"))
+    field = ".".join(str(part) for part in named if part not in _FORMS)
     words = _WORDS.get(kind, (issue["msg"].removeprefix("Value error, "), None))
     problem, limit, remedy = *words, None
     if kind in _WORDS:

@@ -24,8 +24,8 @@ _PUSHING = ("hertz", "hertz/stiffness", "hooke", "hooke/stiffness")
 
 Floats = NDArray[np.float64]
 Attraction = Callable[[Floats | float, Floats, Floats, bool], Floats]
-"""Attractive force of (N,) contacts, N, from the coefficient, reduced radii and overlaps, m, and
-whether the other body is a wall."""
+"""Attractive force of (N,) contacts, N, from the coefficient, reduced radii and overlaps, m, to
+which it is proportional, and whether the other body is a wall."""
 
 RollingModel = Literal["epsd2", "cdt", "epsd"]
 
@@ -210,7 +210,8 @@ def added_forces(law: Sequence[str]) -> list[str]:
     if named.get("tangential_reduce", "off") != "off":
         found.append("tangential_reduce on")
     rows = (row.model for row in coefficients().values() if row.attraction)
-    found += [model for model in rows if model in " ".join(words) and model not in found]
+    law_words = f"{' '.join(words)} "
+    found += [model for model in rows if f"{model} " in law_words and model not in found]
     return found
 
 

@@ -6,11 +6,13 @@ run.
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
+from dragdeck.files import table_rows
 from dragdeck.study.base import (
+    QUANTITIES_FILE,
     Line,
     MaterialName,
     Model,
@@ -293,27 +295,11 @@ class Outputs(Model):
         return self
 
 
-Quantity = Literal[
-    "drag_mean",
-    "drag_std",
-    "vertical_mean",
-    "workpiece_contacts",
-    "contact_force_mean",
-    "contact_force_p50",
-    "contact_force_p90",
-    "contact_force_p99",
-    "normal_load",
-    "sliding_distance",
-    "friction_work",
-    "force_slide",
-    "coordination_number",
-    "mechanical_coordination_number",
-    "network_force_mean",
-    "chain_count",
-    "chain_length",
-    "path_bottleneck",
-    "restitution",
-]
+if TYPE_CHECKING:
+    Quantity = str
+else:
+    _ROWS = table_rows(QUANTITIES_FILE)
+    Quantity = Literal[tuple(row["name"] for row in _ROWS if row["tolerance"])]
 """Quantities to which a tolerance can apply; docs/evidence/tradeoff.md defines each."""
 
 RESTITUTION = "restitution"
@@ -452,7 +438,11 @@ class Tolerance(Model):
         description="relative half-width of the 95 % confidence interval at the physical Young's "
         "modulus"
     )
-    quantity: Quantity | Annotated[list[Quantity], Field(min_length=1, max_length=8)] = Field(
+    quantity: Annotated[
+        Annotated[Quantity, Tag("a-name")]
+        | Annotated[list[Quantity], Field(min_length=1, max_length=8), Tag("a-list")],
+        Discriminator(lambda value: "a-list" if isinstance(value, list) else "a-name"),
+    ] = Field(
         default="drag_mean",
         description="quantity, or list of up to eight, to which the tolerance applies",
     )

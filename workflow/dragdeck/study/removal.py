@@ -86,9 +86,11 @@ class Removal(Model):
             if sd >= _TELLS * value:
                 why = f"{name} {sd:g} is half of its value, {value:g}, or more"
                 raise ValueError(f"{why}: the interval of the coefficient would include zero")
-        for name, wanted in (("impact_ratio", "+" in self.law), ("hardness_pa", "oka" in self.law)):
-            if wanted != (getattr(self, name) is not None):
-                verb = "is missing: give it" if wanted else "has no meaning: remove it"
+        wanted = {"impact_ratio"} if "+" in self.law else set()
+        wanted |= {name for law in self.laws for name in law.parameters}
+        for name in ("impact_ratio", *(name for law in LAWS.values() for name in law.parameters)):
+            if (name in wanted) != (getattr(self, name) is not None):
+                verb = "is missing: give it" if name in wanted else "has no meaning: remove it"
                 raise ValueError(f"{name} {verb} for the law {self.law}")
         return self
 
@@ -150,11 +152,14 @@ class Law:
         Whether it reads impacts at first touch; otherwise contacts in samples.
     action : callable
         The action in J of N contacts or impacts, (N,).
+    parameters : tuple of str
+        Fields of `Removal` that it needs.
     """
 
     title: str
     impact: bool
     action: Callable[[Wearing, Removal], _Floats]
+    parameters: tuple[str, ...] = ()
 
 
 def _finnie(one: Wearing, _: Removal) -> _Floats:
@@ -189,6 +194,6 @@ def _archard(one: Wearing, _: Removal) -> _Floats:
 LAWS: Mapping[str, Law] = {
     "archard": Law("normal force times sliding distance (Archard, Preston)", False, _archard),
     "finnie": Law("erosion by cutting impacts (Finnie 1960)", True, _finnie),
-    "oka": Law("erosion by impacts (Oka et al. 2005)", True, _oka),
+    "oka": Law("erosion by impacts (Oka et al. 2005)", True, _oka, ("hardness_pa",)),
 }
 """The registry of laws."""

@@ -58,7 +58,7 @@ class WorkpiecePath(Model):
     Attributes
     ----------
     length_field : str
-        The field below ``motion.path`` that its length is proportional to.
+        The field below ``motion.path`` that its length grows with.
     one_direction : bool
         Whether it has one direction: the workpiece never turns with it.
     """
@@ -184,7 +184,15 @@ class WorkpiecePath(Model):
 
     def with_length(self, length_m: float) -> Self:
         """The same path with another length."""
+
+        def off(value: float) -> float:
+            return self.model_copy(update={self.length_field: value}).path_length_m - length_m
+
         longer = getattr(self, self.length_field) * length_m / self.path_length_m
+        if abs(off(longer)) > 1e-9 * length_m:  # not proportional: its speed varies
+            from scipy.optimize import newton
+
+            longer = float(newton(off, longer, tol=1e-9 * longer))
         return self.model_copy(update={self.length_field: longer})
 
     # --- as a run drives it --------------------------------------------------------------------
