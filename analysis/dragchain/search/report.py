@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -135,7 +136,7 @@ def at_bounds(found: SearchFindings, point: SearchPoint) -> list[str]:
 
 def draw_search(found: SearchFindings, rows: list[SearchRow]) -> dict[str, Figure]:
     """The path of the search, the response along each field, and predicted against measured."""
-    objective = label(found.studied.search.objective)
+    objective = fill(label(found.studied.search.objective), 30)
     path, (axes,) = new_panels(3.2, width_in=WIDE_IN)
     for purpose, marker in zip(_COLOURS, MARKERS, strict=False):
         own = [one for one in rows if one.point.purpose == purpose and one.objective]
