@@ -145,7 +145,7 @@ def draw_search(found: SearchFindings, rows: list[SearchRow]) -> dict[str, Figur
     axes.plot(gone, np.full(len(gone), 0.03), "x", color=ORANGE, label="refused or rejected",
               transform=axes.get_xaxis_transform())  # fmt: skip
     axes.set(xlabel="setting in the order of the search", ylabel=objective)
-    axes.xaxis.get_major_locator().set_params(integer=True)
+    axes.locator_params(axis="x", integer=True)
     figures = {"path": legend_below(path)}
     fields, model = list(found.studied.search.vary.items()), found.trials.responses
     if found.studied.search.objective.goal != "target":
