@@ -5,7 +5,7 @@ Some errors no single field shows: names that do not exist, values that contradi
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from itertools import product
+from itertools import pairwise, product
 from pathlib import Path
 from typing import get_args
 
@@ -430,7 +430,7 @@ def _problems(error: ValidationError) -> list[InputError]:
 def _problem(issue: ErrorDetails) -> InputError:
     """One problem that a model found."""
     kind = issue["type"]
-    places = zip(("", *issue["loc"]), issue["loc"], strict=False)
+    places = pairwise(("", *issue["loc"]))
     named = (part for above, part in places if above not in ("path", "shape"))
     field = ".".join(str(part) for part in named if part not in _FORMS)
     words = _WORDS.get(kind, (issue["msg"].removeprefix("Value error, "), None))
