@@ -35,11 +35,11 @@ class InputError(DragdeckError):
         Accepted values.
     remedy : str, optional
         Instruction for the user.
+    line : int, optional
+        Line of the field in the file.
 
     Attributes
     ----------
-    line : int or None
-        Line of the field in the file, where it is known.
     more : sequence of InputError
         Further problems of the same input; the message contains them all.
     """
@@ -51,9 +51,9 @@ class InputError(DragdeckError):
     value: object = None
     limit: str | None = None
     remedy: str | None = None
+    line: int | None = None
 
     def __post_init__(self) -> None:
-        self.line: int | None = None
         self.more: Sequence[InputError] = ()
 
     def __str__(self) -> str:

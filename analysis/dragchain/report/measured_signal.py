@@ -294,7 +294,8 @@ class SignalComparison:
         """What of a signal is compared, positive in the direction in which peaks are counted."""
         sign = -1.0 if self.signal.component == "drag" else 1.0
         rate = PER_HZ * self.signal.low_pass_hz
-        return sign * force_n[math.ceil(self.transient_s * rate - 1e-9) :]
+        kept = force_n[math.ceil(self.transient_s * rate - 1e-9) :]
+        return sign * kept[np.isfinite(kept)]
 
     def table(self) -> pd.DataFrame:
         """One row per quantity; the intervals are those of the report."""

@@ -57,6 +57,17 @@ def test_offset_drift_sign_and_unit_are_undone(tmp_path: Path) -> None:
     np.testing.assert_allclose(by_rate.force_n, plain.force_n, atol=1e-9)
 
 
+def test_nothing_is_extrapolated(tmp_path: Path) -> None:
+    """A file that begins and ends with the drag, and within a sampling interval of it."""
+    inside = (TIME > START) & (TIME < END)
+    cut = read(tmp_path, text(resistance()[inside], TIME[inside]))
+    assert np.isnan(cut.force_n[0])
+    assert np.isfinite(cut.force_n[1:]).all()
+    assert cut.time_s[-1] <= END - START
+    late, force = low_passed(TIME[7:], resistance()[7:], 20.0)
+    np.testing.assert_array_equal(np.isnan(force), late < TIME[7])
+
+
 def test_the_start_is_found_where_the_force_leaves_the_noise(tmp_path: Path) -> None:
     noise = np.random.default_rng(3).normal(0.0, 0.02, len(TIME))
     found = read(tmp_path, text(resistance() + noise), starts_at_s=None, rest_s=[[0.0, 1.8]])
@@ -74,14 +85,14 @@ def clipped(force: Floats) -> Floats:
     return np.minimum(force, np.quantile(force[DRAG], 0.9))
 
 
-def with_nan(force: Floats) -> Floats:
-    return np.where(np.arange(len(force)) == 4000, np.nan, force)
+def halted(time: Floats) -> Floats:
+    return np.where(np.arange(len(time)) == 500, time[499], time)
 
 
 WRONG: dict[str, tuple[Callable[[Floats], str], dict[str, Any], str, str]] = {
     "no unit": (lambda f: text(f, header="time_s,fx"), {"column": "fx"}, "columns", "no unit"),
-    "other column": (lambda f: text(f), {"column": "fy_n"}, "columns", "fx_n"),
-    "NaN": (lambda f: text(with_nan(f)), {}, "numbers", "row 4001"),
+    "time stands still": (lambda f: text(f, halted(TIME)), {}, "time", "lines 501 and 502"),
+    "time runs backwards": (lambda f: text(f, TIME[::-1]), {}, "time", "lines 2 and 3"),
     "clipped": (lambda f: text(clipped(f)), {}, "clipped", "wider range"),
     "uneven": (
         lambda f: text(f, TIME + 0.0009 * (np.arange(len(TIME)) % 7 == 0)),
@@ -90,9 +101,14 @@ WRONG: dict[str, tuple[Callable[[Floats], str], dict[str, Any], str, str]] = {
     "too slow": (lambda f: text(f), {"low_pass_hz": 101}, "slow", "505 Hz"),
     "too short": (lambda f: text(f), {"ends_at_s": 2.9}, "short", "own correlation"),
     "constant drift": (lambda f: text(f + 4 * TIME), {}, "short", "own correlation"),
+    "begins late": (
+        lambda f: text(f[1500:], TIME[1500:]), {}, "short", "from 3 to 15.998",
+    ),
+    "ends early": (lambda f: text(f[:6900], TIME[:6900]), {}, "short", "from 0 to 13.798"),
+    "rest not recorded": (lambda f: text(f), {"rest_s": [[-1, 1]]}, "short", "rest_s"),
+    "rest in the drag": (lambda f: text(f), {"rest_s": [[0, 2.5]]}, "start", "without load"),
     "no such time": (lambda f: text(f), {"starts_at_s": 20, "ends_at_s": 21}, "short", "15.998"),
     "start unknown": (lambda f: text(f), {"starts_at_s": None}, "start", "starts_at_s"),
-    "empty": (lambda f: "\n", {}, "columns", "empty"),
 }  # fmt: skip
 
 
@@ -105,24 +121,19 @@ def test_a_signal_that_no_comparison_can_use_is_refused(name: str, tmp_path: Pat
     assert words in str(caught.value)
 
 
-def test_a_huge_file_is_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(force_record, "_MOST_BYTES", 1000)
-    with pytest.raises(RecordError, match="too large"):
-        read(tmp_path, text(resistance()))
-
-
 @pytest.mark.parametrize(
     ("fields", "problem", "field"),
     [
         ({}, None, ""),
         ({"file": "none.csv"}, "no such file", "reference.signal.file"),
         ({"file": "../force.csv"}, "leaves the folder", "reference.signal.file"),
-        ({"column": "fz_n"}, "(columns)", "reference.signal.file"),
+        ({"column": "fz_n"}, "force.csv:1: no column(s)", None),
+        ({"starts_at_s": -1}, "(short)", "reference.signal.file"),
         ({"low_pass_hz": 201}, "sampled too slowly", "reference.signal.low_pass_hz"),
     ],
 )
 def test_check_names_the_field_of_a_study(
-    fields: dict[str, Any], problem: str | None, field: str, tmp_path: Path
+    fields: dict[str, Any], problem: str | None, field: str | None, tmp_path: Path
 ) -> None:
     from dragdeck.study.check import validate
 

@@ -418,7 +418,7 @@ def explained(error: ValidationError, file: Path | str) -> InputError:
 
 def _of_file(found: list[InputError], file: Path | str, places: Places) -> InputError:
     for error in found:
-        here = file, error.line, error.field
+        here = error.file or file, error.line, error.field
         error.file, error.line, error.field = places.get(error.field, here)
     return located(together(found))
 

@@ -1,22 +1,19 @@
 """Measured forces over time as CSV files: drop tests, and signals of a process."""
 
-import io
-from collections.abc import Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
-import pandas as pd
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.signal import butter, correlate, sosfiltfilt
 from scipy.stats import theilslopes
 
-from dragdeck.errors import RecordError
+from dragdeck.errors import InputError, RecordError
 from dragdeck.study.reference import Signal, Span
-
-Floats = NDArray[np.float64]
+from dragdeck.study.table import Floats, Table, read_table
 
 TIME_COLUMNS = {"time_s": 1.0, "time_ms": 1e-3, "time_us": 1e-6}
 FORCE_COLUMNS = {"force_n": 1.0, "force_mn": 1e-3, "force_kn": 1e3}
@@ -25,8 +22,6 @@ FORCE_COLUMNS = {"force_n": 1.0, "force_mn": 1e-3, "force_kn": 1e3}
 _LEAST_SAMPLES = 100
 _BLOCKS = 50
 """Blocks of a record whose medians a line is put through: impacts touch few of them."""
-
-_MOST_BYTES = 64_000_000
 
 _JITTER = 0.25
 """A time may be off an even grid by this fraction of the interval (rounded stamps)."""
@@ -63,61 +58,41 @@ def read_record(file: Path) -> Record:
     Parameters
     ----------
     file : Path
-        A header line, then one row per sample; ``,`` or ``;`` or a tab between
-        columns, a point in numbers; lines that begin with ``#`` are comments.
-        One column of `TIME_COLUMNS` and one of `FORCE_COLUMNS`; others are
+        As for `read_table`: one column of `TIME_COLUMNS` and one of `FORCE_COLUMNS`; others are
         left alone.
 
     Raises
     ------
+    InputError
+        The file is no such table.
     RecordError
-        The file cannot be used; `reason` says why: ``file``, ``columns``,
-        ``numbers``, ``short``, ``time``, ``uneven``.
+        The record cannot be used; `reason` says why: ``short``, ``time``, ``uneven``.
     """
-    return check_samples(*parse_record(_text(file)))
+    return check_samples(*read_samples(file))
 
 
-def _text(file: Path) -> str:
-    try:
-        if file.stat().st_size > _MOST_BYTES:
-            value, limit = (f"{size / 1e6:.0f} MB" for size in (file.stat().st_size, _MOST_BYTES))
-            raise RecordError(
-                "huge", "the file is too large", value=value, limit=f"at most {limit}"
-            )
-        return file.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise RecordError("file", f"{file} cannot be read: {error}") from None
-
-
-def parse_record(
-    text: str, column: str | None = None, rate_hz: float | None = None
-) -> tuple[Floats, Floats]:
-    """Times in s and forces in N of a CSV text; see `read_record`.
+def read_samples(
+    file: Path, column: str | None = None, rate_hz: float | None = None
+) -> tuple[Floats, Floats, Sequence[int]]:
+    """Times in s, forces in N and lines of a CSV file; see `read_record`.
 
     `column` names the force where it is not one of `FORCE_COLUMNS`; `rate_hz` stands in for times.
     """
-    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
-    if not lines:
-        raise RecordError("columns", "the file is empty", remedy="write a header line and samples")
-    separator = next((mark for mark in (";", "\t") if mark in lines[0]), ",")
-    names = [name.strip().strip('"').lower() for name in lines[0].split(separator)]
+    table = read_table(file)
+    table = replace(table, names=tuple(name.lower() for name in table.names))
     forces = FORCE_COLUMNS if column is None else {column.lower(): _unit(column)}
-    force_name = _column(names, forces)
-    time_name = _column(names, TIME_COLUMNS) if rate_hz is None else force_name
-    try:
-        table = pd.read_csv(
-            io.StringIO("\n".join(lines[1:])), sep=separator, names=names, index_col=False
-        )
-        time, force = (table[name].to_numpy(np.float64) for name in (time_name, force_name))
-    except (ValueError, pd.errors.ParserError) as error:
-        raise RecordError(
-            "numbers",
-            f"a value is not a number: {error}",
-            remedy="use a decimal point, and a comma, semicolon or tab between columns",
-        ) from None
+    name = _column(table, forces)
+    if rate_hz is None or {*table.names} & {*TIME_COLUMNS}:
+        time_name = _column(table, TIME_COLUMNS)
+        time, force = table.numbers([time_name, name])
+        time *= TIME_COLUMNS[time_name]
+    else:
+        table.refuse_gaps()
+        (force,) = table.numbers([name])
+        time = np.arange(len(force)) / rate_hz
     if rate_hz is not None:
-        return np.arange(len(force)) / rate_hz, force * forces[force_name]
-    return time * TIME_COLUMNS[time_name], force * forces[force_name]
+        _refuse_other_rate(time, rate_hz, file)
+    return time, force * forces[name], table.lines
 
 
 def _unit(column: str) -> float:
@@ -129,56 +104,78 @@ def _unit(column: str) -> float:
     raise RecordError("columns", problem, value=column, limit=limit, remedy="rename the column")
 
 
-def _column(names: Sequence[str], known: dict[str, float]) -> str:
-    found = [name for name in names if name in known]
+def _column(table: Table, known: Mapping[str, float]) -> str:
+    found = [name for name in table.names if name in known]
     if len(found) != 1:
-        raise RecordError(
-            "columns",
+        names, remedy = table.names, "name the columns in the first line, such as time_s,force_n"
+        quoted = {*names} & {*TIME_COLUMNS, *FORCE_COLUMNS, *known}
+        raise InputError(
             f"{len(found) or 'no'} column(s) with a recognised name",
-            value=", ".join(names)[:200] if {*names} & {*TIME_COLUMNS, *FORCE_COLUMNS} else None,
+            file=table.file,
+            line=table.header_line,
+            value=", ".join(names)[:200] if quoted else None,
             limit=f"one of {', '.join(known)}",
-            remedy="name the columns in the first line, for example time_s,force_n",
+            remedy=remedy,
         )
     return found[0]
 
 
-def check_samples(time_s: Floats, force_n: Floats) -> Record:
+def _refuse_other_rate(time: Floats, rate_hz: float, file: Path) -> None:
+    """Refuse a sampling rate that the times of the file contradict."""
+    even = time[:1] + np.arange(len(time)) / rate_hz
+    if np.any(np.abs(time - even) > _JITTER / rate_hz):
+        mean = (len(time) - 1) / (time[-1] - time[0]) if time[-1] > time[0] else math.nan
+        problem, remedy = "rate_hz contradicts the times in the file", "remove or correct rate_hz"
+        limit = f"{mean:.6g} Hz, the mean rate of the times"
+        raise InputError(problem, file=file, value=f"{rate_hz:g} Hz", limit=limit, remedy=remedy)
+
+
+def check_samples(time_s: Floats, force_n: Floats, lines: Sequence[int] | None = None) -> Record:
     """Check that samples are numbers at even times, and turn compression positive.
+
+    Parameters
+    ----------
+    time_s, force_n : (N,) ndarray
+        Times, s, and forces, N.
+    lines : sequence of int, optional
+        Where they stand in their file; none: numbers of samples, from 1.
 
     Raises
     ------
     RecordError
         ``short``, ``numbers``, ``time`` or ``uneven``.
     """
-    even, interval = _even(time_s, force_n)
+    even, interval = _even(time_s, force_n, lines)
     rest = force_n - np.polyval(quiet_line(even, force_n), even)
     if -float(rest.min()) > float(rest.max()):
         return Record(even, -force_n, interval, ("sign_turned",))
     return Record(even, force_n, interval)
 
 
-def _even(time_s: Floats, force_n: Floats) -> tuple[Floats, float]:
+def _even(time_s: Floats, force_n: Floats, lines: Sequence[int] | None) -> tuple[Floats, float]:
     """Even times and their interval, s; errors are those of `check_samples`."""
     if len(time_s) < _LEAST_SAMPLES:
         raise RecordError(
             "short", "too few samples", value=str(len(time_s)), limit=f"at least {_LEAST_SAMPLES}"
         )
+    word, places = ("line", lines) if lines else ("sample", range(1, len(time_s) + 1))
     bad = np.flatnonzero(~(np.isfinite(time_s) & np.isfinite(force_n)))
     if len(bad):
         raise RecordError(
             "numbers",
             "a sample is not a finite number",
-            value=f"{len(bad)} samples, the first in row {bad[0] + 1}",
+            value=f"{len(bad)} samples, the first is {word} {places[bad[0]]}",
             remedy="remove these samples, or record again",
         )
     back = np.flatnonzero(np.diff(time_s) <= 0.0)
     if len(back):
         row = int(back[0])
-        word = "stands still" if time_s[row + 1] == time_s[row] else "runs backwards"
+        verb = "stands still" if time_s[row + 1] == time_s[row] else "runs backwards"
+        times = f"{time_s[row]:.9g} s then {time_s[row + 1]:.9g} s"
         raise RecordError(
             "time",
-            f"time {word}",
-            value=f"{time_s[row]:.9g} s then {time_s[row + 1]:.9g} s, rows {row + 1}, {row + 2}",
+            f"time {verb}",
+            value=f"{times}, {word}s {places[row]} and {places[row + 1]}",
             remedy="export a single trigger, with enough decimals in the time",
         )
     interval = float((time_s[-1] - time_s[0]) / (len(time_s) - 1))
@@ -189,7 +186,7 @@ def _even(time_s: Floats, force_n: Floats) -> tuple[Floats, float]:
         raise RecordError(
             "uneven",
             "the sampling interval is not constant",
-            value=f"row {row + 1} is {off[row] / interval:.2g} intervals off",
+            value=f"{word} {places[row]} is {off[row] / interval:.2g} intervals off",
             limit=f"{_JITTER:g} intervals of {interval:.3g} s",
             remedy="export every sample at the sampling rate of the sensor",
         )
@@ -270,7 +267,7 @@ def low_passed(time_s: Floats, force_n: Floats, low_pass_hz: float) -> tuple[Flo
     Returns
     -------
     (M,) ndarray, (M,) ndarray
-        Times from 0 on, s, and forces, N.
+        Times from 0 on, s, and forces, N: NaN before the first sample.
 
     Raises
     ------
@@ -284,7 +281,7 @@ def low_passed(time_s: Floats, force_n: Floats, low_pass_hz: float) -> tuple[Flo
         raise RecordError("slow", problem, value=value, limit=limit, remedy=remedy)
     smooth = sosfiltfilt(butter(_ORDER, low_pass_hz, fs=rate, output="sos"), force_n)
     grid = np.arange(0.0, time_s[-1], 1.0 / (RATES_PER_BANDWIDTH * low_pass_hz))
-    return grid, np.asarray(CubicSpline(time_s, smooth)(grid))
+    return grid, np.asarray(CubicSpline(time_s, smooth, extrapolate=False)(grid))
 
 
 def measured_signal(file: Path, signal: Signal, transient_s: float) -> MeasuredSignal:
@@ -300,35 +297,44 @@ def measured_signal(file: Path, signal: Signal, transient_s: float) -> MeasuredS
 
     Raises
     ------
+    InputError
+        The file is no such table.
     RecordError
-        ``huge``, ``file``, ``columns``, ``numbers``, ``time``, ``uneven``, ``short``,
-        ``start``, ``clipped`` or ``slow``.
+        ``columns``, ``time``, ``uneven``, ``short``, ``start``, ``clipped`` or ``slow``.
     """
-    time, raw = parse_record(_text(file), signal.column, signal.rate_hz)
-    time, interval = _even(time, raw)
+    time, raw, lines = read_samples(file, signal.column, signal.rate_hz)
+    time, interval = _even(time, raw, lines)
     rests = [_within(time, span, "rest_s") for span in signal.rest_s]
     force = signal.sign * (raw - _baseline(time, raw, rests))
     start, error = _start(time, force, signal, interval)
     end = float(time[-1]) if signal.ends_at_s is None else signal.ends_at_s
     if signal.ends_at_s is None and len(rests) > 1 and signal.rest_s[1][0] > start:
         end = signal.rest_s[1][0]
+    _within(time, (start, end), "starts_at_s, ends_at_s")
     used = _within(time, (start + transient_s, end), "starts_at_s, ends_at_s")
+    if any(begin < end and stop > start for begin, stop in signal.rest_s):
+        problem, value = "the drag overlaps a stretch without load", f"{start:.6g} to {end:.6g} s"
+        remedy = "correct rest_s, starts_at_s or ends_at_s"
+        raise RecordError("start", problem, value=value, remedy=remedy)
     _check_clipped(raw[used], interval, signal.low_pass_hz)
     kept = time <= end
     grid, found = low_passed(time[kept] - start, force[kept], signal.low_pass_hz)
-    _check_length(found[grid >= transient_s], signal.low_pass_hz)
+    _check_length(found[(grid >= transient_s) & np.isfinite(found)], signal.low_pass_hz)
     return MeasuredSignal(grid, found, start, error)
 
 
 def _within(time: Floats, span: Span, field: str) -> slice:
-    """The samples between two times; at least `_BLOCKS` of them."""
+    """The samples between two times within the file; at least `_BLOCKS` of them."""
     first, last = np.searchsorted(time, span)
-    if last - first < _BLOCKS:
-        problem = f"too few samples from {span[0]:.6g} to {span[1]:.6g} s"
-        limit = f"at least {_BLOCKS}; the file is from {time[0]:.6g} to {time[-1]:.6g} s"
-        value, remedy = f"{max(last - first, 0)}", f"correct {field}, or record for a longer time"
-        raise RecordError("short", problem, value=value, limit=limit, remedy=remedy)
-    return slice(int(first), int(last))
+    near = (1 + _JITTER) * (time[1] - time[0])
+    problem = f"too few samples from {span[0]:.6g} to {span[1]:.6g} s"
+    if span[0] < time[0] - near or span[1] > time[-1] + near:
+        problem = f"the file does not reach from {span[0]:.6g} to {span[1]:.6g} s"
+    elif last - first >= _BLOCKS:
+        return slice(int(first), int(last))
+    limit = f"at least {_BLOCKS}; the file is from {time[0]:.6g} to {time[-1]:.6g} s"
+    value, remedy = f"{max(last - first, 0)}", f"correct {field}, or record for a longer time"
+    raise RecordError("short", problem, value=value, limit=limit, remedy=remedy)
 
 
 def _baseline(time: Floats, force: Floats, rests: Sequence[slice]) -> Floats:

@@ -1,12 +1,11 @@
 """Tables in CSV files: their rows take their place in the study; errors name file and line."""
 
-import csv
 import os
 from collections.abc import Mapping
-from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 from pydantic import JsonValue
 
 from dragdeck.errors import InputError
@@ -14,6 +13,7 @@ from dragdeck.mesh.clump import convex_corners
 from dragdeck.study.base import Json
 from dragdeck.study.media import MOST_SIEVES, Sieve
 from dragdeck.study.paths.waypoints import MOST_POINTS, Waypoint
+from dragdeck.study.table import read_table
 from dragdeck.study.yaml import located, study_folders
 
 _Place = tuple[Path | str, int | None, str | None]
@@ -97,32 +97,25 @@ def recorded_file(name: str, study: Path, field: str) -> Path:
 def _read(
     file: Path, row: type[NamedTuple], most: int, field: str, places: dict[str | None, _Place]
 ) -> list[JsonValue]:
-    """Rows as a study may have them, numbers or not; where they stand is added to `places`.
+    """Rows of numbers as a study may have them; where they stand is added to `places`.
 
     Of too long a file, no more is read than shows that it is.
     """
-    columns, optional = row._fields, tuple(row._field_defaults)
-    try:
-        with file.open(encoding="utf-8-sig", newline="") as stream:
-            reader = csv.DictReader(stream, skipinitialspace=True)
-            header = reader.fieldnames or []
-            rows = [(reader.line_num, row) for row in islice(reader, most + 1)]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"not a CSV file: {error}", file=file) from None
-    needed = columns[: len(columns) - len(optional)]
+    columns, optional, table = row._fields, tuple(row._field_defaults), read_table(file, most)
+    header, needed = table.names, columns[: len(columns) - len(optional)]
     if not set(needed) <= set(header) <= set(columns) or len(set(header)) < len(header):
         limit = ",".join(needed) + (f", optionally {', '.join(optional)}" if optional else "")
-        limit += ", separated by commas"
         problem = f"the columns are not those of {row.__name__.lower()}s"
         value = ",".join(header)[:200] if set(needed) & set(header) else None  # quote only a table
-        raise InputError(problem, file=file, field="line 1", value=value, limit=limit)
-    surplus: Any = None  # the key of values beyond the header
-    points: list[JsonValue] = [
-        [*(cells.get(key, "0") for key in columns), *cells.get(surplus, ())] for _, cells in rows
-    ]
+        line = table.header_line
+        raise InputError(problem, file=file, line=line, value=value, limit=limit)
+    values = dict(zip(header, table.numbers(header), strict=True))
+    zero = np.zeros(len(table.lines))
+    points = np.transpose([values.get(name, zero) for name in columns]).tolist()
     places[field] = file, None, None
-    for number, (line, _) in enumerate(rows):
+    for number, line in enumerate(table.lines):
         places[f"{field}.{number}"] = file, line, None
         for at, name in [*enumerate(columns), ("speed_m_s", "speed_m_s")]:
             places[f"{field}.{number}.{at}"] = file, line, name
-    return points
+    found: list[JsonValue] = points
+    return found

@@ -1,0 +1,129 @@
+"""Tables of users: what is read, and what is refused instead of being cut, shifted or guessed."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dragdeck.errors import InputError
+from dragdeck.study import table
+from dragdeck.study.force_record import read_samples
+from dragdeck.study.table import read_table
+
+TIME, FORCE = [0.0, 0.005, 0.01, 0.015], [-0.06, 0.42, -1234.5, 2.0]
+
+
+def written(folder: Path, content: str | bytes) -> Path:
+    file = folder / "table.csv"
+    file.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return file
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "time_s,fx_n\n0.000,-0.060\n0.005,.42\n0.01,-1234.50\n15e-3,+2\n",
+        "time_s;fx_n\r\n0,000;-0,060\r\n0,005;,42\r\n0,010;-1234,5\r\n0,015;2\r\n",
+        "\ufeff# exported\n\ntime_s\tfx_n\n0,000\t-0,060\n0,005\t0,42\n0,01\t-1,2345E3\n0,015\t2\n",
+        'n,time_s,fx_n,note\n1,0,-0.06,"a, b"\n2,.005,"0.42",\n3,0.01,-1234.5,\n4,0.015,2,1,2\n'
+        .replace(",1,2\n", ',"1,2"\n'),
+        "time_s;fx_n;;\n0;-0.06;;\n0.005;0.42;;\n0.01;-1234.5;;\n0.015;002.0;;\n",
+        "time_s,fx_n\n0,-0.06\n# a comment\n0.005,0.42\n\n0.01,-1234.5\n0.015,2",
+    ],
+)  # fmt: skip
+def test_what_is_unambiguous_is_read(content: str, tmp_path: Path) -> None:
+    time, force, _ = read_samples(written(tmp_path, content), "fx_n")
+    np.testing.assert_array_equal(time, TIME)
+    np.testing.assert_array_equal(force, FORCE)
+
+
+@given(
+    values=st.lists(st.floats(-9, 9).filter(lambda value: abs(value) > 1e-3), min_size=1),
+    comma=st.booleans(),
+    separator=st.sampled_from([";", "\t", ","]),
+    digits=st.integers(0, 5),
+)
+def test_no_digit_is_ever_lost(
+    values: list[float], comma: bool, separator: str, digits: int, tmp_path_factory: Any
+) -> None:
+    """Whatever the marks: the numbers that were meant, or a refusal."""
+    cells = [f"{value:.{digits}f}" for value in values]
+    rows = [f"{n}{separator}{cell}" for n, cell in enumerate(cells)]
+    text = "\n".join([f"n{separator}fx_n", *rows])
+    text = text.replace(".", ",") if comma else text
+    file = written(tmp_path_factory.mktemp("table"), text)
+    try:
+        (got,) = read_table(file).numbers(["fx_n"])
+    except InputError as error:
+        assert comma and digits
+        assert "decimal comma" in str(error)
+        assert separator == "," or digits == 3
+        return
+    assert got.tolist() == [float(cell) for cell in cells]
+
+
+HEAD = "time_s,fx_n\n"
+REFUSED: dict[str, tuple[str | bytes, dict[str, Any], int | None, str]] = {
+    "decimal commas, one column": ("fx_n\n-0,060\n0,420\n", {"rate_hz": 200}, 2, "decimal comma"),
+    "decimal commas, two columns": (HEAD + "0,0000,-2,5\n0,0050,-2,4\n", {}, 2, "decimal comma"),
+    "decimal comma in quotes": (HEAD + '0,"1,5"\n', {}, 2, "'1,5' is text, not a number"),
+    "a nameless column": ("fx_n,\n-0,060\n", {"rate_hz": 200}, 2, "decimal comma"),
+    "commas of thousands": ("time_s;fx_n\n0;1,234\n1;5,678\n", {}, 2, "thousands"),
+    "both marks": ("time_s;fx_n\n0,005;1.234,5\n", {}, 2, "line 2 has a decimal point"),
+    "a longer row": (HEAD + "0,1\n0.005,2,3\n", {}, 3, "3 values, but the header has 2 names"),
+    "a shorter row": (HEAD + "0,1\n0.005\n", {}, 3, "1 values, but the header has 2 names"),
+    "a missing value": (HEAD + "0,1\n0.005,\n", {}, 3, "fx_n: the value is missing"),
+    "a row of units": ("time_s;fx_n\ns;N\n0;1\n", {}, 2, "'s' is text, not a number"),
+    "not finite": (HEAD + "0,inf\n", {}, 2, "'inf' is text"),
+    "too large": (HEAD + "0,1e999\n", {}, 2, "a finite number"),
+    "underscore": (HEAD + "0,1_000\n", {}, 2, "'1_000' is text"),
+    "a blank line": ("fx_n\n1\n2\n\n4\n", {"rate_hz": 200}, 4, "series without times"),
+    "a comment": ("fx_n\n1\n# 2\n3\n", {"rate_hz": 200}, 3, "series without times"),
+    "a first comment": ("fx_n\n# 1\n2\n3\n", {"rate_hz": 200}, 2, "series without times"),
+    "another rate": (HEAD + "0,1\n0.005,2\n0.01,3\n", {"rate_hz": 100}, None, "contradicts the"),
+    "a slow drift": (
+        HEAD + "".join(f"{n / 200:.4f},1\n" for n in range(300)), {"rate_hz": 200.4},
+        None, "200 Hz, the mean rate",
+    ),
+    "no header": ("0,1\n0.005,2\n", {}, 1, "no column(s) with a recognised name"),
+    "the column twice": ("time_s,fx_n,fx_n\n0,1,2\n", {}, 1, "2 column(s)"),
+    "a header of LabVIEW": ("LabVIEW Measurement\t\nSeparator\tTab\n", {}, 1, "no column(s)"),
+    "UTF-16": ("time_s\tfx_n\n0.0\t1\n".encode("utf-16"), {}, None, "encoding UTF-8"),
+    "Latin-1": ("time_s,fx_n,°\n".encode("latin-1"), {}, None, "encoding UTF-8"),
+    "a huge cell": (HEAD + '0,"' + "1" * 200_000, {}, 2, "not a CSV file"),
+    "empty": ("\n# nothing\n", {}, None, "the file is empty"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_is_not_is_refused_with_its_line(name: str, tmp_path: Path) -> None:
+    content, fields, line, words = REFUSED[name]
+    file = written(tmp_path, content)
+    with pytest.raises(InputError) as caught:
+        read_samples(file, "fx_n", **fields)
+    assert words in str(caught.value)
+    assert (caught.value.file, caught.value.line) == (file, line)
+
+
+def test_times_and_a_rate_that_agree_are_read(tmp_path: Path) -> None:
+    file = written(tmp_path, HEAD + "3.000,1\n3.005,2\n3.0101,3\n")
+    assert read_samples(file, "fx_n", 200)[0].tolist() == [3.0, 3.005, 3.0101]
+
+
+def test_errors_are_named_together_up_to_five(tmp_path: Path) -> None:
+    """Those of a table with a bad value in each row; the others are counted."""
+    rows = "".join(f"x,{n}\n" for n in range(25))
+    with pytest.raises(InputError, match="20 more such lines") as caught:
+        read_samples(written(tmp_path, HEAD + rows), "fx_n")
+    assert [error.line for error in (caught.value, *caught.value.more)] == [*range(2, 7), None]
+
+
+def test_a_huge_file_is_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(table, "_MOST_BYTES", 10)
+    with pytest.raises(InputError, match="too large"):
+        read_table(written(tmp_path, HEAD + "0,1\n"))
+    with pytest.raises(InputError, match="cannot be read: No such file"):
+        read_table(tmp_path / "none.csv")

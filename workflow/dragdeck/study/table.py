@@ -1,0 +1,206 @@
+"""Tables of users: CSV files of numbers. Nothing in them is cut, shifted or guessed.
+
+Every table that a study names is read here: measured forces, waypoints, sieve analyses.
+"""
+
+import csv
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dragdeck.errors import InputError, together
+
+Floats = NDArray[np.float64]
+
+_MOST_BYTES = 64_000_000
+_MOST_NAMED = 5
+"""Errors of a table that are named."""
+
+_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
+_GROUPED = re.compile(r"[-+]?[1-9]\d{0,2}(,\d{3})+", re.ASCII)
+"""What may be thousands as well as a decimal comma."""
+
+_COMMA = (
+    "if these are decimal commas, export with a decimal point, or with a semicolon or tab between "
+    "the columns"
+)
+
+
+@dataclass(frozen=True)
+class Table:
+    """The rows of a CSV file as text.
+
+    Attributes
+    ----------
+    file : Path
+    separator : str
+        What stands between columns: ``;``, a tab or ``,``, whichever the header has first.
+    names : tuple of str
+        Columns, as the header names them.
+    header_line : int
+    lines : sequence of int
+        Line of each row in the file.
+    rows : sequence of sequences of str
+    """
+
+    file: Path
+    separator: str
+    names: tuple[str, ...]
+    header_line: int
+    lines: Sequence[int]
+    rows: Sequence[Sequence[str]]
+
+    def numbers(self, names: Iterable[str]) -> list[Floats]:
+        """Columns as numbers, (N,) each, by their names.
+
+        Raises
+        ------
+        InputError
+            Rows are longer or shorter than the header, a value is no finite number, or a comma in
+            it may be a decimal comma or not; it names the line of each.
+        """
+        self._refuse_uneven()
+        wanted = {name: [row[self.names.index(name)].strip() for row in self.rows]
+                  for name in names}  # fmt: skip
+        if self._decimal_commas(list(wanted.values())):
+            wanted = {
+                name: [cell if "." in cell else cell.replace(",", ".") for cell in cells]
+                for name, cells in wanted.items()
+            }
+        values, errors = [], []
+        for name, cells in wanted.items():
+            texts = [row for row, cell in enumerate(cells) if not _NUMBER.fullmatch(cell)]
+            errors += [self._wrong(row, name, _said(cells[row])) for row in texts]
+            column = np.array(["0" if texts else cell for cell in cells], dtype=np.float64)
+            large = np.flatnonzero(~np.isfinite(column)).tolist()
+            errors += [self._wrong(row, name, _said(cells[row])) for row in large]
+            values.append(column)
+        if errors:
+            raise _first(sorted(errors, key=lambda error: error.line or 0))
+        return values
+
+    def refuse_gaps(self) -> None:
+        """Refuse lines between the header and the last row that are no rows: samples have no time.
+
+        Raises
+        ------
+        InputError
+            It names the first blank or commented line.
+        """
+        for line, other in zip(self.lines, range(self.header_line + 1, 10**9), strict=False):
+            if line != other:
+                problem = "a blank or commented line in a series without times"
+                remedy = "remove the line if no sample is missing there, or give a column of times"
+                raise InputError(problem, file=self.file, line=other, remedy=remedy)
+
+    def _refuse_uneven(self) -> None:
+        """Refuse rows that are longer or shorter than the header, or have a value without name."""
+        count, errors = len(self.names), []
+        unnamed = [column for column, name in enumerate(self.names) if not name]
+        for line, row in zip(self.lines, self.rows, strict=True):
+            if len(row) == count and not any(row[column].strip() for column in unnamed):
+                continue
+            problem = f"the row has {len(row)} values, but the header has {count} names"
+            if len(row) == count:
+                problem = "a value stands in a column without a name"
+            decimal = self.separator == "," and len(row) >= count
+            errors.append(
+                InputError(
+                    problem, file=self.file, line=line, value=self.separator.join(row)[:80],
+                    limit=self.separator.join(self.names)[:200],
+                    remedy=_COMMA if decimal else "correct the row, or the header",
+                )
+            )  # fmt: skip
+        if errors:
+            raise _first(errors)
+
+    def _decimal_commas(self, columns: Sequence[Sequence[str]]) -> bool:
+        """Whether commas in numbers are decimal commas."""
+        if self.separator == ",":
+            return False
+        points, commas = (
+            [(row, cell) for cells in columns for row, cell in enumerate(cells) if mark in cell]
+            for mark in ".,"
+        )
+        if not commas:
+            return False
+        row, cell = min(commas)
+        limit = "one decimal mark, point or comma, in the whole table, and no mark of thousands"
+        if points or all(_GROUPED.fullmatch(cell) for _, cell in commas):
+            problem = "a comma may be a decimal comma or a mark of thousands"
+            if points:
+                problem += f", while line {self.lines[min(points)[0]]} has a decimal point"
+            raise InputError(
+                problem, file=self.file, line=self.lines[row], value=cell, limit=limit,
+                remedy="export with a decimal point and without marks of thousands",
+            )  # fmt: skip
+        return True
+
+    def _wrong(self, row: int, name: str, problem: str) -> InputError:
+        file, line = self.file, self.lines[row]
+        return InputError(problem, file=file, line=line, field=name, limit="a finite number")
+
+
+def _said(cell: str) -> str:
+    return f"{cell!r} is text, not a number" if cell else "the value is missing"
+
+
+def read_table(file: Path, most: int | None = None) -> Table:
+    """Read a CSV file: a header line, then one row per line.
+
+    Lines that begin with ``#`` are comments; they and blank lines are passed over.
+
+    Parameters
+    ----------
+    file : Path
+    most : int, optional
+        Of a longer table, no more rows than one beyond so many are read.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read as text of at most 64 MB, or is no CSV file.
+    """
+    texts = _text(file).split("\n")
+    used = [n for n, text in enumerate(texts) if text.strip() and text.lstrip()[0] != "#"]
+    if not used:
+        raise InputError("the file is empty", file=file, limit="a header line, and rows of numbers")
+    header = texts[used[0]]
+    separator = next((mark for mark in (";", "\t") if mark in header), ",")
+    lines, rows = [], []
+    reader = csv.reader((texts[n] for n in used), delimiter=separator, skipinitialspace=True)
+    try:
+        names, *_ = islice(reader, 1)
+        for row in islice(reader, None if most is None else most + 1):
+            lines.append(used[reader.line_num - 1] + 1)
+            rows.append(row)
+    except csv.Error as error:
+        line = used[reader.line_num - 1] + 1
+        raise InputError(f"not a CSV file: {error}", file=file, line=line) from None
+    return Table(file, separator, tuple(n.strip() for n in names), used[0] + 1, lines, rows)
+
+
+def _text(file: Path) -> str:
+    try:
+        if (size := file.stat().st_size) > _MOST_BYTES:
+            value, limit = f"{size / 1e6:.0f} MB", f"at most {_MOST_BYTES / 1e6:.0f} MB"
+            raise InputError("the file is too large", file=file, value=value, limit=limit)
+        return file.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        problem, remedy = f"not a CSV file: {error}", "export it as text in the encoding UTF-8"
+        raise InputError(problem, file=file, remedy=remedy) from None
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror}", file=file) from None
+
+
+def _first(errors: Sequence[InputError]) -> InputError:
+    """The first errors as one, with the number of the others."""
+    shown, left = list(errors[:_MOST_NAMED]), len(errors) - _MOST_NAMED
+    if left > 0:
+        shown.append(InputError(f"{left} more such lines", file=shown[0].file))
+    return together(shown)
