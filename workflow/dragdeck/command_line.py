@@ -82,8 +82,9 @@ class Program:
             The arguments, without the program's name; those of the process if None. A wrong use
             of the program exits with 2.
         """
-        options = vars(self.parser().parse_args(arguments))
-        command = options.pop("_command")
+        parsed = vars(self.parser().parse_args(arguments))
+        command = parsed.pop("_command")
+        options = {name: _once(value) for name, value in parsed.items()}
         return guarded(self.package, lambda: command.run(self.package, options))
 
     def parser(self) -> argparse.ArgumentParser:
@@ -103,6 +104,16 @@ class Program:
             )
             _add(step.add_subparsers(required=True, metavar="STEP"), self.steps)
         return parser
+
+
+def _once(value: Any) -> Any:
+    """A list of paths without those that name a file or folder again, in any way."""
+    if not isinstance(value, list) or not all(isinstance(one, Path) for one in value):
+        return value
+    first: dict[Path, Path] = {}
+    for one in value:
+        first.setdefault(one.resolve(), one)
+    return list(first.values())
 
 
 def _add(parsers: Any, commands: Sequence[Command]) -> None:

@@ -315,9 +315,17 @@ class ReportedCase:
 
 
 def cases_of(studies: Iterable[StudyRuns]) -> list[ReportedCase]:
-    """Group process runs by all inputs but the seed, in the order of the first ones."""
+    """Group process runs by all inputs but the seed, in the order of the first ones.
+
+    A run that is given again, perhaps as a copy elsewhere, is the same packing: it counts once.
+    """
     found: list[list[StudyRuns]] = []
+    known: set[tuple[str, str]] = set()
     for study in studies:
+        case = study.process.case
+        if (case.study, case.run) in known:
+            continue
+        known.add((case.study, case.run))
         for group in found:
             if _same_but_seed(group[0], study):
                 group.append(study)

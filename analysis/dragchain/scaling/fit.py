@@ -88,7 +88,8 @@ def read_scaled_runs(run_dirs: Sequence[Path], field: str) -> list[RunOfScaling]
         If a run has no such field or no number there, the mean drag does not
         point against the motion, or runs differ in more than the field and the seed.
     """
-    runs = [_read_run(folder, field) for folder in run_dirs]
+    each = {run.row.run: run for run in (_read_run(folder, field) for folder in run_dirs)}
+    runs = list(each.values())  # a run that is given again counts once
     _check_alike([run.case for run in runs], field)
     return sorted(runs, key=lambda run: (run.row.level, run.row.bed))
 

@@ -1,6 +1,7 @@
 """Cases side by side: differences, effects of factors, and the page."""
 
 import math
+import shutil
 from itertools import product
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pytest
 from pages import stands_alone
 from report_files import PICTURES, case_json, make_run, process_findings, write_quantities
 
+from dragchain.cli import main
 from dragchain.compare.report import read_compared, write_comparison
 from dragchain.errors import TableError
 from dragchain.report.values import EXTRAPOLATED, Extrapolated, LoadMap
@@ -95,6 +97,29 @@ def test_page_and_linked_networks(tmp_path: Path) -> None:
     linked = (tmp_path / "out/networks.html").read_text(encoding="utf-8")
     assert linked.count("<iframe") == 4
     assert (tmp_path / "out/network-4.html").is_file()
+
+
+def test_a_packing_named_again_counts_once(tmp_path: Path) -> None:
+    """By another path, through a link, as a copy, or within its study: the same comparison."""
+    folders = study(tmp_path / "results")
+    (tmp_path / "link").symlink_to(tmp_path / "results")
+    copied = Path(shutil.copytree(folders[0], tmp_path / "copies" / folders[0].name))
+    again = [tmp_path / "link" / one.relative_to(tmp_path / "results") for one in folders[::-1]]
+    again += [folders[1] / ".." / folders[1].name, *folders[:3], copied]
+    cases = [read_compared(some) for some in (folders, [*folders, *again])]
+    one, other = ([(c.name, [*c.by_seed], len(c.case.studies)) for c in some] for some in cases)
+    assert one == other
+    names = ["compare", *map(str, folders), *map(str, again)]
+    assert main([*names, "--out", str(tmp_path / "twice")]) == 0
+    write_comparison(tmp_path / "once", folders)
+    for file in ("differences.csv", "effects.csv"):
+        assert (tmp_path / "twice" / file).read_text() == (tmp_path / "once" / file).read_text()
+
+
+def test_a_study_is_not_compared_with_itself(tmp_path: Path) -> None:
+    packings = [one for one in study(tmp_path) if "deep-0_fast-0" in one.name]
+    with pytest.raises(TableError, match="at least two cases"):
+        read_compared(packings * 2)
 
 
 def test_one_case_is_refused(tmp_path: Path) -> None:
