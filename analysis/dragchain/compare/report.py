@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import combinations
+from itertools import combinations, product
 from pathlib import Path
 from textwrap import fill
 from typing import Any
@@ -152,15 +152,23 @@ class FactorEffect:
     ----------
     quantity : Quantity
     factors : tuple of str
-        One: the change from its lowest to its highest level, averaged over the other factors.
-        Two: half of the difference between the effects of the first at the highest and at the
-        lowest level of the second.
+        One: the change from its first level to another, averaged over the other factors.
+        Two: half of the difference between the changes of the first factor at another and at the
+        first level of the second.
+    levels : tuple of str
+        Of each factor: the two levels.
     effect : Estimate
     """
 
     quantity: Quantity
     factors: tuple[str, ...]
+    levels: tuple[str, ...]
     effect: Estimate
+
+    @property
+    def words(self) -> Sequence[str]:
+        """Each factor with its levels."""
+        return [f"{name} ({both})" for name, both in zip(self.factors, self.levels, strict=True)]
 
 
 def factors_of(cases: Sequence[ComparedCase]) -> dict[str, list[JsonValue]]:
@@ -182,49 +190,69 @@ def effects_of(
 ) -> list[FactorEffect]:
     """Main effects and interactions of two factors on a quantity, by least squares.
 
-    Levels are coded from -1 to 1: numbers in proportion, others in their order. A packing that all
-    cases share is a block. Interactions are left out where too few runs remain for the scatter.
+    Every level of a factor has a coefficient of its own, so that no shape of the response is
+    assumed; numbers are ordered, others are as they come. A packing that all cases share is a
+    block. Interactions are left out where too few runs remain for the scatter.
     """
     from statsmodels.formula.api import ols
 
-    codes = {f"x{k}": _coded(levels) for k, levels in enumerate(factors.values())}
+    columns = {f"x{k}": _ordered(levels) for k, levels in enumerate(factors.values())}
     rows = [
-        {"y": standing.run.value, "seed": seed, **{name: code[k] for name, code in codes.items()}}
+        {"y": standing.run.value, "seed": seed, "case": k}
+        | {name: order[k] for name, (order, _) in columns.items()}
         for k, one in enumerate(cases)
         for seed, standing in _standings(one, quantity).items()
     ]
+    if len({row["case"] for row in rows}) < len(cases):
+        return []
     frame = pd.DataFrame(rows)
-    if len(frame) < len(cases) or not 0.0 < np.ptp(frame["y"]) < math.inf:
+    if not 0.0 < np.ptp(frame["y"]) < math.inf:
         return []
     shared = all(one.by_seed.keys() == cases[0].by_seed.keys() for one in cases)
     block = " + C(seed)" if shared and len(cases[0].by_seed) > 1 else ""
-    pairs = list(combinations(codes, 2)) if len(codes) <= _LARGEST_MODEL else []
-    for terms in ([*codes, *(":".join(pair) for pair in pairs)], [*codes]):
-        fit = ols(f"y ~ {' + '.join(terms)}{block}", frame).fit()
+    pairs = list(combinations(columns, 2)) if len(columns) <= _LARGEST_MODEL else []
+    singles = [(name,) for name in columns]
+    for terms in ([*singles, *pairs], singles):
+        formula = " + ".join(":".join(f"C({name})" for name in term) for term in terms)
+        fit = ols(f"y ~ {formula}{block}", frame).fit()
         if fit.df_resid >= 1:
             break
     else:
         return []
-    names, ends = dict(zip(codes, factors, strict=True)), fit.conf_int()
-    return [
-        FactorEffect(
-            quantity,
-            tuple(names[code] for code in term.split(":")),
-            Estimate(2 * fit.params[term], *(2 * ends.loc[term])),
-        )
-        for term in terms
-    ]
+    exog = pd.DataFrame(fit.model.exog).groupby(frame["case"]).mean()
+    titles = dict(zip(columns, factors, strict=True))
+    found = []
+    for term in terms:
+        for others in product(*(range(1, len(columns[name][1])) for name in term)):
+            test = fit.t_test(_contrast(exog, columns, dict(zip(term, others, strict=True))))
+            names = tuple(titles[name] for name in term)
+            words = [(columns[name][1], other) for name, other in zip(term, others, strict=True)]
+            levels = tuple(f"{labels[0]} to {labels[other]}" for labels, other in words)
+            effect = Estimate(float(test.effect[0]), *map(float, test.conf_int()[0]))
+            found.append(FactorEffect(quantity, names, levels, effect))
+    return found
 
 
-def _coded(levels: Sequence[JsonValue]) -> Floats:
+def _ordered(levels: Sequence[JsonValue]) -> tuple[list[int], list[str]]:
+    """The number of each case's level, from 0, and what the levels are called."""
     numeric = all(isinstance(one, int | float) for one in levels)
-    if numeric:
-        places = np.array(levels, dtype=np.float64)
-    else:
-        order = list(dict.fromkeys(map(repr, levels)))
-        places = np.array([order.index(repr(one)) for one in levels], dtype=np.float64)
-    coded: Floats = 2 * (places - places.min()) / np.ptp(places) - 1
-    return coded
+    known: list[JsonValue] = []
+    for level in sorted(levels, key=lambda one: float(str(one))) if numeric else levels:
+        if level not in known:
+            known.append(level)
+    return [known.index(one) for one in levels], [str(one) for one in known]
+
+
+def _contrast(
+    exog: pd.DataFrame, columns: Mapping[str, tuple[list[int], list[str]]], term: Mapping[str, int]
+) -> Floats:
+    """Weights of coefficients: from the first levels to others, averaged over other factors."""
+    weights = np.zeros(exog.shape[1])
+    for ends in product((0, 1), repeat=len(term)):
+        at = {name: other * end for (name, other), end in zip(term.items(), ends, strict=True)}
+        here = np.all([np.equal(columns[name][0], level) for name, level in at.items()], axis=0)
+        weights += (-1) ** (len(term) - sum(ends)) * exog.to_numpy()[here].mean(axis=0)
+    return weights / len(term)  # of an interaction, half
 
 
 # --- figures -------------------------------------------------------------------------------------
@@ -442,6 +470,7 @@ def _table(rows: Sequence[CaseDifference | FactorEffect], *estimates: str) -> pd
             plain |= {"basis": row.basis, "paired": row.paired}
         else:
             plain["factors"] = " x ".join(row.factors)
+            plain["levels"] = " x ".join(row.levels)
         found.append(flattened(plain | {name: getattr(row, name) for name in estimates}))
     return pd.DataFrame(found)
 

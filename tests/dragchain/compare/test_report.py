@@ -4,6 +4,8 @@ import math
 import shutil
 from itertools import product
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -12,9 +14,12 @@ from pages import stands_alone
 from report_files import PICTURES, case_json, make_run, process_findings, write_quantities
 
 from dragchain.cli import main
+from dragchain.compare import report
 from dragchain.compare.report import read_compared, write_comparison
 from dragchain.errors import TableError
 from dragchain.report.values import EXTRAPOLATED, Extrapolated, LoadMap
+from dragchain.run.basis import QUANTITIES
+from dragchain.statistics.estimate import Estimate
 
 DEPTH, SPEED, TOGETHER = 0.8, 0.3, 0.1
 PACKING = {11: 0.5, 12: -0.2, 13: 0.05}
@@ -86,6 +91,61 @@ def test_a_packing_of_each_case_leaves_no_interaction(tmp_path: Path) -> None:
     write_comparison(tmp_path / "out", study(tmp_path, seeds=(11,)))
     table = pd.read_csv(tmp_path / "out/effects.csv")
     assert set(table["factors"]) == {"depth", "speed"}
+
+
+CENTRES = {"flat": 0.0, "angled": 10.0, "rounded": 0.0}
+"""Planted means of three words."""
+
+
+def planted(random: np.random.Generator, levels: list[Any], seeds: int, curved: Any) -> Any:
+    """Effects of a factor with these levels and of one with two, with and without packings."""
+    seed_effects = random.normal(0, 0.5, seeds)
+    cases = {
+        (level, fast): {
+            seed: SimpleNamespace(
+                run=Estimate.around(
+                    curved(level) + 0.3 * fast + seed_effects[seed] + random.normal(0, 0.01), 0.0
+                )
+            )
+            for seed in range(seeds)
+        }
+        for level in levels
+        for fast in (0, 1)
+    }
+    factors = dict(zip(("edge", "fast"), map(list, zip(*cases, strict=True)), strict=True))
+    some: Any = [SimpleNamespace(by_seed=one) for one in cases.values()]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(report, "_standings", lambda one, quantity: one.by_seed)
+        return report.effects_of(some, factors, QUANTITIES[0])
+
+
+@pytest.mark.parametrize(
+    ("levels", "curved"),
+    [([*CENTRES], CENTRES.get), ([0.1, 0.2, 0.4], lambda speed: 100 * (speed - 0.25) ** 2)],
+)
+def test_no_response_is_put_on_a_line(levels: list[Any], curved: Any) -> None:
+    """Words, and numbers on a parabola: every level has its effect, others keep their precision."""
+    found = planted(np.random.default_rng(3), levels, 3, curved)
+    effects = {tuple(zip(one.factors, one.levels, strict=True)): one.effect for one in found}
+    first, *others = levels
+    for level in others:
+        effect = effects[(("edge", f"{first} to {level}"),)]
+        assert effect.contains(curved(level) - curved(first))
+        assert effect.half_width < 0.02
+        both = effects[(("edge", f"{first} to {level}"), ("fast", "0 to 1"))]
+        assert abs(both.value) < 0.02
+    assert effects[(("fast", "0 to 1"),)].value == pytest.approx(0.3, abs=0.02)
+    assert effects[(("fast", "0 to 1"),)].half_width < 0.02
+
+
+def test_intervals_of_effects_contain_what_was_planted() -> None:
+    """In 95 % of draws, from 2 packings, whose differences are blocks."""
+    random, inside = np.random.default_rng(5), []
+    for _ in range(120):
+        for one in planted(random, [*CENTRES], 2, CENTRES.get):
+            truth = 10.0 * ("angled" in one.levels[0]) if len(one.factors) == 1 else 0.0
+            inside.append(one.effect.contains(0.3 if one.factors == ("fast",) else truth))
+    assert np.mean(inside) == pytest.approx(0.95, abs=0.035)
 
 
 def test_page_and_linked_networks(tmp_path: Path) -> None:

@@ -304,8 +304,8 @@ def _signal(study: Study, file: Path) -> Iterator[InputError]:
         measured_signal(recorded_file(signal.file, file, field), signal, transient_s)
     except RecordError as error:
         problem, value = f"({error.reason}) {error.problem}", error.value or signal.file
-        more = {"limit": error.limit, "remedy": error.remedy}
-        yield InputError(problem, field=field, value=value, **more)
+        limit, remedy = error.limit, error.remedy
+        yield InputError(problem, field=field, value=value, limit=limit, remedy=remedy)
     except InputError as error:
         yield error
 
