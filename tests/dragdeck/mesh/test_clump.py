@@ -172,3 +172,19 @@ def test_refused(media: dict[str, Any], problem: str, made: Made, project: Any) 
     (folder / "dented.stl").write_text(_stl([*CORNERS, [0.1, 0.1, 0.1]], dented))
     with pytest.raises(InputError, match=problem):
         filling_scene(made({"media": media, "bowl": {"radius_m": 0.024}}))
+
+
+@pytest.mark.parametrize("size", [1e-9, 1e-6, 1e-3, 1.0, 1e3, 1e9])
+@pytest.mark.parametrize("kind", ["ellipsoid", "mesh"])
+def test_the_scale_of_a_body_is_of_no_importance(kind: str, size: float) -> None:
+    """Over all sizes that a study accepts."""
+    corners = [[3, 1, 1], [3, -1, -1], [-3, 1, -1], [-3, -1, 1]]
+    shapes = {
+        "ellipsoid": {"axes": [size, 2 * size, size]},
+        "mesh": {"points": [[size * x for x in corner] for corner in corners]},
+    }
+    shape: Any = TypeAdapter(AnyShape).validate_python({"kind": kind, "spheres": 4, **shapes[kind]})
+    mesh = body(shape.corners())
+    assert mesh.volume == pytest.approx(4 / 3 * math.pi)
+    lengths = {"ellipsoid": [1.587, 1.587, 3.175], "mesh": [1.612, 1.612, 4.836]}[kind]
+    assert sorted(mesh.extents) == pytest.approx(lengths, rel=0.01)

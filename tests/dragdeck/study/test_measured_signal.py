@@ -68,6 +68,18 @@ def test_nothing_is_extrapolated(tmp_path: Path) -> None:
     np.testing.assert_array_equal(np.isnan(force), late < TIME[7])
 
 
+@pytest.mark.parametrize("low_pass_hz", [0.001, 0.01, 0.08, 0.2, 1.0, 99.0])
+def test_every_bandwidth_is_used_or_refused(low_pass_hz: float, tmp_path: Path) -> None:
+    """Down to the lowest that a study accepts."""
+    try:
+        found = read(tmp_path, text(resistance()), low_pass_hz=low_pass_hz)
+    except RecordError as error:
+        assert low_pass_hz < 5.0
+        assert error.reason == "short"
+        return
+    assert len(found.force_n) >= 20
+
+
 def test_the_start_is_found_where_the_force_leaves_the_noise(tmp_path: Path) -> None:
     noise = np.random.default_rng(3).normal(0.0, 0.02, len(TIME))
     found = read(tmp_path, text(resistance() + noise), starts_at_s=None, rest_s=[[0.0, 1.8]])

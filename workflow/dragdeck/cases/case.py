@@ -11,12 +11,11 @@ from typing import Any
 from pydantic import JsonValue
 
 from dragdeck.cases.ranks import auto_ranks, cores_here, ranks_within
-from dragdeck.errors import InputError
 from dragdeck.records.advised import AdvisedSettings
 from dragdeck.study.base import Json
 from dragdeck.study.model import Study, Tolerance
+from dragdeck.study.recorded import mesh_beside
 from dragdeck.study.workpiece import MeshShape
-from dragdeck.study.yaml import study_folders
 
 SAID_BY_NAME = ("youngs_modulus_scale", "timestep_fraction", "speed_factor")
 """The settings that the name of a fidelity without a name says."""
@@ -164,20 +163,7 @@ def mesh_file(case: Case, shape: MeshShape) -> Path:
     InputError
         No such file in any of these places.
     """
-    folders = study_folders(case.file)
-    places = [place for folder in folders for place in (folder, folder / "meshes")]
-    places.append(case.file.parent.parent.parent / "meshes")
-    for place in places:
-        if (place / shape.file).is_file():
-            return place / shape.file
-    raise InputError(
-        "no such mesh file",
-        file=case.file,
-        field="workpiece.shape.file",
-        value=shape.file,
-        limit="a file in " + ", ".join(str(place) for place in places),
-        remedy="put the mesh there, or correct the name",
-    )
+    return mesh_beside(case.file, shape.file)
 
 
 def materials_content(study: Study, *names: str) -> dict[str, JsonValue]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dragdeck.errors import InputError
+from dragdeck.errors import InputError, together
 from dragdeck.mesh.surface import (
     CAD_VOLUME,
     MERGED,
@@ -99,14 +99,16 @@ def check(
     Raises
     ------
     InputError
-        For the first error found.
+        For all errors found.
     """
     found = findings(mesh, workpiece=workpiece, surroundings=surroundings)
-    for problem, value, limit, remedy, severity in found:
-        if severity == "error":
-            raise InputError(
-                problem, file=file, field=field, value=value, limit=limit, remedy=remedy
-            )
+    errors = [
+        InputError(problem, file=file, field=field, value=value, limit=limit, remedy=remedy)
+        for problem, value, limit, remedy, severity in found
+        if severity == "error"
+    ]
+    if errors:
+        raise together(errors)
     return found
 
 
@@ -128,8 +130,9 @@ def findings(
     if broken:
         return broken
     found = _implausible_size(mesh, surroundings) if surroundings else []
-    useless = _degenerate(mesh) + _duplicates(mesh)
-    found += useless or _sharp_angles(mesh) + _overlaps(mesh)
+    found += _degenerate(mesh) + _duplicates(mesh)
+    sound = mesh.nondegenerate_faces(height=NODE_PRECISION_M) & mesh.unique_faces()
+    found += _sharp_angles(mesh, sound) + _overlaps(mesh, sound)
     found += _crowded_edges(mesh)
     if workpiece:
         found += _open_edges(mesh) or _several_bodies(mesh) or _turned_normals(mesh)
@@ -203,8 +206,8 @@ def _duplicates(mesh: Trimesh) -> list[Finding]:
     return _facets(~mesh.unique_faces(), "a facet is duplicated", "every facet once", remedy)
 
 
-def _sharp_angles(mesh: Trimesh) -> list[Finding]:
-    smallest = np.degrees(mesh.face_angles.min(axis=1))
+def _sharp_angles(mesh: Trimesh, sound: NDArray[np.bool_]) -> list[Finding]:
+    smallest = np.where(sound, np.degrees(mesh.face_angles.min(axis=1)), np.inf)
     x, y, z = 1e3 * mesh.triangles_center[smallest.argmin()]
     at = f"at ({x:.4g}, {y:.4g}, {z:.4g}) mm, clamp upwards"
     remedy, measured = "remesh with better shaped triangles", f"{smallest.min():.4g} degrees {at}; "
@@ -217,7 +220,7 @@ def _sharp_angles(mesh: Trimesh) -> list[Finding]:
     return errors or [doubt._replace(severity="warning") for doubt in doubts]
 
 
-def _overlaps(mesh: Trimesh) -> list[Finding]:
+def _overlaps(mesh: Trimesh, sound: NDArray[np.bool_]) -> list[Finding]:
     """Find facets of one plane on the same side of the edge that they share."""
     nodes = np.asarray(mesh.vertices)
     start, end = (nodes[row] for row in mesh.face_adjacency_edges.T)
@@ -230,9 +233,11 @@ def _overlaps(mesh: Trimesh) -> list[Finding]:
     squares = (length * _dot(one, one) - along_one**2) * (
         length * _dot(other, other) - along_other**2
     )
-    cosine = product / np.sqrt(squares)
+    with np.errstate(divide="ignore", invalid="ignore"):  # of facets without area
+        cosine = product / np.sqrt(squares)
     bad = np.zeros(len(mesh.faces), dtype=np.bool_)
     bad[mesh.face_adjacency[cosine >= np.cos(np.radians(_CURVATURE_DEG)), 0]] = True
+    bad &= sound
     problem = "two facets of one plane lie on top of each other"
     limit = "facets that share an edge lie on both sides of it"
     return _facets(bad, problem, limit, "repair the mesh: one surface, without folds")

@@ -119,7 +119,7 @@ def body(corners: Floats) -> Trimesh:
     lengths = np.linalg.svd(corners - corners.mean(axis=0), compute_uv=False)
     if lengths[-1] < _FLAT * lengths[0]:
         raise InputError("the corners of a particle lie in a plane, or are too few")
-    mesh: Trimesh = convex_hull(corners)
+    mesh: Trimesh = convex_hull(corners / min(1.0, lengths[0]))  # trimesh merges near corners
     mesh.apply_transform(mesh.principal_inertia_transform)
     mesh.apply_translation(-mesh.center_mass)
     mesh.apply_scale((4 / 3 * np.pi / float(mesh.volume)) ** (1 / 3))

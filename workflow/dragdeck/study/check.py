@@ -16,7 +16,7 @@ from dragdeck.errors import Caution, InputError, RecordError, choices, near, tog
 from dragdeck.study.base import Json, Model, flat
 from dragdeck.study.model import BUILT_IN_FIDELITIES, AnyPath, Fidelity, Scaling, Study, Tolerance
 from dragdeck.study.plausible import implausible
-from dragdeck.study.recorded import Places, recorded_file, with_recording
+from dragdeck.study.recorded import Places, mesh_errors, recorded_file, with_recording
 from dragdeck.study.search import Search
 from dragdeck.study.workpiece import CylinderShape, Shape
 from dragdeck.study.yaml import located, shown
@@ -337,12 +337,12 @@ def validate(data: Json, file: Path | str, *, whole: bool = False) -> Study:
     InputError
         Names every problem with its line, field, value, limit and a remedy.
     """
-    data, places = with_recording(data, Path(file))
-    found, study = [], None
+    data, places, unread = with_recording(data, Path(file))
+    found, study = list(unread.values()), None
     try:
         study = Study.model_validate(data)
     except ValidationError as error:
-        found = _problems(error)
+        found += [one for one in _problems(error) if one.field not in _named(unread)]
     wrong = {error.field for error in found}
     implied = study.motion.path.implied if study else {}
     doubts = [row for row in implausible({**data, **implied}) if row[0].field not in wrong]
@@ -351,8 +351,13 @@ def validate(data: Json, file: Path | str, *, whole: bool = False) -> Study:
     others = [*contradictions(study, whole), *_signal(study, Path(file))] if study else []
     more = [error for error in others if error.field not in known]
     if study is None or more or any(refused for _, refused in doubts):
-        raise _of_file([*found, *more], file, places)
+        raise _of_file([*found, *more, *mesh_errors(data, Path(file))], file, places)
     return study
+
+
+def _named(unread: Iterable[str]) -> set[str]:
+    """Fields that the model misses, because the files that they name cannot be used."""
+    return {name for field in unread for name in (field, f"{field}.points")}
 
 
 def warnings(study: Study) -> list[Caution]:
@@ -419,7 +424,7 @@ def explained(error: ValidationError, file: Path | str) -> InputError:
 def _of_file(found: list[InputError], file: Path | str, places: Places) -> InputError:
     for error in found:
         here = error.file or file, error.line, error.field
-        error.file, error.line, error.field = places.get(error.field, here)
+        error.file, error.line, error.field = here if error.line else places.get(error.field, here)
     return located(together(found))
 
 

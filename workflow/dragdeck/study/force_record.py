@@ -272,8 +272,14 @@ def low_passed(time_s: Floats, force_n: Floats, low_pass_hz: float) -> tuple[Flo
     Raises
     ------
     RecordError
-        ``slow``: the sampling rate is less than `RATES_PER_BANDWIDTH` times the bandwidth.
+        ``slow``: the sampling rate is less than `RATES_PER_BANDWIDTH` times the bandwidth;
+        ``short``: the signal is shorter than a period of the bandwidth.
     """
+    span, least = time_s[-1] - time_s[0] if len(time_s) else 0.0, 1.0 / low_pass_hz
+    if len(time_s) < _BLOCKS or span < least:
+        problem, remedy = "too short for the bandwidth", "increase low_pass_hz, or use a longer one"
+        value, limit = f"{span:.3g} s, {len(time_s)} samples", f"{least:.3g} s, {_BLOCKS} samples"
+        raise RecordError("short", problem, value=value, limit=f"at least {limit}", remedy=remedy)
     rate = (len(time_s) - 1) / (time_s[-1] - time_s[0])
     if rate < RATES_PER_BANDWIDTH * low_pass_hz * (1 - 1e-6):
         problem, remedy = "sampled too slowly for the bandwidth", "reduce low_pass_hz"
@@ -385,7 +391,7 @@ def _check_clipped(raw: Floats, interval: float, low_pass_hz: float) -> None:
 
 def _check_length(force: Floats, low_pass_hz: float) -> None:
     """Refuse a signal of few correlation times: lags at which the autocorrelation is 1/e."""
-    rest = force - force.mean()
+    rest = force - force.mean() if len(force) else np.zeros(1)
     products = correlate(rest, rest, method="fft")[len(rest) - 1 :]
     lag = max(int(np.argmax(products < products[0] / np.e)), 1)
     if len(force) < _LEAST_LENGTHS * lag or not products[0] > 0.0:

@@ -1,19 +1,23 @@
 """Tables in CSV files: their rows take their place in the study; errors name file and line."""
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from pydantic import JsonValue
+from pydantic import JsonValue, ValidationError
 
 from dragdeck.errors import InputError
+from dragdeck.mesh.checks import check
 from dragdeck.mesh.clump import convex_corners
+from dragdeck.mesh.files import STEP, read
+from dragdeck.mesh.surface import upright
 from dragdeck.study.base import Json
 from dragdeck.study.media import MOST_SIEVES, Sieve
 from dragdeck.study.paths.waypoints import MOST_POINTS, Waypoint
 from dragdeck.study.table import read_table
+from dragdeck.study.workpiece import MeshShape
 from dragdeck.study.yaml import located, study_folders
 
 _Place = tuple[Path | str, int | None, str | None]
@@ -21,57 +25,115 @@ Places = Mapping[str | None, _Place]
 """File, line and column of fields that do not stand in the study's own file."""
 
 
-def with_recording(data: Json, study: Path) -> tuple[Json, Places]:
-    """Plain data of a study with waypoints and sieve analyses instead of the names of their files.
+def with_recording(data: Json, study: Path) -> tuple[Json, Places, Mapping[str, InputError]]:
+    """Plain data of a study with the content of tables and particle meshes for their names.
 
-    Raises
-    ------
-    InputError
-        There is no such file, or it is no such table.
+    Returns
+    -------
+    data : mapping
+    places : mapping
+        Where the rows of tables stand.
+    unread : mapping
+        Fields that still name a file, because that cannot be used, and why.
     """
     motion, media = data.get("motion"), data.get("media")
     places: dict[str | None, _Place] = {}
+    unread: dict[str, InputError] = {}
+
+    def filled(value: Any, field: str, content: Callable[..., Any]) -> Any:
+        try:
+            return content(value, field, study, places)
+        except InputError as error:
+            unread[field] = error
+            return value
+
+    def grains(value: Any, field: str) -> Any:
+        if not isinstance(value, dict):
+            return value
+        contents = {"sieve": _sieved, "shape": _shaped}
+        known = {key: content for key, content in contents.items() if key in value}
+        return value | {k: filled(value[k], f"{field}.{k}", one) for k, one in known.items()}
+
     if isinstance(motion, dict) and "path" in motion:
-        data = {**data, "motion": {**motion, "path": _waypoints(motion.get("path"), study, places)}}
+        path = filled(motion["path"], "motion.path", _waypoints)
+        data = {**data, "motion": {**motion, "path": path}}
     if isinstance(media, dict):
-        media, classes = _with_files(media, "media", study, places), media.get("classes")
+        classes = media.get("classes")
         if isinstance(classes, dict):
-            fields = {name: f"media.classes.{name}" for name in classes}
-            parts = {k: _with_files(v, fields[k], study, places) for k, v in classes.items()}
-            media = {**media, "classes": parts}
-        data = {**data, "media": media}
-    return data, places
+            found = {name: grains(one, f"media.classes.{name}") for name, one in classes.items()}
+            media = {**media, "classes": found}
+        data = {**data, "media": grains(media, "media")}
+    return data, places, unread
 
 
-def _waypoints(path: Any, study: Path, places: dict[str | None, _Place]) -> Any:
+def _waypoints(path: Any, field: str, study: Path, places: dict[str | None, _Place]) -> Any:
     """A path with its waypoints, if it names a file of them."""
     if not isinstance(path, dict) or path.get("kind") != "waypoints" or path.get("points"):
         return path
     name = path.get("file")
     if not isinstance(name, str):
         return path
-    file = recorded_file(name, study, "motion.path.file")
-    points = _read(file, Waypoint, MOST_POINTS, "motion.path.points", places)
+    file = recorded_file(name, study, f"{field}.file")
+    points = _read(file, Waypoint, MOST_POINTS, f"{field}.points", places)
     return {**path, "file": None, "points": points}
 
 
-def _with_files(grains: Any, field: str, study: Path, places: dict[str | None, _Place]) -> Any:
-    """A class of the media with its sieve analysis and its body, if it names files of them."""
-    grains = _sieved(grains, field, study, places)
-    shape = grains.get("shape") if isinstance(grains, dict) else None
+def _shaped(shape: Any, field: str, study: Path, _: dict[str | None, _Place]) -> Any:
+    """A shape with its corners, if it names a mesh."""
     if not isinstance(shape, dict) or not isinstance(shape.get("points"), str):
-        return grains
-    file = recorded_file(shape["points"], study, f"{field}.shape.points")
-    return {**grains, "shape": {**shape, "points": convex_corners(file).tolist()}}
+        return shape
+    file = recorded_file(shape["points"], study, f"{field}.points")
+    return {**shape, "points": convex_corners(file).tolist()}
 
 
-def _sieved(grains: Any, field: str, study: Path, places: dict[str | None, _Place]) -> Any:
-    """A class of the media with its sieve analysis, if it names a file of one."""
-    name = grains.get("sieve") if isinstance(grains, dict) else None
-    if not isinstance(name, str):
-        return grains
-    file = recorded_file(name, study, f"{field}.sieve")
-    return {**grains, "sieve": _read(file, Sieve, MOST_SIEVES, f"{field}.sieve", places)}
+def _sieved(sieve: Any, field: str, study: Path, places: dict[str | None, _Place]) -> Any:
+    """A sieve analysis, if it is the name of a file of one."""
+    if not isinstance(sieve, str):
+        return sieve
+    return _read(recorded_file(sieve, study, field), Sieve, MOST_SIEVES, field, places)
+
+
+def mesh_beside(study: Path, name: str) -> Path:
+    """The file of a mesh: beside the study, in its meshes/, or in the project's meshes/.
+
+    A study that extends another finds its meshes, too.
+
+    Raises
+    ------
+    InputError
+        No such file in any of these places.
+    """
+    places = [place for one in study_folders(study) for place in (one, one / "meshes")]
+    places.append(study.parent.parent.parent / "meshes")
+    for place in places:
+        if (place / name).is_file():
+            return place / name
+    raise InputError(
+        "no such mesh file",
+        file=study,
+        field="workpiece.shape.file",
+        value=name,
+        limit="a file in " + ", ".join(str(place) for place in places),
+        remedy="put the mesh there, or correct the name",
+    )
+
+
+def mesh_errors(data: Json, study: Path) -> Iterator[InputError]:
+    """What is wrong with the meshes of workpieces, of a study that has other errors, too."""
+    several, one = data.get("workpieces"), data.get("workpiece")
+    each = several.get("each") if isinstance(several, dict) else None
+    for owner in (one, *(each if isinstance(each, list) else ())):
+        try:
+            shape = MeshShape.model_validate(owner.get("shape") if isinstance(owner, dict) else 0)
+            sizes = shape.facet_size_m, shape.edge_facet_size_m
+            file = mesh_beside(study, shape.file)
+            if file.suffix.lower() not in STEP or shape.facet_size_m:
+                mesh = upright(read(file, shape.unit, *sizes), shape.axis)
+                check(mesh, file=file, field="workpiece.shape")
+        except ValidationError:
+            continue
+        except InputError as error:
+            yield located(error)
 
 
 def recorded_file(name: str, study: Path, field: str) -> Path:
