@@ -10,7 +10,15 @@ import pytest
 from force_signals import BANDWIDTH_HZ, synthetic
 from report_files import PICTURES, case_json, make_run, page_of, process_findings
 
-from dragchain.report.measured_signal import SIGNAL_QUANTITIES, Difference, _over_packings, compared
+from dragchain.errors import SeriesError
+from dragchain.report.measured_signal import (
+    SIGNAL_QUANTITIES,
+    Difference,
+    _correlation_time,
+    _difference,
+    _over_packings,
+    compared,
+)
 from dragchain.report.study_report import write_study_report
 from dragchain.statistics.estimate import Estimate
 
@@ -45,6 +53,32 @@ def test_a_planted_difference_is_found_and_none_that_is_not_there() -> None:
         planted += differences(one, 1.1 * other)["mean"].verdict == "different"
     assert planted >= 11
     assert null <= 2
+
+
+def test_equal_correlation_times_are_rarely_called_different() -> None:
+    """Of 300 pairs about 1.5 by chance; an interval linear in the autocovariances excluded 12."""
+    random, found = np.random.default_rng(17), []
+    for _ in range(300):
+        pair = (synthetic(random, 12.0) for _ in range(2))
+        one, other = (_correlation_time(force - force.mean(), 5 * BANDWIDTH_HZ) for force in pair)
+        found.append(_difference(one, other, None))
+    assert sum(not one.contains(0.0) for one in found) <= 4
+    assert np.median([one.half_width for one in found]) < 1.5
+
+
+def test_a_correlation_time_three_times_as_long_is_found() -> None:
+    random = np.random.default_rng(19)
+    fast, slow = synthetic(random, 240.0), np.repeat(synthetic(random, 80.0), 3)
+    rest = [one - one.mean() for one in (fast, slow)]
+    one, other = (_correlation_time(force, 5 * BANDWIDTH_HZ) for force in rest)
+    assert _difference(other, one, None).ci95_low > 0.0
+    assert other.value == pytest.approx(3 * one.value, rel=0.3)
+
+
+def test_too_short_a_signal_is_said_to_be_so() -> None:
+    short = synthetic(np.random.default_rng(1), 12.0)
+    with pytest.raises(SeriesError, match="3 samples"):
+        differences(short, short[:3])
 
 
 def test_an_undecided_quantity_says_how_long_a_signal_it_needs() -> None:
