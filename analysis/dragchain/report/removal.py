@@ -303,6 +303,14 @@ def edge_rows(
     return found
 
 
+def touches_per_s(case: ReportedCase) -> tuple[int, Estimate]:
+    """Number of first touches in all packings, and their mean rate, 1/s."""
+    found = [one.wear.touches for one in case.studies if one.wear and one.wear.touches]
+    rates = [one.per_s for one in found]
+    rate = rates[0] if len(rates) == 1 else mean_of([one.value for one in rates])
+    return sum(one.events for one in found), rate
+
+
 def touch_rows(case: ReportedCase) -> list[tuple[str, Estimate, Estimate]]:
     """Median and 95th percentile over the first touches, means over packings, in report units."""
     found = [one.wear.touches.quantities for one in case.studies if one.wear and one.wear.touches]

@@ -22,7 +22,7 @@ from dragchain.report.cases import (
 from dragchain.report.cost_check import CostRow, answers, cost_rows, prediction_for, read_advice
 from dragchain.report.findings import Findings
 from dragchain.report.page import NETWORK_PAGE, data_uri, file_uri, render_page, write_bundle
-from dragchain.report.removal import UM_PER_H, RemovalOfCase, removal_of, touch_rows
+from dragchain.report.removal import UM_PER_H, RemovalOfCase, removal_of, touch_rows, touches_per_s
 from dragchain.report.spreadsheet import summary_workbook
 from dragchain.report.summary import summary
 from dragchain.run.case import upstream_folders
@@ -343,7 +343,7 @@ def _render(
         reliable_times=RELIABLE_TIMES,
         asked=[(one, answer) for one in cases for answer in answers(one)],
         removed=removed,
-        touched=[(one, rows) for one in cases if (rows := touch_rows(one))],
+        touched=[(one, rows, *touches_per_s(one)) for one in cases if (rows := touch_rows(one))],
     )
 
 

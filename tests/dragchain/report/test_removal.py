@@ -3,6 +3,7 @@
 import json
 import math
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ from dragchain.report.removal import (
     joined_half_width,
     patch_means,
     predict,
+    touches_per_s,
 )
 from dragchain.report.study_report import write_study_report
 from dragchain.statistics.estimate import Estimate, EstimateColumns, student_quantile
@@ -222,3 +224,18 @@ def test_packings_are_one_removal_with_the_scatter_between_them(tmp_path: Path) 
 def test_a_run_without_its_wear_is_named(tmp_path: Path) -> None:
     with pytest.raises(TableError, match=r"no wear\.json: make it with: dragchain loading"):
         report(tmp_path, GIVEN, wear=False)
+
+
+def test_first_touches_of_several_packings_are_those_of_all() -> None:
+    """The sum of the events, and the mean of the rates with Student's t between packings."""
+    rates = (90.0, 110.0, 100.0)
+    touches = [
+        SimpleNamespace(events=int(rate), per_s=Estimate.around(rate, 3.0)) for rate in rates
+    ]
+    packings = [SimpleNamespace(wear=SimpleNamespace(touches=one)) for one in touches]
+    several: Any = SimpleNamespace(studies=packings)
+    events, rate = touches_per_s(several)
+    assert (events, rate.value) == (300, pytest.approx(100.0))
+    assert rate.half_width == pytest.approx(4.302652730 * 10.0 / math.sqrt(3))
+    single: Any = SimpleNamespace(studies=packings[:1])
+    assert touches_per_s(single) == (90, touches[0].per_s)
