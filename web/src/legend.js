@@ -11,7 +11,7 @@ const SCALES = {
 
 /** Fill the legend with the scale of the scene and that of the load on the workpiece. */
 export function showLegend(element, { colours, scales, media }, look, load) {
-  const key = `${look.colour} ${load?.name}`;
+  const key = `${look.colour} ${scales[look.colour]} ${load?.name} ${load?.top}`;
   if (element.dataset.key === key) return;
   element.dataset.key = key;
   const names = media.classes.map(({ name }) => name),

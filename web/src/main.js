@@ -108,10 +108,11 @@ class Page {
     if (parent !== window) this.link();
   }
 
-  /** Share camera and time with the pages beside this one, by way of the page around them all. */
+  /** Share camera, time and scales with the pages beside this one, by way of the page around them all. */
   link() {
     const { view, frames } = this,
-      { camera, controls } = view;
+      { camera, controls } = view,
+      own = this.tops;
     const told = () => ({
       dragdeck: true,
       place: camera.position.toArray(),
@@ -127,12 +128,31 @@ class Page {
     };
     addEventListener("message", ({ data, source }) => {
       if (source !== parent || data?.dragdeck !== true) return;
+      if ("tops" in data) {
+        this.tops = { ...own, ...data.tops };
+        return;
+      }
       Object.assign(view, { follows: null, framed: null });
       this.go(Math.round(data.time * (frames.count - 1)));
       view.look(new Vector3(...data.target), new Vector3(...data.place).sub(new Vector3(...data.target)), data.zoom);
       last = JSON.stringify(told());
     });
-    parent.postMessage({ ...told(), opens: true }, "*");
+    parent.postMessage({ ...told(), opens: true, own }, "*");
+  }
+
+  /** The tops of all scales by name: those of the scene, and those of the loads on the workpiece. */
+  get tops() {
+    const { mean, ...scene } = this.head.scales,
+      loads = this.workpiece.own.loads.map(({ name, top }) => [name, top]);
+    return { ...scene, ...Object.fromEntries(loads) };
+  }
+
+  set tops(tops) {
+    const { scales } = this.head;
+    for (const name of Object.keys(scales)) scales[name] = tops[name] ?? scales[name];
+    for (const load of this.workpiece.own.loads) load.top = tops[load.name];
+    this.workpiece.shown = null;
+    this.redraw();
   }
 
   /** What is to be seen: the bowl, or the surroundings of the workpiece in a wide one. */

@@ -1,9 +1,11 @@
 """network.html in a real browser: what it shows is what the tables say."""
 
+import json
 import math
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -15,7 +17,7 @@ from selenium.webdriver import Keys
 from selenium.webdriver.support.ui import Select
 
 from dragchain.network_page.page import write_page
-from dragchain.report.page import MINUS, TIMES
+from dragchain.report.page import MINUS, TIMES, render_page
 
 pytestmark = [
     pytest.mark.slow,
@@ -178,3 +180,56 @@ def test_contacts_are_shown_by_force_class_and_chain(page: Browser, run: Path) -
     assert drawn() == (b_id.size, 0, expected)
     page.click("#class-0")
     assert drawn() == (sum(expected[1:]), 0, [0, *expected[1:]])
+
+
+# --- beside other networks -----------------------------------------------------------------------
+
+
+def test_networks_side_by_side_have_one_scale_unless_each_is_to_have_its_own(
+    window: Browser, run: Path, tmp_path: Path
+) -> None:
+    """The second has half of the forces and three times the load and speed of the first."""
+    text = (run / "network.html").read_text(encoding="utf-8")
+    before, after = re.split(r"(?<=application/json\" id=\"head\">).*?(?=</script>)", text)
+    head = json.loads(text[len(before) : -len(after)])
+    factors = {"force": 0.5, "largest": 0.5, "speed": 3.0, "mean": 0.5}
+    own = [head["scales"], {k: factors.get(k, 1.0) * v for k, v in head["scales"].items()}]
+    loads = head["workpieces"][0]["loads"]
+    tops = [{one["name"]: one["top"] for one in loads}]
+    tops.append({name: 3.0 * top for name, top in tops[0].items()})
+    for load in loads:
+        load["top"] = tops[1][load["name"]]
+    other = (
+        f"{before}{json.dumps(head | {'scales': own[1]}).replace('<', chr(92) + 'u003c')}{after}"
+    )
+    (tmp_path / "network-1.html").write_text(text, encoding="utf-8")
+    (tmp_path / "network-2.html").write_text(other, encoding="utf-8")
+    shown = [("network-1.html", "one"), ("network-2.html", "other")]
+    page = render_page("compare/networks.html.j2", shown=shown)
+    (tmp_path / "networks.html").write_text(page, encoding="utf-8")
+    window.driver.get((tmp_path / "networks.html").as_uri())
+
+    def scales(number: int) -> dict[str, Any]:
+        window.driver.switch_to.frame(number)
+        window.wait(lambda: window.run("return document.documentElement.dataset.ready"), "a page")
+        found = window.run("return {...networkPage.head.scales, ...networkPage.tops}")
+        found["said"] = window.text("#legend")
+        window.driver.switch_to.default_content()
+        return dict(found)
+
+    def expected(number: int, common: bool) -> dict[str, float]:
+        each = [{**own[k], **tops[k]} for k in range(2)]
+        found = {k: max(one[k] for one in each) for k in each[0]} if common else each[number]
+        return {**found, "mean": own[number]["mean"]}
+
+    for common in (True, False, True):
+        for number in range(2):
+            wanted = expected(number, common)
+            window.wait(
+                lambda number=number, wanted=wanted: wanted.items() <= scales(number).items(),  # type: ignore[misc]
+                f"the scales of network {number + 1}, common: {common}",
+            )
+        said = [scales(number)["said"] for number in range(2)]
+        assert (said[0] == said[1]) == common
+        window.driver.find_element("id", "one-scale").click()
+    assert window.errors() == []
