@@ -82,29 +82,32 @@ def _totals(sampled: Sampled, events: pd.DataFrame) -> Totals:
         [
             *(sampled.per_frame(rows[name]) for name in _KNOWN),
             *(sampled.per_frame(rows[name] * ahead) for name in _KNOWN),
+            *(sampled.per_frame(rows[name] * (1.0 - ahead)) for name in _KNOWN),
             sampled.per_frame(),
             sampled.per_frame(rows["normal_impulse_n_s"] * rows["mobilised"]),
+            sampled.per_frame(rows["normal_impulse_n_s"] * (1.0 - rows["mobilised"])),
             np.bincount(events["frame"], minlength=sampled.frames),
         ]
     )
-    impulse, friction, normal, whole = (
-        _KNOWN.index(name)
-        for name in ("normal_impulse_n_s", "friction_work_j", "normal_work_j", "workpiece_work_j")
+    friction, normal, whole = (
+        _KNOWN.index(name) for name in ("friction_work_j", "normal_work_j", "workpiece_work_j")
     )
     metre = sampled.path_m / sampled.frames
 
     def statistic(means: Floats) -> Floats:
-        total, front = means[..., :count], means[..., count : 2 * count]
-        contacts, sliding, begins = np.moveaxis(means[..., 2 * count :], -1, 0)
+        total, front, back = (means[..., k * count : (k + 1) * count] for k in range(3))
+        contacts, sliding, sticking, begins = np.moveaxis(means[..., 3 * count :], -1, 0)
         work = total[..., whole]
         others = [
             total[..., friction] / work,
             total[..., normal] / work,
-            sliding / total[..., impulse],
+            sliding / (sliding + sticking),
             contacts,
             begins / metre,
         ]
-        return np.concatenate([total / metre, front / total, np.stack(others, -1)], axis=-1)
+        return np.concatenate(
+            [total / metre, front / (front + back), np.stack(others, -1)], axis=-1
+        )
 
     found = estimates(sums, statistic)
     friction_part, normal_part, sliding_part, contacts, begins = found[2 * count :]

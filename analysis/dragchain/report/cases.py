@@ -155,6 +155,7 @@ def _class(one: ClassOfRun, case: CaseOfRun, findings: Sequence[ProcessFindings]
             values[0] if len(values) == 1 else mean_of([value.value for value in values])
             for values in zip(*own, strict=True)
         )
+        part = part.within_one if len(own) > 1 else part
         yield (
             f"{with_interval(contacts)} contacts on the workpiece at a time of "
             f"{with_interval(force, 'N')} each: {with_interval(part.over(0.01), '%')} of the load"

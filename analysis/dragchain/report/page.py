@@ -54,7 +54,8 @@ def measured(value: object, digits: int = 3) -> str:
     """A number as `number` does, with its zeros at the end."""
     if not isinstance(value, float) or value == 0.0 or not 1e-4 <= abs(value) < 10**digits:
         return number(value, digits)
-    return _typeset(f"{value:#.{digits}g}".rstrip("."))
+    text = f"{value:#.{digits}g}".rstrip(".")
+    return number(value, digits) if "e" in text else _typeset(text)
 
 
 def fixed(value: float | None, decimals: int, sign: bool = False) -> str:

@@ -279,14 +279,17 @@ def _own(
     extrapolated: Extrapolated | None,
 ) -> Iterator[tuple[str, Estimate]]:
     """The values of the run in simulated time, later ones instead of earlier ones."""
-    yield "drag_std", Estimate(found.forces["drag_n"].std, math.nan, math.nan)
     yield "chain_count", Estimate(found.chains.peters_per_frame, math.nan, math.nan)
     yield "chain_length", Estimate(found.chains.peters_particles_mean, math.nan, math.nan)
     for name in ("coordination_number", "mechanical_coordination_number"):
         if name in found.network:
             yield name, Estimate(found.network[name], math.nan, math.nan)
+    std = Estimate(found.forces["drag_n"].std, math.nan, math.nan)  # of one divisor, samples - 1
     for one in extrapolated.quantities if extrapolated else ():
         yield one.name, one.measured
+        if one.name == "drag_std" and one.measured.value:
+            std = one.measured.over(one.measured.value / std.value)
+    yield "drag_std", std
     for name, force in _FORCES.items():
         if force in found.forces:
             yield name, found.forces[force].estimate

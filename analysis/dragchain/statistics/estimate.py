@@ -94,6 +94,17 @@ class Estimate:
         """The estimate of ``exp(factor * x) - minus``, for a positive factor."""
         return self.mapped(lambda number: np.exp(factor * number) - minus)
 
+    @property
+    def within_one(self) -> "Estimate":
+        """That of a fraction: the interval is symmetric in the logit, so that it ends in 0 to 1."""
+        spread = self.value * (1.0 - self.value)
+        if not self.known or spread <= 0.0:
+            return self
+        from scipy.special import expit, logit
+
+        reach = self.half_width / spread * np.array([-1.0, 1.0])
+        return Estimate(self.value, *expit(logit(self.value) + reach), reliable=self.reliable)
+
     def mapped(self, function: Callable[[float], float]) -> "Estimate":
         """The estimate of a rising function of the number."""
         value, low, high = (float(function(number)) for number in self._numbers)

@@ -2,6 +2,8 @@
 
 import jinja2
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from pages import stands_alone
 
 from dragchain.report.page import (
@@ -111,3 +113,14 @@ def test_a_value_has_the_decimals_of_its_interval(
     ends: tuple[float, float, float], text: str
 ) -> None:
     assert with_interval(Estimate(*ends), "N") == text
+
+
+@given(st.floats(1e-4, 9.9e6), st.integers(1, 5))
+def test_no_usual_number_is_shown_with_a_power_of_ten(value: float, digits: int) -> None:
+    """Not beside others of its kind: 52 to 100 %, not 52 to 1.0 x 10^2 %."""
+    shown = measured(value, digits).replace("\N{NARROW NO-BREAK SPACE}", "")
+    assert float(shown) == pytest.approx(value, rel=0.51 * 10 ** (1 - digits))
+
+
+def test_a_number_that_rounds_up_to_more_digits() -> None:
+    assert [measured(one, 2) for one in (52.0, 99.4, 99.6, 99.96)] == ["52", "99", "100", "100"]

@@ -1,11 +1,15 @@
 import base64
 import html
 import json
+import math
 import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
+import numpy as np
 import pandas as pd
 import pytest
 from loading_files import made_contacts, write_run
@@ -28,6 +32,9 @@ from dragchain.loading.write import write_loading
 from dragchain.report.findings import FILE
 from dragchain.report.study_report import write_study_report
 from dragchain.report.summary import main_numbers
+from dragchain.report.values import _own
+from dragchain.statistics.correlated import estimate_mean
+from dragchain.statistics.estimate import Estimate
 
 
 @pytest.fixture
@@ -283,3 +290,20 @@ def test_packings_of_one_case_have_one_headline_and_another_case_its_own(
     headlines = pd.read_csv(tmp_path / "two/summary.csv").groupby("case")["headline"].nunique()
     assert headlines.tolist() == [1, 1, 1, 1] and "-2.60" in main_numbers(tmp_path / "two")
     assert main_numbers(tmp_path / "two").count("mean drag") == 2
+
+
+def test_a_page_has_one_standard_deviation_of_the_drag() -> None:
+    """That of the table of forces, divisor N - 1; the interval is that of the blocks."""
+    forces = {"drag_n": estimate_mean(np.sin(np.arange(40.0)) - 3.0)}
+    blocks = Estimate(math.sqrt(39 / 40) * forces["drag_n"].std, 0.5, 0.9)
+    found: Any = SimpleNamespace(
+        forces=forces,
+        network={},
+        chains=SimpleNamespace(peters_per_frame=1.0, peters_particles_mean=3.0),
+        ahead_behind=SimpleNamespace(ratio=blocks),
+    )
+    quantities = [SimpleNamespace(name="drag_std", measured=blocks)]
+    for extrapolated in (None, SimpleNamespace(quantities=quantities)):
+        own = dict(_own(cast(Any, None), found, None, cast(Any, extrapolated)))
+        assert own["drag_std"].value == pytest.approx(forces["drag_n"].std, rel=1e-15)
+    assert own["drag_std"].relative_half_width == pytest.approx(blocks.relative_half_width)

@@ -35,3 +35,20 @@ def test_what_was_expected_is_confirmed_if_the_interval_contains_it() -> None:
 )
 def test_an_excess_is_the_interval_against_no_effect(low: float, high: float, verdict: str) -> None:
     assert Estimate((low + high) / 2, low, high).exceeds(1.0) == verdict
+
+
+@pytest.mark.parametrize("values", [(0.97, 0.99), (0.6, 0.9, 1.0), (0.001, 0.02), (0.5, 0.52)])
+def test_the_interval_of_a_fraction_ends_in_it(values: tuple[float, ...]) -> None:
+    """It has the value, nearly the width where there is room, and stays within 0 to 1."""
+    plain = mean_of(values)
+    found = plain.within_one
+    assert found.value == plain.value
+    assert 0.0 < found.ci95_low < found.value < found.ci95_high < 1.0
+    if plain.ci95_low > 0.2 and plain.ci95_high < 0.8:
+        assert found.half_width == pytest.approx(plain.half_width, rel=0.1)
+
+
+@pytest.mark.parametrize("values", [(1.0, 1.0), (0.0, 0.0), (0.4,), ()])
+def test_a_fraction_without_room_or_interval_stays_as_it_is(values: tuple[float, ...]) -> None:
+    plain = mean_of(values)
+    assert repr(plain.within_one) == repr(plain)
