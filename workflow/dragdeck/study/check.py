@@ -304,8 +304,7 @@ def _signal(study: Study, file: Path) -> Iterator[InputError]:
         measured_signal(recorded_file(signal.file, file, field), signal, transient_s)
     except RecordError as error:
         problem, value = f"({error.reason}) {error.problem}", error.value or signal.file
-        limit, remedy = error.limit, error.remedy
-        yield InputError(problem, field=field, value=value, limit=limit, remedy=remedy)
+        yield InputError(problem, field=field, value=value, limit=error.limit, remedy=error.remedy)
     except InputError as error:
         yield error
 
