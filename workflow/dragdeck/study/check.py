@@ -350,7 +350,8 @@ def validate(data: Json, file: Path | str, *, whole: bool = False) -> Study:
     others = [*contradictions(study, whole), *_signal(study, Path(file))] if study else []
     more = [error for error in others if error.field not in known]
     if study is None or more or any(refused for _, refused in doubts):
-        raise _of_file([*found, *more, *mesh_errors(data, Path(file))], file, places)
+        meshes = mesh_errors(data, Path(file)) if whole else ()
+        raise _of_file([*found, *more, *meshes], file, places)
     return study
 
 
