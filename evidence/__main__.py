@@ -1,4 +1,4 @@
-"""Commands behind verification suite, stability map and validation: python -m evidence."""
+"""Commands behind the evidence and its records: python -m evidence."""
 
 import sys
 from pathlib import Path
@@ -39,6 +39,14 @@ COMMANDS = (
         OUT_DIR, RUN_DIRS,
         Argument("--command", required=True, metavar="TEXT",
                  help="command that made the runs, to be recorded with the results; required"))),
+    Command("record-scenes", "make windows.json and stable_step.json from runs of designed scenes",
+            "Make windows.json and stable_step.json, which decide tolerances and time steps, from "
+            "the runs of designed scenes.", "windows.record:write_scene_records", (
+        OUT_DIR,
+        Argument("archives", type=Path, nargs="+", metavar="ARCHIVE",
+                 help="tar archives of measures.json: docs/data/scenes/measures.tar.xz and "
+                 "fresh.tar.xz for the records of this version")),
+        "python -m evidence record-scenes --out workflow/dragdeck/data docs/data/scenes/*.tar.xz"),
 )  # fmt: skip
 
 PROGRAM = Program(

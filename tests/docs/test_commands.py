@@ -103,6 +103,8 @@ def test_a_long_command_would_run(clone: Path, call: str, pytestconfig: pytest.C
             runs(f"{program} {command} --help", clone)
         case ["./run", own, *_]:
             runs(f"./run --help | grep -F 'run {own}'", clone)
+        case ["python", "-m", package, command, *_]:
+            runs(f"python -m {package} {command} --help", clone)
         case ["python", script, *_]:
             runs(f"python {script} --help", clone)
         case _:

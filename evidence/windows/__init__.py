@@ -1,0 +1,1 @@
+"""What designed scenes say of windows and time steps, for the advice of dragdeck."""

@@ -1,0 +1,292 @@
+"""What runs of designed scenes say: ``windows.json`` and ``stable_step.json`` of dragdeck.
+
+Each scene was run at the physical Young's modulus and at reduced ones, over one or more packings.
+``windows.json`` has, for each quantity, the ratio of the values at both moduli and its scatter
+from scene to scene, the ratio of the variances along the path, and the scatter between packings.
+``stable_step.json`` has the law of the stability number of a time step, `StableStepLaw`.
+"""
+
+import math
+import tarfile
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from scipy.optimize import brentq, least_squares
+from scipy.special import polygamma
+
+from dragchain.arrays import Floats
+from dragchain.errors import SeriesError
+from dragchain.tradeoff.measures import QUANTITIES, Measurand, Measures
+from dragchain.windows.estimate import Known, WindowsRecord
+from dragdeck.physics.contact_mechanics import damping_ratio
+from dragdeck.records.stability import StableStepLaw, StableStepRecord
+from dragdeck.records.tradeoff import SixDigits
+
+_SOFT = 1e-3
+_FEWEST_SCENES = 5
+_LARGEST_STD = 0.08
+"""A ratio that differs more than this from scene to scene says too little to save windows."""
+
+_MOST_DEGREES = 10.0
+"""Windows' worth of evidence on a variance: never more, whatever the scenes agree on."""
+
+
+class SceneRun(Measures):
+    """A ``measures.json``, with the number of the acceptance check of the time step."""
+
+    stability_number: float | None = None
+
+    def number(self, field: str) -> float:
+        """A number of the study."""
+        value = self.inputs[field]
+        assert isinstance(value, int | float)
+        return value
+
+
+Scenes = Sequence[Sequence[SceneRun]]
+"""The runs of each scene."""
+
+
+def write_scene_records(out_dir: Path, archives: Sequence[Path]) -> str:
+    """Write ``windows.json`` and ``stable_step.json``; return a line on each.
+
+    Parameters
+    ----------
+    out_dir : Path
+    archives : sequence of Path
+        Tar archives of ``measures.json`` files.
+
+    Raises
+    ------
+    SeriesError
+        Too few scenes or runs.
+    """
+    scenes = read_scenes(archives)
+    windows = windows_record(scenes, [file.name for file in archives])
+    step = stable_step_record(scenes)
+    windows.write(out_dir / "windows.json")
+    step.write(out_dir / "stable_step.json")
+    return (
+        f"windows.json: {len(windows.quantities)} quantities\n"
+        f"stable_step.json: {step.stable_step.runs} runs"
+    )
+
+
+def read_scenes(archives: Sequence[Path]) -> Scenes:
+    """All runs, by what tells one scene from another: archive and dimensionless numbers."""
+    scenes = defaultdict[object, list[SceneRun]](list)
+    for archive in archives:
+        with tarfile.open(archive) as files:
+            for member in files:
+                if member.name.endswith(".json") and (stream := files.extractfile(member)):
+                    run = SceneRun.model_validate_json(stream.read())
+                    numbers = {
+                        name: run.numbers[name] for name in run.numbers.keys() - {"particles"}
+                    }
+                    scenes[archive, frozenset(numbers.items())].append(run)
+    return list(scenes.values())
+
+
+def _measured(scenes: Scenes) -> str:
+    return max(run.started for runs in scenes for run in runs)[:10]
+
+
+# --- windows.json --------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class QuantityOfRun:
+    """The blocks of a quantity along the path of a run, (B,)."""
+
+    run: SceneRun
+    blocks: Floats
+
+    @cached_property
+    def value(self) -> float:
+        """Magnitude of the mean."""
+        return abs(float(self.blocks.mean()))
+
+    @cached_property
+    def variance(self) -> float:
+        """Of a block, relative to the square of the mean."""
+        return float(self.blocks.var(ddof=1)) / self.value**2
+
+    @property
+    def variance_of_mean(self) -> float:
+        """Relative variance of the mean, for blocks that are independent."""
+        return self.variance / len(self.blocks)
+
+
+def windows_record(scenes: Scenes, archives: Sequence[str]) -> WindowsRecord:
+    """The ratios of every quantity that enough of the scenes have at both moduli.
+
+    Raises
+    ------
+    SeriesError
+        There is none.
+    """
+    rows = {quantity.name: _known(quantity, scenes) for quantity in QUANTITIES}
+    quantities = {name: known for name, known in rows.items() if known}
+    if not quantities:
+        raise SeriesError(f"no quantity has both moduli in {_FEWEST_SCENES} scenes or more")
+    return WindowsRecord(
+        measured=_measured(scenes),
+        source=f"designed scenes at E x 1 and E x {_SOFT:g}: {', '.join(archives)}",
+        quantities=quantities,
+    )
+
+
+def _known(quantity: Measurand, scenes: Scenes) -> Known | None:
+    measured = [[*_runs_with(quantity, runs)] for runs in scenes]
+    pairs = [
+        (stiff, soft)
+        for runs in measured
+        if (stiff := [one for one in runs if one.run.fidelity.youngs_modulus_scale == 1.0])
+        and (soft := [one for one in runs if _is_soft(one.run)])
+    ]
+    if len(pairs) < _FEWEST_SCENES:
+        return None
+    ratios = [math.log(_mean(stiff, "value") / _mean(soft, "value")) for stiff, soft in pairs]
+    noise = float(np.mean([sum(map(_variance_of_mean, pair)) for pair in pairs]))
+    between = max(float(np.var(ratios, ddof=1)) - noise, 0.0) + noise / len(pairs)
+    std = math.sqrt(between * (1 + 1 / len(pairs)))
+    logs = [math.log(_mean(stiff, "variance") / _mean(soft, "variance")) for stiff, soft in pairs]
+    by_chance = float(np.mean([sum(map(_log_variance, pair)) for pair in pairs]))
+    return Known(
+        ratio_log=round(float(np.mean(ratios)), 4),
+        ratio_log_std=round(std, 4) if std <= _LARGEST_STD and not quantity.signed else math.inf,
+        variance_ratio=round(math.exp(float(np.mean(logs))), 3),
+        degrees=round(_degrees(float(np.var(logs, ddof=1)) - by_chance), 1),
+        packing_std=round(_between_packings(measured), 4),
+    )
+
+
+def _runs_with(quantity: Measurand, runs: Sequence[SceneRun]) -> list[QuantityOfRun]:
+    """The runs at the speed of their scene in which every block has the quantity."""
+    plain = [run for run in runs if run.fidelity.speed_factor == 1]
+    rows = [QuantityOfRun(run, quantity.rooted(run.of_blocks(quantity.name))) for run in plain]
+    return [row for row in rows if len(row.blocks) > 1 and np.isfinite(row.blocks).all()]
+
+
+def _is_soft(run: SceneRun) -> bool:
+    return math.isclose(run.fidelity.youngs_modulus_scale, _SOFT, rel_tol=0.1)
+
+
+def _mean(runs: Sequence[QuantityOfRun], name: str) -> float:
+    return float(np.mean([getattr(one, name) for one in runs]))
+
+
+def _variance_of_mean(runs: Sequence[QuantityOfRun]) -> float:
+    return _mean(runs, "variance_of_mean") / len(runs)
+
+
+def _log_variance(runs: Sequence[QuantityOfRun]) -> float:
+    """Variance of the logarithm of a variance with so many degrees of freedom."""
+    return float(polygamma(1, sum(len(one.blocks) - 1 for one in runs) / 2))
+
+
+def _degrees(excess: float) -> float:
+    """Degrees of freedom of a variance whose logarithm has this variance."""
+    if polygamma(1, _MOST_DEGREES / 2) >= excess:
+        return _MOST_DEGREES
+    return float(brentq(lambda degrees: polygamma(1, degrees / 2) - excess, 0.5, _MOST_DEGREES))
+
+
+def _between_packings(measured: Sequence[Sequence[QuantityOfRun]]) -> float:
+    """Relative standard deviation of a mean between packings beyond that along the path."""
+    squares, degrees = 0.0, 0
+    for runs in measured:
+        groups = defaultdict[object, list[QuantityOfRun]](list)
+        for one in runs:
+            fidelity = one.run.fidelity
+            groups[fidelity.youngs_modulus_scale, fidelity.timestep_fraction].append(one)
+        for group in groups.values():
+            values = np.array([one.value for one in group]) / _mean(group, "value")
+            if len(group) > 1:
+                excess = float(values.var(ddof=1)) - _mean(group, "variance_of_mean")
+                squares += excess * (len(group) - 1)
+                degrees += len(group) - 1
+    return math.sqrt(max(squares / degrees, 0.0)) if degrees else 0.0
+
+
+# --- stable_step.json ----------------------------------------------------------------------------
+
+
+class MeasuredStepLaw(StableStepLaw):
+    """The law with the range of the stiffness numbers and restitutions of its runs."""
+
+    stiffness: SixDigits
+    damping: SixDigits
+    spread: SixDigits
+    scatter: SixDigits
+    largest: SixDigits
+    stiffness_numbers: tuple[SixDigits, SixDigits]
+    restitutions: tuple[SixDigits, SixDigits]
+
+
+class MeasuredStepRecord(StableStepRecord):
+    """The content of ``stable_step.json``."""
+
+    engine_versions: tuple[str, ...]
+    stable_step: MeasuredStepLaw
+
+
+def stable_step_record(scenes: Scenes) -> MeasuredStepRecord:
+    """The law of the stability number, by least squares on the logarithms of the measured ones.
+
+    In a packing, the product of contact frequency and Rayleigh time is proportional to
+    kappa^(-1/4), with the stiffness number kappa, since the stiffness of a Hertz contact is
+    proportional to the square root of its overlap.
+
+    Raises
+    ------
+    SeriesError
+        Fewer runs with a number than constants of the law.
+    """
+    runs = [run for scene in scenes for run in scene if run.stability_number and run.numbers]
+    if len(runs) <= 3:
+        raise SeriesError(f"{len(runs)} runs have a stability number, too few to fit a law")
+    rows = np.array([_step_row(run) for run in runs])
+    number, kappa, restitution, fraction, spread = rows.T
+    reach = fraction * kappa**-0.25
+    damping = np.array([damping_ratio(one) for one in restitution]) * reach
+
+    def misfit(constants: Floats) -> Floats:
+        stiffness, of_damping = np.exp(constants[:2])
+        of_mean = 0.5 * np.log(stiffness * reach**2 + of_damping * damping)
+        return np.asarray(np.log(number) - of_mean - constants[2] * spread)
+
+    fit = least_squares(misfit, [math.log(50.0), math.log(50.0), 0.0])
+    return MeasuredStepRecord(
+        measured=_measured(scenes),
+        engine_versions=tuple(sorted({run.versions["engine"] for run in runs})),
+        stable_step=MeasuredStepLaw(
+            stiffness=math.exp(fit.x[0]),
+            damping=math.exp(fit.x[1]),
+            spread=float(fit.x[2]),
+            scatter=math.sqrt(float(np.sum(fit.fun**2)) / (len(runs) - 3)),
+            largest=float(fit.fun.max()),
+            runs=len(runs),
+            stiffness_numbers=(kappa.min(), kappa.max()),
+            restitutions=(restitution.min(), restitution.max()),
+        ),
+    )
+
+
+def _step_row(run: SceneRun) -> tuple[float, ...]:
+    """Stability number, kappa, restitution, step over Rayleigh time, relative spread of radii."""
+    media = run.inputs["media.material"]
+    kappa = run.numbers["stiffness_number"] * run.fidelity.youngs_modulus_scale ** (2.0 / 3.0)
+    spread = run.number("media.radius_std_m") / run.number("media.radius_mean_m")
+    restitution = run.number(f"pairs.{media}-{media}.restitution")
+    return (
+        run.stability_number or math.nan,
+        kappa,
+        restitution,
+        run.fidelity.timestep_fraction,
+        spread,
+    )
