@@ -51,7 +51,14 @@ from dragdeck.physics.packing import Bed
 from dragdeck.preview.layout import CaseLayout, layout
 from dragdeck.preview.picture import picture, small_picture
 from dragdeck.preview.swept import swept_volume
-from dragdeck.project import by_folder, by_run, find_project, study_templates
+from dragdeck.project import (
+    by_folder,
+    by_run,
+    check_buildable,
+    check_search,
+    find_project,
+    study_templates,
+)
 from dragdeck.records.advice import AdviceFile
 from dragdeck.records.calibration import FitFile
 from dragdeck.records.tradeoff import TradeoffRecord, measured_tradeoff, tradeoff_if_measured
@@ -96,6 +103,8 @@ def _check(study: str, fidelity: str | None, verbose: bool) -> None:
         for kind in SCENES.values()
         for run in expected_runs(kind, project.run_folders(every, kind), partial(found.look, kind))
     ]
+    for varied, cases in check_search(every[0].file).items():
+        found.look_at_bounds(f"search.vary.{varied}", cases)
     if not found.errors:
         found.errors += idle(found.overriding - found.effective, found.templates)
     found.show(verbose)
@@ -142,6 +151,21 @@ class _Findings:
         names = [f"{kind.name} {folder.name}" for folder in runs]
         self.notes.setdefault("\n  ".join(lines), []).extend(names)
         return scene
+
+    def look_at_bounds(self, name: str, cases: Sequence[Case]) -> None:
+        """Refuse a field of a search that cannot be varied; warn where a part of it cannot be."""
+        refused = []
+        for case in cases:
+            try:
+                check_buildable(case)
+            except InputError as error:
+                refused.append(replace(error, field=f"{name}: {case.name}: {error.field}"))
+        if len(refused) == len(cases):
+            self.errors += refused[:1]
+            return
+        for one in refused:
+            text = f"{one.field}: {one.problem}; such a setting is not run, but infeasible"
+            self.warnings[text] = ["search"]
 
     def show(self, verbose: bool) -> None:
         """Print the warnings; and what is expected of every run, if that is asked for."""

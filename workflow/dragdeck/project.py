@@ -1,6 +1,6 @@
 """Where things are: the project's folders and the paths of a run."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -11,13 +11,16 @@ from dragdeck.errors import InputError, choices
 from dragdeck.outlook.timestep import check_timestep
 from dragdeck.records.tradeoff import TradeoffRecord
 from dragdeck.scenes.lead import FIRST_WINDOWS, LEAD, with_leads
+from dragdeck.scenes.motion import deepest
 from dragdeck.scenes.process import PROCESS, SCENES
 from dragdeck.scenes.scene import SceneType
+from dragdeck.scenes.workpiece import workpiece_length
 from dragdeck.study.base import NAME, NAME_LIMIT
+from dragdeck.study.check import validate
 from dragdeck.study.search import RECORD as SEARCHED
 from dragdeck.study.workpiece import MeshShape
-from dragdeck.study.yaml import located, study_folders
-from dragdeck.sweep.cases import load_cases, study_file
+from dragdeck.study.yaml import located, read_study, study_folders
+from dragdeck.sweep.cases import load_cases, searched_bounds, study_file
 from dragdeck.sweep.plan import Plan, Points, plan_points
 
 POINTS = "points"
@@ -73,11 +76,9 @@ class Project:
         try:
             found_by = partial(resolve, tradeoff=tradeoff)
             found = load_cases(file, fidelity, found_by, self.results(study) / SEARCHED)
+            check_search(file)
             for case in found:
-                check_timestep(case)
-                if case.study.chosen_fidelity().soft_start:
-                    start = replace(case, study=case.study.at_start())
-                    check_timestep(start, "fidelity.soft_start")
+                _check_timesteps(case)
         except InputError as error:
             raise located(error) from None
         return found
@@ -143,6 +144,55 @@ class Project:
         elif scene.needs_bed and of_plan and case.part != LEAD:
             place = POINTS
         return self.root / run_path(case.study_name, place, scene.run_id(case))
+
+
+def check_search(file: Path) -> Mapping[str, Sequence[Case]]:
+    """Refuse a search whose fields, bounds or parts of the surface no run could have.
+
+    Returns
+    -------
+    mapping
+        The cases at the bounds of each field; empty for a study without a search.
+    """
+    search = validate(read_study(file), file, whole=True).search
+    if search is None:
+        return {}
+    bounds = searched_bounds(file, search)
+    for field, cases in bounds.items():
+        if len({PROCESS.digest(case) for case in cases}) == 1:
+            name = f"search.vary.{field}"
+            raise InputError("no run depends on it", file=file, field=name, remedy="remove it")
+    every = [case for cases in bounds.values() for case in cases]
+    depth = max(deepest(case.study.motion) for case in every)
+    for name, measure in search.measures.items():
+        if measure.heights_m is None:
+            continue
+        (low, high), length = measure.heights_m, max(map(workpiece_length, every))
+        if low < 0 or low >= depth or high > length:
+            limit = f"0 to {length:.4g} m, the height of the workpiece; the first below {depth:.4g}"
+            raise InputError("no part of the surface that is immersed, or beyond the workpiece",
+                             file=file, field=f"search.{name}.heights_m", value=[low, high],
+                             limit=f"{limit} m, the largest immersion depth")  # fmt: skip
+    return bounds
+
+
+def _check_timesteps(case: Case) -> None:
+    check_timestep(case)
+    if case.study.chosen_fidelity().soft_start:
+        check_timestep(replace(case, study=case.study.at_start()), "fidelity.soft_start")
+
+
+def check_buildable(case: Case) -> None:
+    """Refuse a case whose time step is not stable or of which a scene cannot be built.
+
+    Raises
+    ------
+    InputError
+        Names the field.
+    """
+    _check_timesteps(case)
+    for scene in SCENES.values():
+        scene.build(case, None)
 
 
 def find_project(start: Path) -> Project:

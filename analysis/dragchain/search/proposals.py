@@ -1,34 +1,39 @@
 """Which setting to try next, and which is best: Gaussian processes on what is known so far.
 
 Pure functions of the trials and a seed: the same trials give the same setting. A *place* is a
-setting in fractions of its bounds. Expected improvement times the probability that all limits are
-met (Gardner et al. 2014) is maximised by the package bayesian-optimization; the Gaussian processes
-are those of scikit-learn (Matern covariance with the exponent 5/2, a length per field), and include
-the standard error of each value.
+setting in fractions of its bounds. The next one has the largest expected improvement on the least
+expectation at a place tried (Picheny et al. 2013, Struct. Multidiscip. Optim. 48, 607) times the
+probability that all limits are met (Gardner et al. 2014). The Gaussian processes are those of
+scikit-learn (Matern covariance with the exponent 5/2, a length per field), and include the standard
+error of each value.
 """
 
 import warnings
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.optimize import NonlinearConstraint
 from scipy.special import log_ndtr
-from scipy.stats import qmc
+from scipy.stats import norm, qmc
 
 from dragchain.arrays import Floats
 
 _CANDIDATES = 12
 """Power of two of the places among which the best one is looked for."""
 
+_NEAR, _REACH = 256, (0.02, 0.1)
+"""Further places near the best one so far, and how far they are from it."""
+
 _LEAST_NOISE = 1e-4
 """Least variance of a value over that of all, which keeps the covariance invertible."""
 
 _REFUSED_LIMIT, _REFUSED_SE = 0.5, 0.05
-"""Of the response that is 1 where the study's checks refuse a setting, and else 0."""
+"""Of the response that is 1 where a setting was refused, and else 0."""
+
+_DRAWS = 200
+"""Simulated sets of measurements."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +61,11 @@ class Trials:
         """Whether a place has no value, (N,)."""
         return np.isnan(self.values).any(axis=1)
 
+    @property
+    def known(self) -> Floats:
+        """The places with values."""
+        return np.asarray(self.places[~self.refused])
+
     @cached_property
     def responses(self) -> "Responses":
         """The model of these trials, which is fitted once."""
@@ -74,28 +84,53 @@ class Trials:
         return Trials(places, values, errors, self.low, self.high)
 
 
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """Without the warnings that a length of a covariance is at its bound."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        yield
+@dataclass(frozen=True)
+class Response:
+    """The Gaussian process of (N,) values with standard errors at (N, D) places."""
 
+    places: Floats
+    values: Floats
+    errors: Floats
 
-def _process(values: Floats, errors: Floats, dimensions: int) -> Any:
-    """A Gaussian process for (N,) values with these standard errors, not yet fitted."""
-    from sklearn.gaussian_process import GaussianProcessRegressor
-    from sklearn.gaussian_process.kernels import ConstantKernel, Matern
+    @cached_property
+    def _scale(self) -> tuple[float, float]:
+        return float(self.values.mean()), float(self.values.std()) or 1.0
 
-    spread = float(values.std()) or 1.0
-    kernel = ConstantKernel(1.0, (0.1, 10.0)) * Matern([0.5] * dimensions, (0.1, 10.0), nu=2.5)
-    return GaussianProcessRegressor(
-        kernel=kernel,
-        alpha=(errors / spread) ** 2 + _LEAST_NOISE,
-        normalize_y=True,
-        n_restarts_optimizer=1,
-        random_state=0,
-    )
+    @cached_property
+    def _process(self) -> Any:
+        from sklearn.gaussian_process import GaussianProcessRegressor
+        from sklearn.gaussian_process.kernels import ConstantKernel, Matern
+
+        centre, spread = self._scale
+        lengths = [0.5] * self.places.shape[1]
+        kernel = ConstantKernel(1.0, (0.1, 10.0)) * Matern(lengths, (0.1, 10.0), nu=2.5)
+        noise = (self.errors / spread) ** 2 + _LEAST_NOISE
+        process = GaussianProcessRegressor(
+            kernel, alpha=noise, n_restarts_optimizer=1, random_state=0
+        )
+        with warnings.catch_warnings():  # a length at its bound
+            warnings.simplefilter("ignore")
+            return process.fit(self.places, (self.values - centre) / spread)
+
+    def predict(self, places: Floats) -> tuple[Floats, Floats]:
+        """Expectations at (M, D) places and their standard errors, (M,) each."""
+        centre, spread = self._scale
+        mean, error = self._process.predict(places, return_std=True)
+        return centre + spread * mean, spread * error
+
+    def measured_again(self, places: Floats) -> Floats:
+        """Expectations at (M, D) places after other measurements of the same places, (M, draws).
+
+        Each draw has the expectation as the true response, and errors of their own.
+        """
+        from sklearn.base import clone
+
+        centre, spread = self._scale
+        truth, noise = self._process.predict(self.places), np.random.default_rng(0)
+        scatter = (self.errors / spread)[:, None] * noise.normal(size=(len(truth), _DRAWS))
+        again = clone(self._process).set_params(kernel=self._process.kernel_, optimizer=None)
+        mean = again.fit(self.places, truth[:, None] + scatter).predict(places)
+        return np.asarray(centre + spread * mean)
 
 
 @dataclass(frozen=True)
@@ -105,28 +140,54 @@ class Responses:
     trials: Trials
 
     @cached_property
-    def _fitted(self) -> Sequence[Any]:
-        known, found = ~self.trials.refused, []
-        places = self.trials.places[known]
-        with _quiet():
-            for value, error in zip(
-                self.trials.values[known].T, self.trials.errors[known].T, strict=True
-            ):
-                found.append(_process(value, error, places.shape[1]).fit(places, value))
-        return found
+    def _each(self) -> list[Response]:
+        known, of = ~self.trials.refused, self.trials
+        columns = zip(of.values[known].T, of.errors[known].T, strict=True)
+        return [Response(of.known, value, error) for value, error in columns]
+
+    @cached_property
+    def _refused(self) -> Response:
+        gone = self.trials.refused
+        return Response(self.trials.places, gone * 1.0, np.full(len(gone), _REFUSED_SE))
 
     def predict(self, places: Floats) -> tuple[Floats, Floats]:
         """Expected responses at (M, D) places and their standard errors, (M, Q) each."""
-        each = [one.predict(places, return_std=True) for one in self._fitted]
+        each = [one.predict(places) for one in self._each]
         mean, error = (np.stack(columns, axis=1) for columns in zip(*each, strict=True))
         return mean, error
+
+    def measurement(self, place: Floats) -> tuple[float, float]:
+        """What a new measurement at a place (D,) is expected to be, and its standard error."""
+        mean, error = (columns[0, 0] for columns in self.predict(place[None]))
+        nearest = ((self.trials.known - place) ** 2).sum(axis=1).argmin()
+        return float(mean), float(np.hypot(error, self._each[0].errors[nearest]))
 
     def allowed(self, places: Floats) -> Floats:
         """Logarithm of the probability that (M, D) places meet all limits, each apart, (M,)."""
         mean, error = self.predict(places)
         ends = self.trials.high - mean, mean - self.trials.low
-        each = [log_ndtr(end / np.maximum(error, 1e-12)) for end in ends]
-        return np.asarray(np.sum(each, axis=(0, 2)))
+        each = np.sum([log_ndtr(end / np.maximum(error, 1e-12)) for end in ends], axis=(0, 2))
+        if self.trials.refused.any():
+            gone, unsure = self._refused.predict(places)
+            each = each + log_ndtr((_REFUSED_LIMIT - gone) / np.maximum(unsure, 1e-12))
+        return np.asarray(each)
+
+    def meets(self, places: Floats) -> Any:
+        """Whether all limits are expected to be met at (M, D) places, (M,)."""
+        mean, _ = self.predict(places)
+        return ((mean >= self.trials.low) & (mean <= self.trials.high)).all(axis=1)
+
+    def optimism(self, places: Floats) -> float:
+        """By how much the least expectation at (M, D) places is too small, on average.
+
+        The least of many uncertain values is so partly by chance: measured again, with the
+        expectation as the truth, the least one is chosen anew and compared with that truth
+        (parametric bootstrap, Efron and Tibshirani 1993).
+        """
+        truth, _ = self._each[0].predict(places)
+        again = self._each[0].measured_again(places)
+        least = again.argmin(axis=0)
+        return float(np.mean(truth[least] - again.min(axis=0)))
 
 
 def spread_places(count: int, dimensions: int, seed: int) -> Floats:
@@ -145,61 +206,51 @@ def candidates(dimensions: int) -> Floats:
 
 def propose(trials: Trials, seed: int) -> Floats:
     """The place to try next, (D,)."""
-    from bayes_opt import BayesianOptimization
-    from bayes_opt.acquisition import ExpectedImprovement
-    from bayes_opt.exception import NoValidPointRegisteredError
-
-    dimensions, gone = trials.places.shape[1], trials.refused[:, None]
-    if (~gone).sum() < 2:
-        return np.asarray(np.random.default_rng(seed).random(dimensions))
-    mean, _ = trials.responses.predict(trials.places)
-    values = np.hstack([np.where(gone, mean, trials.values), gone])
-    errors = np.where(gone, np.nanstd(trials.values, axis=0), trials.errors)
-    errors = np.hstack([errors, np.full(gone.shape, _REFUSED_SE)])
-    processes = [_process(*pair, dimensions) for pair in zip(values.T, errors.T, strict=True)]
-    names = [f"x{k}" for k in range(dimensions)]
-    search = BayesianOptimization(
-        None,
-        dict.fromkeys(names, (0.0, 1.0)),
-        acquisition_function=ExpectedImprovement(xi=0.0),
-        constraint=NonlinearConstraint(
-            _unused, [*trials.low[1:], -np.inf], [*trials.high[1:], _REFUSED_LIMIT]
-        ),
-        random_state=seed,
-        verbose=0,
-        allow_duplicate_points=True,
-    )
-    assert search.constraint is not None
-    search.set_gp_params(**processes[0].get_params(deep=False))
-    for one, process in zip(search.constraint.model, processes[1:], strict=True):
-        one.set_params(**process.get_params(deep=False))
-    for place, row in zip(trials.places, values, strict=True):
-        limits = row[1:] if len(row) > 2 else row[1]
-        search.register(dict(zip(names, place, strict=True)), -row[0], limits)
-    try:
-        with _quiet():
-            found = search.suggest()
-    except NoValidPointRegisteredError:  # no limit was ever met: go where that is most probable
-        places = candidates(dimensions)
-        return np.asarray(places[trials.responses.allowed(places).argmax()])
-    return np.array([found[name] for name in names])
+    dimensions, random = trials.places.shape[1], np.random.default_rng(seed)
+    if len(trials.known) < 2:
+        return np.asarray(random.random(dimensions))
+    model, places = trials.responses, candidates(dimensions)
+    good = trials.known[model.meets(trials.known)]
+    if not len(good):  # go where the limits are most probably met
+        return np.asarray(places[model.allowed(places).argmax()])
+    expected = model.predict(good)[0][:, 0]
+    reach = random.choice(_REACH, (_NEAR, 1)) * random.normal(size=(_NEAR, dimensions))
+    places = np.vstack([places, np.clip(good[expected.argmin()] + reach, 0.0, 1.0)])
+    mean, error = (columns[:, 0] for columns in model.predict(places))
+    by = (expected.min() - mean) / error
+    gain = error * (by * norm.cdf(by) + norm.pdf(by))
+    return np.asarray(places[(np.log(np.maximum(gain, 1e-300)) + model.allowed(places)).argmax()])
 
 
-def _unused(_: Any) -> Any:
-    """The package asks for a function of a limit, but never calls it: values are registered."""
-    raise NotImplementedError
+@dataclass(frozen=True)
+class BestPlace:
+    """The best place by the model.
+
+    Attributes
+    ----------
+    place : (D,) ndarray
+    value, error : float
+        What a new measurement there is expected to be, and its standard error.
+    """
+
+    place: Floats
+    value: float
+    error: float
 
 
-def best_place(trials: Trials, accepted: Callable[[Floats], bool]) -> Floats | None:
+def best_place(trials: Trials, accepted: Callable[[Floats], bool]) -> BestPlace | None:
     """The place of the least expected response where all limits are expected to be met.
 
     Where that is nowhere, of the largest probability that they do; None if none is accepted.
     """
-    places = np.vstack([trials.places[~trials.refused], candidates(trials.places.shape[1])])
-    mean, _ = trials.responses.predict(places)
-    holds = ((mean >= trials.low) & (mean <= trials.high)).all(axis=1)
-    rank = np.where(holds, mean[:, 0], np.inf) if holds.any() else -trials.responses.allowed(places)
-    order = np.argsort(rank, kind="stable")
-    return next(
-        (places[k] for k in order[:200] if np.isfinite(rank[k]) and accepted(places[k])), None
-    )
+    model = trials.responses
+    places = np.vstack([trials.known, candidates(trials.places.shape[1])])
+    meets, allowed = model.meets(places), model.allowed(places)
+    mean = model.predict(places)[0][:, 0]
+    rank = np.where(meets, mean, np.inf) if meets.any() else -allowed
+    for k in np.argsort(rank, kind="stable")[:200]:
+        if np.isfinite(rank[k]) and accepted(places[k]):
+            more = model.optimism(places[meets]) if meets.any() else 0.0
+            value, error = model.measurement(places[k])
+            return BestPlace(places[k], value + more, error)
+    return None

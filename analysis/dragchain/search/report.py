@@ -1,7 +1,7 @@
 """The next round of a search, and the page on what it has found."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from textwrap import fill
@@ -25,17 +25,11 @@ from dragchain.search.rounds import (
     read_findings,
     read_point,
 )
-from dragchain.statistics.estimate import (
-    NORMAL_QUANTILE,
-    Estimate,
-    EstimateColumns,
-    Verdict,
-    flattened,
-)
+from dragchain.statistics.estimate import Estimate, EstimateColumns, Verdict, flattened, t_interval
 from dragdeck.engine.reports import say
 from dragdeck.errors import InputError
 from dragdeck.project import find_project
-from dragdeck.study.search import SearchLimit, SearchPoint, SearchRecord
+from dragdeck.study.search import SearchPoint, SearchRecord
 
 NAME = "search"
 _AT_BOUND = 0.02
@@ -88,8 +82,8 @@ def advance(
 class SearchRow:
     """A point on the page.
 
-    `objective` and `limits` are as measured; `predicted` is what the model expected before the run,
-    of the distance from the value where the goal is a target.
+    `objective` and `limits` are as measured; `predicted` is what the model expected of them before
+    the run, of the distance from the value where the goal is a target.
     """
 
     number: int
@@ -97,12 +91,14 @@ class SearchRow:
     objective: Estimate | None
     limits: tuple[Estimate, ...]
     predicted: Estimate | None
+    verdicts: Sequence[Verdict]
+    as_good: bool
 
 
 def _signed(found: SearchFindings, value: float, error: float) -> Estimate:
     """An expectation of the model in the unit of the objective."""
     sign = -1.0 if found.studied.search.objective.goal == "maximise" else 1.0
-    return Estimate.around(sign * value, NORMAL_QUANTILE * error)
+    return t_interval(sign * value, error, found.degrees)
 
 
 def rows_of(found: SearchFindings) -> list[SearchRow]:
@@ -113,17 +109,18 @@ def rows_of(found: SearchFindings) -> list[SearchRow]:
         said = None
         if one.predicted is not None and one.predicted_se is not None:
             said = _signed(found, one.predicted, one.predicted_se)
-        rows.append(SearchRow(k + 1, one, known[0] if known else None, tuple(known[1:]), said))
+        rows.append(
+            SearchRow(
+                k + 1,
+                one,
+                known[0] if known else None,
+                tuple(known[1:]),
+                said,
+                found.verdict(k) if known else (),
+                k in found.as_good,
+            )
+        )
     return rows
-
-
-def limit_verdict(limit: SearchLimit, value: Estimate) -> Verdict:
-    """Whether the whole interval meets a limit."""
-    low = -math.inf if limit.at_least is None else limit.at_least
-    high = math.inf if limit.at_most is None else limit.at_most
-    if low <= value.ci95_low and value.ci95_high <= high:
-        return "confirmed"
-    return "contradicted" if value.ci95_high < low or value.ci95_low > high else "not confirmed"
 
 
 def at_bounds(found: SearchFindings, point: SearchPoint) -> list[str]:
@@ -203,7 +200,14 @@ def write_search(out_dir: Path, found: SearchFindings) -> None:
     if confirmed:
         full = confirmed[-1]
         same = [one for one in rows if one.point.values.items() <= full.point.values.items()]
-        best = {"full": full, "soft": same[0], "bounds": at_bounds(found, full.point)}
+        place = studied.place(full.point.values)
+        best = {
+            "full": full,
+            "soft": same[0],
+            "bounds": at_bounds(found, full.point),
+            "meets": bool(found.trials.responses.meets(place[None])[0]),
+            "probability": math.exp(found.trials.responses.allowed(place[None])[0]),
+        }
     measured = [one for one in rows if one.objective and not one.point.confirms]
     lowest = min(measured, key=lambda one: loss(search.objective, one.objective.value))  # type: ignore[union-attr]
     table = pd.DataFrame(
@@ -216,6 +220,7 @@ def write_search(out_dir: Path, found: SearchFindings) -> None:
                 search.objective.quantity: one.objective or math.nan,
                 **{f"limit_{k}": value for k, value in enumerate(one.limits, 1)},
                 "predicted": one.predicted or math.nan,
+                "as_good": one.as_good,
                 "refused": one.point.refused,
             }
         )
@@ -233,6 +238,6 @@ def write_search(out_dir: Path, found: SearchFindings) -> None:
         rows=rows,
         best=best,
         lowest=lowest,
-        verdict_of=limit_verdict,
+        compared=sum(bool(one.objective) and "fidelity" not in one.point.values for one in rows),
         packings=found.packings.shape[1],
     )

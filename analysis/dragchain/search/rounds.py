@@ -20,18 +20,30 @@ from dragchain.report.removal import depth_spread, removal_of
 from dragchain.run.basis import QUANTITIES
 from dragchain.run.workpiece import read_surface
 from dragchain.search.proposals import Trials, best_place, propose, spread_places
-from dragchain.statistics.estimate import Estimate, t_interval
+from dragchain.statistics.estimate import (
+    CONFIDENCE,
+    Estimate,
+    Verdict,
+    student_quantile,
+    t_interval,
+)
 from dragdeck.advice.advise import resolve
 from dragdeck.cases.case import Case, digest
 from dragdeck.engine.status import run_status
 from dragdeck.errors import InputError
-from dragdeck.outlook.timestep import check_timestep
-from dragdeck.project import Project
-from dragdeck.scenes.process import PROCESS, SCENES
+from dragdeck.project import Project, check_buildable
+from dragdeck.scenes.process import PROCESS
 from dragdeck.study.base import Json
 from dragdeck.study.check import validate
 from dragdeck.study.model import Study
-from dragdeck.study.search import RECORD, Objective, Search, SearchedMeasure, SearchPoint
+from dragdeck.study.search import (
+    RECORD,
+    Objective,
+    Search,
+    SearchedMeasure,
+    SearchLimit,
+    SearchPoint,
+)
 from dragdeck.study.yaml import read_study
 from dragdeck.sweep.cases import Settings, settle_case, study_file
 
@@ -122,7 +134,7 @@ class SearchedStudy:
     @property
     def measures(self) -> Sequence[SearchedMeasure]:
         """The objective, and the quantities of the limits."""
-        return [self.search.objective, *self.search.limits]
+        return list(self.search.measures.values())
 
     @property
     def record(self) -> Path:
@@ -131,9 +143,11 @@ class SearchedStudy:
 
     def asked(self) -> str:
         """Hash of all that the choice of settings depends on, but not of how many there are."""
-        base = PROCESS.digest(self.case({}, self.study.sweep["seed"][0]))
+        plain = self.study.plain()
         search = {name: one for name, one in self.search.plain().items() if name != "runs"}
-        return digest({"base": base, "search": search, "sweep": dict(self.study.sweep)})
+        run = PROCESS.run_id(self.case({}, self.study.sweep["seed"][0]))
+        others = {name: plain.get(name) for name in ("sweep", "removal")}
+        return digest({"run": run, "search": search, **others})
 
     @cached_property
     def _plain(self) -> Json:
@@ -152,10 +166,7 @@ class SearchedStudy:
     def refusal(self, values: Settings) -> str:
         """Why the study's checks refuse a setting, in one line; empty if they accept it."""
         try:
-            case = self.case(values, self.study.sweep["seed"][0])
-            check_timestep(case)
-            for scene in SCENES.values():
-                scene.build(case, None)
+            check_buildable(self.case(values, self.study.sweep["seed"][0]))
         except InputError as error:
             return " ".join(filter(None, (error.field, error.problem)))
         return ""
@@ -168,12 +179,8 @@ class SearchedStudy:
 
     def values_at(self, place: Floats) -> dict[str, Any]:
         """The setting at a place, rounded to a thousandth of its range."""
-        found: dict[str, Any] = {}
-        for part, (field, (low, high)) in zip(place, self.search.vary.items(), strict=True):
-            digits = 2 - math.floor(math.log10(high - low))
-            value = min(max(round(low + float(part) * (high - low), digits), low), high)
-            found[field] = int(value) if value.is_integer() else value
-        return found
+        parts = zip(self.search.vary, place, strict=True)
+        return {field: self.search.value(field, float(part)) for field, part in parts}
 
 
 Measured = Floats | str | None
@@ -223,42 +230,101 @@ class SearchFindings:
         return np.asarray(self.packings.mean(axis=1))
 
     @cached_property
-    def errors(self) -> Floats:
-        """Standard errors of the means, (N, Q), from the scatter pooled over all points searched.
+    def _scale(self) -> Floats:
+        """What the scatter of a quantity is in proportion to, (N, Q): its mean.
 
-        The scatter of a coefficient of variation is taken as the same at all points, that of any
-        other quantity as in proportion to it.
+        That of a coefficient of variation is taken as the same at all points.
         """
-        means, count = self.means, self.packings.shape[1]
         own = [one.quantity == "removal_variation" for one in self.studied.measures]
-        scale = np.where(own, 1.0, np.abs(means))
-        variance = self.packings.var(axis=1, ddof=1) / scale**2
-        pooled = np.sqrt(np.nanmean(variance[self.searched], axis=0) / count)
-        return np.asarray(np.where(np.isnan(means), np.nan, pooled * scale))
+        return np.where(own, 1.0, np.abs(self.means))
+
+    @cached_property
+    def _residuals(self) -> Floats:
+        """Of the packings about the mean of each point searched that counts, (N, P, Q)."""
+        found = (self.packings - self.means[:, None]) / self._scale[:, None]
+        return np.asarray(found[self.searched & np.isfinite(self.means).all(axis=1)])
+
+    def _errors(self, residuals: Floats, degrees: int) -> Floats:
+        pooled = np.sqrt((residuals**2).sum(axis=(0, 1)) / degrees / residuals.shape[1])
+        return np.asarray(pooled * self._scale)
+
+    @cached_property
+    def errors(self) -> Floats:
+        """Standard errors of the means, (N, Q), from the scatter pooled over points searched."""
+        points, packings, _ = self._residuals.shape
+        return self._errors(self._residuals, points * (packings - 1))
+
+    @cached_property
+    def noise(self) -> Floats:
+        """The same without what a packing does to all points alike: of their differences."""
+        residuals = self._residuals - self._residuals.mean(axis=0)
+        return self._errors(residuals, self.degrees)
+
+    @property
+    def degrees(self) -> int:
+        """Degrees of freedom of `noise`."""
+        points, packings, _ = self._residuals.shape
+        return int((points - 1) * (packings - 1))
 
     def estimate(self, point: int, measure: int) -> Estimate:
         """A quantity at a point with its interval."""
-        known = np.isfinite(self.means[self.searched, 0]).sum() * (self.packings.shape[1] - 1)
-        return t_interval(self.means[point, measure], self.errors[point, measure], int(known))
+        points, packings, _ = self._residuals.shape
+        error = self.errors[point, measure]
+        return t_interval(self.means[point, measure], error, points * (packings - 1))
+
+    def verdict(self, point: int) -> Sequence[Verdict]:
+        """Whether the whole interval of a point meets each limit."""
+        limits = enumerate(self.studied.search.limits, 1)
+        return [_met(limit, self.estimate(point, measure)) for measure, limit in limits]
+
+    @cached_property
+    def as_good(self) -> list[int]:
+        """Points at the fidelity of the search that may be the best ones.
+
+        None of them contradicts a limit, nor is worse than the least mean that meets all limits by
+        more than Bonferroni's one-sided t test over all comparisons allows: with 95 % confidence,
+        the best setting of all that were run is among them (subset selection: Gupta 1965,
+        Technometrics 7, 225). The places may depend on earlier values: the errors do not.
+        """
+        trials, search = self.trials, self.studied.search
+        loss_of = loss(search.objective, self.means[:, 0])
+        run = [k for k, one in enumerate(self.points)
+               if np.isfinite(loss_of[k]) and "fidelity" not in one.values
+               and "contradicted" not in self.verdict(k)]  # fmt: skip
+        if len(run) < 2:
+            return run
+        inside = (self.means >= trials.low) & (self.means <= trials.high)
+        meets = [k for k in run if inside[k, 1:].all()] or run
+        best = min(meets, key=lambda k: loss_of[k])
+        tests = (len(run) - 1) * (2 if search.objective.goal == "target" else 1)
+        quantile = student_quantile(self.degrees, 1 - 2 * (1 - CONFIDENCE) / tests)
+        reach = quantile * np.hypot(self.noise[:, 0], self.noise[best, 0])
+        return [k for k in run if loss_of[k] - loss_of[best] <= reach[k]]
 
     @cached_property
     def trials(self) -> Trials:
         """Points searched as the model knows them: its first response is to be small."""
         search, values = self.studied.search, self.means[self.searched].copy()
         values[:, 0] = loss(search.objective, values[:, 0])
-        ends = [(one.at_least, one.at_most) for one in search.limits]
+        ends = [(-math.inf, math.inf), *(limit.ends for limit in search.limits)]
         return Trials(
             np.array([self.studied.place(one.values) for one in self.of_search]),
             values,
-            self.errors[self.searched],
-            np.array([-np.inf, *(-np.inf if low is None else low for low, _ in ends)]),
-            np.array([np.inf, *(np.inf if high is None else high for _, high in ends)]),
+            self.noise[self.searched],
+            *np.array(ends).T,
         )
 
     @property
     def of_search(self) -> list[SearchPoint]:
         """The points that are no confirmation."""
         return list(compress(self.points, self.searched))
+
+
+def _met(limit: SearchLimit, value: Estimate) -> Verdict:
+    low, high = limit.ends
+    if low <= value.ci95_low and value.ci95_high <= high:
+        return "confirmed"
+    return "contradicted" if value.ci95_high < low or value.ci95_low > high else "not confirmed"
 
 
 def loss(objective: Objective, value: Any) -> Any:
@@ -309,10 +375,10 @@ def next_points(found: SearchFindings) -> list[SearchPoint]:
     wanted = min(search.at_once, search.runs - len(tried))
     while sum(not one.refused for one in chosen) < wanted and len(chosen) < _MOST_REFUSED:
         seed = search.seed + 1000 * len(found.points) + len(chosen)
-        one = _point(studied, propose(trials, seed), number, "model", trials)
+        one = _point(studied, propose(trials, seed), number, "model", found.trials)
         if any(one.values == other.values for other in (*found.points, *chosen)):
             place = np.random.default_rng(seed).random(len(search.vary))
-            one = _point(studied, place, number, "model", trials)
+            one = _point(studied, place, number, "model", found.trials)
         place = studied.place(one.values)
         gone = bool(one.refused)
         trials = trials.joined(place, math.nan, math.nan) if gone else trials.believing(place)
@@ -335,8 +401,8 @@ def _point(
     values = studied.values_at(place)
     said: dict[str, float] = {}
     if trials is not None:
-        mean, error = trials.responses.predict(studied.place(values)[None])
-        said = {"predicted": float(mean[0, 0]), "predicted_se": float(error[0, 0])}
+        value, error = trials.responses.measurement(studied.place(values))
+        said = {"predicted": value, "predicted_se": error}
     return SearchPoint(
         values=values, round=number, purpose=purpose, refused=studied.refusal(values), **said
     )
@@ -351,10 +417,13 @@ def _confirmation(found: SearchFindings, number: int) -> list[SearchPoint]:
         values = studied.values_at(place)
         return values not in gone and not studied.refusal(values)
 
-    place = best_place(found.trials, accepted)
-    if place is None:
+    best = best_place(found.trials, accepted)
+    if best is None:
         raise _stuck(studied, "every setting that the model expects to be good is refused")
-    soft = _point(studied, place, number, "confirmation", found.trials)
+    point = _point(studied, best.place, number, "confirmation")
+    soft = point.model_copy(update={"predicted": best.value, "predicted_se": best.error})
+    if studied.search.confirm == studied.study.fidelity:
+        return [soft]
     values = {**soft.values, "fidelity": studied.search.confirm}
     full = soft.model_copy(update={"values": values, "refused": studied.refusal(values)})
     known = [one.values for one in found.points]

@@ -256,16 +256,29 @@ def _search(search: Search, study: Study) -> _Found:
         yield "search", "a search is of one workpiece", "a study without workpieces"
     removal, touches = study.removal, bool(study.outputs.first_touch_fraction)
     target = bool(removal and removal.target_depth_m)
-    measures = {f"limits.{number}": one for number, one in enumerate(search.limits)}
-    for name, one in {"objective": search.objective, **measures}.items():
+    for name, one in search.measures.items():
         if lacking := one.lacks(removal is not None, target, touches):
             limit = f"a study with {lacking}, or another quantity"
             yield f"search.{name}.quantity", f"no run has {one.quantity}", limit
     for field in search.vary:
         if field.split(".")[0] in (*_NO_SWEEP, "fidelity", "fidelities", "seed", "outputs"):
             yield f"search.vary.{field}", "it is no setting of the machine", "another field"
+    for name, problem in search.excluded():
+        yield f"search.{name}", problem, "limits that one setting can meet together"
+    count, most = len(study.sweep.get("seed", ())) * (search.runs + 2), study.accepted.cases
+    if count > most:
+        limit = f"{most}; if this is intended, set accepted.cases: {count}"
+        yield "search.runs", f"makes {count} cases, more than are accepted", limit
     known = {**BUILT_IN_FIDELITIES, **study.fidelities}
     yield from _known("search.confirm", search.confirm, known, "unknown fidelity")
+    if search.confirm in known and not isinstance(study.fidelity, Tolerance):
+        own, confirm = study.chosen_fidelity(), known[search.confirm]
+        scale, speed = confirm.youngs_modulus_scale, confirm.speed_factor
+        softer = scale < 1 and scale <= own.youngs_modulus_scale
+        if softer or speed > own.speed_factor:
+            problem = f"{search.confirm} is no more accurate than the settings of the search"
+            limit = "a fidelity with a larger youngs_modulus_scale and no larger speed_factor"
+            yield "search.confirm", problem, limit
 
 
 def _scaling(scaling: Scaling, study: Study) -> _Found:

@@ -4,7 +4,8 @@ A search is like a `sweep` whose points are not known beforehand: `SearchRecord`
 were chosen, and each of them is a case of the study.
 """
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -19,6 +20,8 @@ RECORD = Path("search") / "points.json"
 _OF_TARGET = ("minutes", "minutes_slowest")
 _OF_REMOVAL = ("removal_depth", "removal_variation", *_OF_TARGET)
 _OF_TOUCH = ("peak_pressure",)
+_SIGNED = ("drag_mean", "vertical_mean", "workpiece_work")
+"""Quantities that may be negative."""
 
 SearchedQuantity = Literal[
     "removal_depth",
@@ -61,6 +64,11 @@ class SearchedMeasure(Model):
             raise ValueError("heights_m must increase: give the lower height first")
         return self
 
+    @property
+    def least(self) -> float:
+        """Below which the quantity never is."""
+        return -math.inf if self.quantity in _SIGNED else 0.0
+
     def lacks(self, removal: bool, target: bool, touches: bool) -> str:
         """The field without which no run has this quantity, empty if there is none."""
         found = {
@@ -84,6 +92,8 @@ class Objective(SearchedMeasure):
     def _wanted(self) -> "Objective":
         if (self.value is None) == (self.goal == "target"):
             raise ValueError("value belongs to the goal target, and to no other")
+        if self.value is not None and self.value < self.least:
+            raise ValueError(f"{self.quantity} is never below 0, but value is {self.value:g}")
         return self
 
 
@@ -100,7 +110,15 @@ class SearchLimit(SearchedMeasure):
             raise ValueError("a limit has at_least, at_most or both")
         if low is not None and high is not None and low >= high:
             raise ValueError(f"at_least {low:g} is not below at_most {high:g}")
+        if high is not None and high <= self.least:
+            raise ValueError(f"{self.quantity} is never below 0, but at_most is {high:g}")
         return self
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Smallest and largest accepted value; infinite where there is none."""
+        low, high = self.at_least, self.at_most
+        return -math.inf if low is None else low, math.inf if high is None else high
 
 
 class Search(Model):
@@ -139,6 +157,32 @@ class Search(Model):
         if self.runs < self.start:
             raise ValueError(f"runs {self.runs} is fewer than the {self.start} of the first round")
         return self
+
+    @property
+    def measures(self) -> Mapping[str, SearchedMeasure]:
+        """Objective and limits by their fields."""
+        limits = {f"limits.{number}": one for number, one in enumerate(self.limits)}
+        return {"objective": self.objective, **limits}
+
+    def excluded(self) -> Iterator[tuple[str, str]]:
+        """Each limit, by its field, that no setting can meet together with what else is wanted."""
+        value, known = self.objective.value, dict[object, tuple[float, float]]()
+        if value is not None:
+            known[self.objective.quantity, self.objective.heights_m] = value, value
+        for number, limit in enumerate(self.limits):
+            which, (low, high) = (limit.quantity, limit.heights_m), limit.ends
+            least, most = known.get(which, (-math.inf, math.inf))
+            if most < low or high < least:
+                problem = f"{limit.quantity} is to be {least:g} to {most:g} already"
+                yield f"limits.{number}", problem
+            known[which] = max(low, least), min(high, most)
+
+    def value(self, field: str, part: float) -> float:
+        """The value of a field at a part of its range, rounded to a thousandth of that."""
+        low, high = self.vary[field]
+        digits = 2 - math.floor(math.log10(high - low))
+        value = min(max(round(low + part * (high - low), digits), low), high)
+        return int(value) if value.is_integer() else value
 
 
 Purpose = Literal["start", "model", "confirmation"]

@@ -35,6 +35,9 @@ from dragdeck.study.yaml import read_study, read_yaml
 Settings = Mapping[str, Any]
 """Dotted name of a field to its value."""
 
+_MIDDLE = 0.382
+"""A part of a range at which a field of whole numbers, or a switch, is no fraction by chance."""
+
 
 # --- designs -------------------------------------------------------------------------------------
 
@@ -156,7 +159,7 @@ def load_cases(
     plain, found, errors = {**data, "sweep": {}, "search": None}, [], []
     points = list[Settings]([{}])
     if study.search is not None:
-        _check_bounds(file, plain, study.search)
+        searched_bounds(file, study.search)
         if searched and searched.is_file():
             known = SearchRecord.read(searched).points
             points = [one.values for one in known if not one.refused] or points
@@ -172,17 +175,28 @@ def load_cases(
     return beside_each_other(found)
 
 
-def _check_bounds(file: Path, plain: Json, search: Search) -> None:
-    """Refuse a field that can be varied neither to its lowest nor to its highest value."""
-    for field, bounds in search.vary.items():
-        errors = []
-        for value in bounds:
+def searched_bounds(file: Path, search: Search) -> Mapping[str, Sequence[Case]]:
+    """The study with each field of its search at its lowest, a middle and its highest value.
+
+    Raises
+    ------
+    InputError
+        A value breaks the study.
+    """
+    found = {}
+    data = {**read_study(file), "sweep": {}, "search": None, "fidelity": search.confirm}
+    for field in search.vary:
+        cases = found[field] = list[Case]()
+        for value in (search.value(field, part) for part in (0.0, _MIDDLE, 1.0)):
             try:
-                settle_case(file, {**plain, "fidelity": search.confirm}, {field: value})
+                cases.append(settle_case(file, data, {field: value}))
             except InputError as error:
-                errors.append(error)
-        if len(errors) == len(bounds):
-            raise errors[0]
+                other = f"{error.field}: " if error.field not in (None, field) else ""
+                raise InputError(f"the study cannot have this value: {other}{error.problem}",
+                                 file=file, field=f"search.vary.{field}", value=value,
+                                 limit=error.limit, remedy=error.remedy or "other bounds",
+                                 ) from None  # fmt: skip
+    return found
 
 
 def _check_doubles(found: list[Case]) -> None:
