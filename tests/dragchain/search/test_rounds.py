@@ -281,6 +281,7 @@ def test_the_best_setting_is_among_those_that_are_as_good(load: Load, project: P
     assert min(sizes) < 8
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("most", [LIMIT, -0.2])
 def test_the_page_says_whether_limits_are_expected_to_be_met(
     load: Load, project: Project, most: float
@@ -299,6 +300,7 @@ def test_the_page_says_whether_limits_are_expected_to_be_met(
     assert table["as_good"].any() == (most > 0)
 
 
+@pytest.mark.slow
 def test_the_confirmation_at_the_searchs_own_fidelity_is_one_run(
     load: Load, project: Project
 ) -> None:
@@ -362,6 +364,7 @@ def test_what_a_search_asks_for_must_be_possible(
         (block if first == "search" else own)[last or first] = value
     with pytest.raises(InputError, match=f"(?s){words}"):
         load({**own, "search": block})
+        project.cases("small")
 
 
 def test_check_warns_of_bounds_that_are_infeasible_and_refuses_a_field_that_is_all_of_it(
