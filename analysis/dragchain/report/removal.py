@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
-from scipy.special import chdtri, stdtrit
+from scipy.special import stdtrit
 
 from dragchain.arrays import Floats
 from dragchain.errors import TableError
@@ -29,7 +29,7 @@ from dragchain.statistics.estimate import (
     mean_of,
     student_quantile,
 )
-from dragdeck.study.removal import Removal
+from dragdeck.study.removal import Removal, TrialsFit, fit_trials
 
 UM_PER_H = 3600e6
 """A depth per time in micrometres per hour over that in m/s."""
@@ -38,27 +38,34 @@ _ROUNDED_S = 1800.0
 """Time after which the radius of an edge is reported."""
 
 
-def joined_half_width(scatter: ArrayLike, known: ArrayLike, degrees: float) -> Floats:
-    """Half-widths of 95 % intervals, (...,), of which one has such degrees of freedom, as one.
+def joined_half_width(
+    scatter: ArrayLike, known: ArrayLike, degrees: float, known_degrees: float = math.inf
+) -> Floats:
+    """Half-widths of 95 % intervals, (...,), of two errors with such degrees of freedom, as one.
 
-    With few degrees, the approximation adds too many: not narrower than the scatter alone.
+    With few degrees, the approximation adds too many: not narrower than either alone.
     """
-    square = np.maximum(np.asarray(scatter) / student_quantile(degrees), 1e-60) ** 2
-    total = square + (np.asarray(known) / NORMAL_QUANTILE) ** 2
-    half = stdtrit(degrees * (total / square) ** 2, 0.5 + CONFIDENCE / 2) * total**0.5
-    return np.asarray(np.maximum(half, scatter))
+    parts = (np.asarray(scatter), degrees), (np.asarray(known), known_degrees)
+    squares = [(half / student_quantile(of)) ** 2 for half, of in parts]
+    total = np.maximum(sum(squares), 1e-120)
+    with np.errstate(divide="ignore"):
+        both = total**2 / sum(one**2 / of for one, (_, of) in zip(squares, parts, strict=True))
+    half = stdtrit(both, 0.5 + CONFIDENCE / 2) * total**0.5
+    return np.maximum.reduce([half, *np.broadcast_arrays(scatter, known)])
 
 
 class Parted(NamedTuple):
     """A positive number with the relative half-widths of its two 95 % intervals.
 
-    `degrees`: degrees of freedom of that by the scatter of the load.
+    `degrees`, `coefficient_degrees`: degrees of freedom of that by the scatter of the load, and of
+    that by the coefficient.
     """
 
     value: float
     scatter: float
     coefficient: float
     degrees: float = math.inf
+    coefficient_degrees: float = math.inf
 
     def within(self, half: float) -> Estimate:
         """With an interval of this relative half-width, not below zero."""
@@ -67,43 +74,11 @@ class Parted(NamedTuple):
     @property
     def combined(self) -> Estimate:
         """With both together."""
-        return self.within(float(joined_half_width(self.scatter, self.coefficient, self.degrees)))
+        return self.within(float(joined_half_width(*self[1:])))
 
     def times(self, factor: float) -> "Parted":
         """A multiple."""
         return self._replace(value=factor * self.value)
-
-
-class TrialsFit(NamedTuple):
-    """Mass loss per time from weighed trials, by weighted least squares through the origin.
-
-    Attributes
-    ----------
-    rate_kg_s, half : float
-        Slope, and relative half-width of its interval; wider by Birge's ratio (1932) if the
-        trials scatter significantly more than by their uncertainties.
-    residuals : sequence of float
-        Measured minus fitted mass loss of each trial in its standard uncertainties.
-    """
-
-    rate_kg_s: float
-    half: float
-    residuals: Sequence[float]
-
-
-def fit_trials(removal: Removal) -> TrialsFit | None:
-    """The fit to the trials of a study, None if its coefficient is given."""
-    if removal.calibrate is None:
-        return None
-    trials = [(one.mass_loss_kg, one.time_s, one.sd_kg) for one in removal.calibrate]
-    mass, time, sd = np.array(trials).T
-    information = float(((time / sd) ** 2).sum())
-    rate = float((mass * time / sd**2).sum()) / information
-    residuals = (mass - rate * time) / sd
-    square, degrees = float((residuals**2).sum()), max(len(trials) - 1, 1)
-    birge = math.sqrt(square / degrees) if square > chdtri(degrees, 1 - CONFIDENCE) else 1.0
-    half = NORMAL_QUANTILE * birge / math.sqrt(information) / rate
-    return TrialsFit(rate, half, residuals.tolist())
 
 
 def predict(
@@ -117,8 +92,9 @@ def predict(
     """
     load = action_w.relative_half_width
     if fit := fit_trials(removal):
-        rate = Parted(fit.rate_kg_s / density_kg_m3, 0.0, fit.half)
-        return Parted(rate.value / action_w.value, load, fit.half, degrees), rate
+        half = student_quantile(fit.degrees) * fit.error
+        rate = Parted(fit.rate_kg_s / density_kg_m3, 0.0, half, coefficient_degrees=fit.degrees)
+        return rate._replace(value=rate.value / action_w.value, scatter=load, degrees=degrees), rate
     value = removal.coefficient_m2_n or math.nan
     half = NORMAL_QUANTILE * (removal.sd_m2_n or 0.0) / value
     return Parted(value, 0.0, half), Parted(value * action_w.value, load, half, degrees)
@@ -218,7 +194,7 @@ def removal_of(case: ReportedCase) -> RemovalOfCase | None:
     between = len(wears) > 1 and not load.corrected
     degrees = len(wears) - 1 if between else math.inf
     coefficient, rate = predict(removal, action, density, degrees)
-    facets = _facets(wears, coefficient.value * factor, rate.coefficient)
+    facets = _facets(wears, coefficient.value * factor, rate)
     own = facets[facets["immersed"]]
     _, variation, ends = depth_spread(own)
     removed = facets["depth_m_s"] * facets["area_m2"]
@@ -254,12 +230,17 @@ def depth_spread(facets: pd.DataFrame) -> tuple[float, tuple[float, float], tupl
     return UM_PER_H * mean, variation, (float(low), float(high))
 
 
-def _facets(wears: Sequence[Wear], scale: float, uncertainty: float) -> pd.DataFrame:
-    """The map of the depth of removal per time; see `RemovalOfCase`."""
+def _facets(wears: Sequence[Wear], scale: float, rate: Parted) -> pd.DataFrame:
+    """The map of the depth of removal per time; see `RemovalOfCase` and `edge_rows`."""
     found = [np.array([one.patch_w_m2, one.patch_se_w_m2]) for one in wears]
     densities, errors = scale * np.swapaxes(found, 0, 1)
     mean, error, degrees = patch_means(densities, errors)
-    half = joined_half_width(student_quantile(degrees) * error, mean * uncertainty, degrees)
+    half = joined_half_width(
+        student_quantile(degrees) * error,
+        mean * rate.coefficient,
+        degrees,
+        rate.coefficient_degrees,
+    )
     columns = {
         "area_m2": wears[0].area_m2,
         "immersed": wears[0].immersed,

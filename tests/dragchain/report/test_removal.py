@@ -21,7 +21,6 @@ from dragchain.loading.write import write_loading
 from dragchain.report.removal import (
     Parted,
     edge_rows,
-    fit_trials,
     joined_half_width,
     patch_means,
     predict,
@@ -29,7 +28,7 @@ from dragchain.report.removal import (
 )
 from dragchain.report.study_report import write_study_report
 from dragchain.statistics.estimate import Estimate, EstimateColumns, student_quantile
-from dragdeck.study.removal import Removal
+from dragdeck.study.removal import Removal, disagreements, fit_trials
 
 GIVEN = {"coefficient_m2_n": 2e-11, "sd_m2_n": 1e-12, "target_depth_m": 1e-6}
 TRIAL = {"mass_loss_kg": 2e-5, "time_s": 3600.0, "sd_kg": 1e-6}
@@ -74,16 +73,22 @@ def test_the_joint_interval_of_few_packings_covers(packings: int) -> None:
     assert (off < joined_half_width(scatter, Z * known, degrees)).mean() > 0.94
 
 
-@pytest.mark.parametrize(("off", "birge"), [(0.5, 1.0), (6.0, 6.0)])
+@pytest.mark.parametrize(("off", "birge"), [(0.01, 0.6745), (0.5, 0.5), (6.0, 6.0)])
 def test_several_trials_are_fitted_through_the_origin(off: float, birge: float) -> None:
     """Of two equal trials that are off by as many standard uncertainties, up and down."""
-    sd = 1e-6
+    sd, t = 1e-6, 12.706205
     trials = [TRIAL | {"mass_loss_kg": 2e-5 + sign * off * sd / math.sqrt(2)} for sign in (1, -1)]
-    fit = fit_trials(Removal(calibrate=trials))
+    removal = Removal(calibrate=trials)
+    fit = fit_trials(removal)
     assert fit is not None
     assert fit.rate_kg_s == pytest.approx(2e-5 / 3600)
     assert fit.residuals == pytest.approx([off / math.sqrt(2), -off / math.sqrt(2)])
-    assert fit.half == pytest.approx(Z * birge * 0.05 / math.sqrt(2))
+    quantile = 1.0 if off == 0.01 else t  # at least the 50 % interval by the uncertainties
+    _, rate = predict(removal, LOAD, 7800.0)
+    assert rate.coefficient == pytest.approx(quantile * birge * 0.05 / math.sqrt(2))
+    assert (fit.degrees, rate.coefficient_degrees) == (1, 1)
+    said = " ".join(disagreements(removal))
+    assert "trial 1 is +4.24 sd_kg off the fit" in said if off > 2 else not said
 
 
 def test_longer_and_better_trials_count_more() -> None:
