@@ -121,9 +121,9 @@ class RemovalOfCase:
     removal : Removal
     fit : TrialsFit or None
         To the trials, if there are any.
-    edges : sequence of (str, Estimate, Estimate)
+    edges : sequence of (str, Estimate or None, Estimate or None)
         Of each band along sharp edges: its distances in mm, depth per hour and, after half an
-        hour, the radius of the edge, both in micrometres.
+        hour, the radius of the edge, both in micrometres; None where there is no surface.
     edge_length_m : float
     facets : DataFrame
         ``area_m2``, ``immersed``, and of the patch of each facet the depth of removal per time
@@ -142,7 +142,7 @@ class RemovalOfCase:
 
     removal: Removal
     fit: TrialsFit | None
-    edges: Sequence[tuple[str, Estimate, Estimate]]
+    edges: Sequence[tuple[str, Estimate | None, Estimate | None]]
     edge_length_m: float
     facets: pd.DataFrame
     impact_share: Estimate
@@ -258,30 +258,36 @@ def _over_packings(values: Sequence[Estimate]) -> Estimate:
 
 def edge_rows(
     wears: Sequence[Wear], scale: float, rate: Parted
-) -> list[tuple[str, Estimate, Estimate]]:
-    """The bands along sharp edges; see `RemovalOfCase`.
+) -> list[tuple[str, Estimate | None, Estimate | None]]:
+    """The bands along sharp edges but the last; see `RemovalOfCase`.
 
-    By volume balance, all removal nearer to the edge than the far side of a band rounds it: an edge
-    of the interior angle b with the radius r lacks ``r^2 (1/tan(b/2) - (pi - b)/2)``. `scale` is
-    the removed volume per action, m2/N, and the uncertainty of the coefficient that of `rate`.
+    By volume balance, what is removed nearer to the edge than the far side of a band beyond the
+    depth of the next band rounds it: an edge of the interior angle b with the radius r lacks
+    ``r^2 (1/tan(b/2) - (pi - b)/2)``. Where that is not significantly above zero, the radius is an
+    upper limit: its interval starts at zero. `scale` is the removed volume per action, m2/N, and
+    the uncertainty of the coefficient that of `rate`.
     """
-    found, several = list[tuple[str, Estimate, Estimate]](), [one.edges for one in wears]
-    if (edges := several[0]) is None:
-        return found
+    bands = [one.edges for one in wears if one.edges]
+    if not bands:
+        return []
+    edges, degrees = bands[0], len(bands) - 1 or math.inf
 
-    def removed(bands: str, band: int) -> Parted:
-        own = _over_packings([getattr(one, bands).at(band) for one in several if one])
-        half = own.relative_half_width if own.value else 0.0
-        return Parted(scale * own.value, half, *rate[2:])
+    def removed(columns: str, band: int, per: float) -> Estimate | None:
+        own = _over_packings([getattr(one, columns).at(band) for one in bands])
+        if not per or math.isnan(own.value):
+            return None
+        known = abs(own.value) * rate.coefficient
+        half = joined_half_width(own.half_width, known, degrees, rate.coefficient_degrees)
+        return Estimate.around(own.value, float(half)).over(per / scale)
 
     lacks = 1 / math.tan(edges.angle_rad / 2) - (math.pi - edges.angle_rad) / 2
-    for band, (near, far) in enumerate(pairwise(edges.distance_m)):
-        depth = removed("action_w", band).times(UM_PER_H / edges.area_m2[band]).combined
-        rounded = removed("within_w", band).times(_ROUNDED_S / edges.length_m / lacks).combined
-        ends = (rounded.value, rounded.ci95_low, rounded.ci95_high)
-        radius = Estimate(*(1e6 * math.sqrt(one) for one in ends))
-        found.append((f"{1e3 * near:.2g} to {1e3 * far:.2g}", depth, radius))
-    return found
+    rows = list[tuple[str, Estimate | None, Estimate | None]]()
+    for band, (near, far) in enumerate(pairwise(edges.distance_m[:-1])):
+        depth = removed("action_w", band, edges.area_m2[band] / UM_PER_H)
+        square = removed("excess_w", band, edges.length_m * lacks / _ROUNDED_S)
+        radius = square.mapped(lambda one: 1e6 * math.sqrt(max(one, 0.0))) if square else None
+        rows.append((f"{1e3 * near:.2g} to {1e3 * far:.2g}", depth, radius))
+    return rows
 
 
 def touches_per_s(case: ReportedCase) -> tuple[int, Estimate]:
