@@ -145,7 +145,7 @@ def compute_wear(
         touches=touched,
         edges=edge_bands(sampled, surface, immersion, size, factor * sampled.interval_s),
     )
-    return wear, None if events is None else events.drop(columns=["frame", *POINT])
+    return wear, None if events is None else events.drop(columns=["frame", "slid_m", *POINT])
 
 
 def acting(
