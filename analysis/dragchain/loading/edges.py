@@ -9,7 +9,7 @@ from dragchain.loading.contact_events import POINT
 from dragchain.loading.samples import Sampled
 from dragchain.run.workpiece import Surface
 from dragchain.statistics.correlated import estimates
-from dragchain.statistics.estimate import EstimateColumns
+from dragchain.statistics.estimate import Estimate, EstimateColumns
 from dragdeck.documents import Part
 
 FEATURE_DEG = 30.0
@@ -132,7 +132,31 @@ def edge_bands(
     band = np.searchsorted(limits, away, side="right") - 1
     np.add.at(sums, (sampled.rows["frame"], band), sampled.rows["force_slide_n_m"])
     sums, area = sums[:, :-1], np.histogram(spread, limits)[0] * surface.areas.sum() / _SPREAD
-    ratio = area.cumsum()[:-1] / np.where(area[1:] > 0.0, area[1:], np.nan)
+    action, excess = band_actions(sums, area, seconds)
+    return EdgeBands(
+        length_m=float(lengths.sum()),
+        angle_rad=float(np.average(angles, weights=lengths)),
+        distance_m=tuple(limits.tolist()),
+        area_m2=tuple(area.tolist()),
+        action_w=EstimateColumns.of(action),
+        excess_w=EstimateColumns.of(excess),
+    )
+
+
+def band_actions(
+    sums: Floats, area_m2: Floats, seconds: float
+) -> tuple[list[Estimate], list[Estimate]]:
+    """Action in each of B bands, and excess up to each but the last, W; see `EdgeBands`.
+
+    Parameters
+    ----------
+    sums : (frames, B) array
+        Action in each frame, J.
+    area_m2 : (B,) array
+    seconds : float
+        Process time between two frames.
+    """
+    ratio = area_m2.cumsum()[:-1] / np.where(area_m2[1:] > 0.0, area_m2[1:], np.nan)
 
     def statistic(means: Floats) -> Floats:
         """Action in the bands, excess up to each, and what it exceeds."""
@@ -140,17 +164,9 @@ def edge_bands(
         excess = means.cumsum(axis=-1)[..., :-1] - even
         return np.concatenate([means, excess, even], axis=-1) / seconds
 
-    found, count = estimates(sums, statistic), len(area)
-    excess = [
+    found, count = estimates(sums, statistic), len(area_m2)
+    return found[:count], [
         replace(one, ci95_low=one.ci95_low - error, ci95_high=one.ci95_high + error)
         for one, of in zip(found[count:], found[2 * count - 1 :], strict=False)
         for error in [_AREA_ERROR * of.value]
     ]
-    return EdgeBands(
-        length_m=float(lengths.sum()),
-        angle_rad=float(np.average(angles, weights=lengths)),
-        distance_m=tuple(limits.tolist()),
-        area_m2=tuple(area.tolist()),
-        action_w=EstimateColumns.of(found[:count]),
-        excess_w=EstimateColumns.of(excess),
-    )

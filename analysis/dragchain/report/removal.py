@@ -8,6 +8,7 @@ approximation of Welch (1947) and Satterthwaite (1946); coverage in simulated pr
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -29,6 +30,7 @@ from dragchain.statistics.estimate import (
     mean_of,
     student_quantile,
 )
+from dragchain.statistics.noisy_map import MapSpread, map_spread
 from dragdeck.study.removal import Removal, TrialsFit, fit_trials
 
 UM_PER_H = 3600e6
@@ -136,8 +138,8 @@ class RemovalOfCase:
         Mean depth over the immersed surface and mass loss per process time, and the coefficient.
     variation : (float, float)
         Coefficient of variation of the depth over the immersed area, and that without the scatter.
-    percentiles_um_h : (float, float)
-        Depths below which 5 % and 95 % of the immersed area stay.
+    wears : sequence of Wear
+        Of the packings.
     """
 
     removal: Removal
@@ -150,15 +152,42 @@ class RemovalOfCase:
     mass_mg_h: Parted
     coefficient_m2_n: Parted
     variation: tuple[float, float]
-    percentiles_um_h: tuple[float, float]
+    wears: Sequence[Wear]
+
+    @cached_property
+    def spread(self) -> MapSpread:
+        """The spread of the depth over the immersed area, relative to its mean."""
+        own = np.flatnonzero(self.wears[0].immersed)
+        each = ([one.patch_w_m2, one.patch_se_w_m2] for one in self.wears)
+        values, errors = np.swapaxes(np.array(list(each))[..., own], 0, 1)
+        areas, patch = np.array(self.wears[0].area_m2), np.array(self.wears[0].patch)
+        return map_spread(values, errors, areas[own], patch[own])
+
+    @property
+    def percentiles_um_h(self) -> tuple[Estimate, Estimate]:
+        """Depths below which 5 % and 95 % of the immersed area stay; NaN if not available."""
+        mean, half = self.depth_um_h.value, self.depth_um_h.combined.relative_half_width
+        low, high = (
+            Estimate(
+                mean * one.value,
+                mean * max(0.0, one.value - math.hypot(one.value - one.ci95_low, half * one.value)),
+                mean * (one.value + math.hypot(one.ci95_high - one.value, half * one.value)),
+            )
+            for one in self.spread.percentiles
+        )
+        return low, high
 
     @property
     def minutes(self) -> Mapping[str, Estimate]:
-        """Minutes to the target depth, on average and where it takes longest."""
-        target_um, mean = 1e6 * (self.removal.target_depth_m or 0.0), self.depth_um_h
-        slow = mean.times(self.percentiles_um_h[0] / mean.value)
-        found = {"mean depth": mean, "95 % of the immersed area": slow}
-        return {name: _time_to(target_um, one.combined) for name, one in found.items() if target_um}
+        """Minutes to the target depth, on average and where it takes longest; NaN if not known."""
+        target_um = 1e6 * (self.removal.target_depth_m or 0.0)
+        if not target_um:
+            return {}
+        found = {
+            "mean depth": self.depth_um_h.combined,
+            "95 % of the immersed area": self.percentiles_um_h[0],
+        }
+        return {name: _time_to(target_um, one) for name, one in found.items()}
 
 
 def _time_to(depth_um: float, um_h: Estimate) -> Estimate:
@@ -196,7 +225,7 @@ def removal_of(case: ReportedCase) -> RemovalOfCase | None:
     coefficient, rate = predict(removal, action, density, degrees)
     facets = _facets(wears, coefficient.value * factor, rate)
     own = facets[facets["immersed"]]
-    _, variation, ends = depth_spread(own)
+    _, variation = depth_spread(own)
     removed = facets["depth_m_s"] * facets["area_m2"]
     share = float(removed[facets["immersed"]].sum() / removed.sum())
     edges = wears[0].edges
@@ -216,18 +245,17 @@ def removal_of(case: ReportedCase) -> RemovalOfCase | None:
         mass_mg_h=rate.times(UM_PER_H * density),
         coefficient_m2_n=coefficient,
         variation=variation,
-        percentiles_um_h=ends,
+        wears=wears,
     )
 
 
-def depth_spread(facets: pd.DataFrame) -> tuple[float, tuple[float, float], tuple[float, float]]:
-    """Mean depth over facets, um/h, coefficients of variation and percentiles (`RemovalOfCase`)."""
+def depth_spread(facets: pd.DataFrame) -> tuple[float, tuple[float, float]]:
+    """Mean depth over facets, um/h, and coefficients of variation (`RemovalOfCase`)."""
     depth, error, area = facets[["depth_m_s", "depth_m_s_se", "area_m2"]].to_numpy(np.float64).T
     mean = float(np.average(depth, weights=area))
     square, scatter = (float(np.average(x**2, weights=area)) for x in (depth - mean, error))
-    low, high = np.quantile(UM_PER_H * depth, (0.05, 0.95), weights=area, method="inverted_cdf")
     variation = (math.sqrt(square) / mean, math.sqrt(max(0.0, square - scatter)) / mean)
-    return UM_PER_H * mean, variation, (float(low), float(high))
+    return UM_PER_H * mean, variation
 
 
 def _facets(wears: Sequence[Wear], scale: float, rate: Parted) -> pd.DataFrame:
