@@ -43,9 +43,14 @@ def levels(random: Random, packings: int, patches: int) -> Floats:
 # --- volume, coefficient and depth ---------------------------------------------------------------
 
 
-def weighed(random: Random, lost: float, number: int, scatter: float, unequal: bool) -> list[Any]:
-    """Trials weighed to 5 %, every second of them to 15 % if unequal, that scatter by more."""
-    sd = 0.05 * lost * np.where(unequal & (np.arange(number) % 2 == 1), 3.0, 1.0)
+def weighed(
+    random: Random, lost: float, number: int, part: float, scatter: float, unequal: bool
+) -> list[Any]:
+    """Trials weighed to a part of the loss, every second to three times that if unequal.
+
+    They scatter by a multiple of their uncertainties.
+    """
+    sd = part * lost * np.where(unequal & (np.arange(number) % 2 == 1), 3.0, 1.0)
     mass = lost + scatter * sd * random.normal(size=number)
     rows = zip(mass.tolist(), sd.tolist(), strict=True)
     return [{"mass_loss_kg": one, "time_s": TIME_S, "sd_kg": own} for one, own in rows]
@@ -53,7 +58,7 @@ def weighed(random: Random, lost: float, number: int, scatter: float, unequal: b
 
 def rates(random: Random, number: int, scatter: float, unequal: bool) -> Hits:
     """The mass loss per time of so many trials."""
-    block = weighed(random, 2e-5, number, scatter, unequal)
+    block = weighed(random, 2e-5, number, 0.02, scatter, unequal)
     _, rate = predict(Removal(calibrate=block), Estimate(1.0, 1.0, 1.0), DENSITY)
     return {"mass loss": rate.combined.contains(2e-5 / TIME_S / DENSITY)}
 
@@ -70,7 +75,7 @@ def volume(random: Random, packings: int, trials: int) -> Hits:
     known = TRUE_M2_N * (1 + 0.1 * random.normal())
     given: dict[str, Any] = {"coefficient_m2_n": known, "sd_m2_n": TRUE_M2_N / 10}
     if trials:
-        given = {"calibrate": weighed(random, lost, trials, 1.0, unequal=False)}
+        given = {"calibrate": weighed(random, lost, trials, 0.05, 1.0, unequal=False)}
     between = packings - 1 if packings > 1 else np.inf
     coefficient, rate = predict(Removal.model_validate(given), action, DENSITY, between)
     errors = np.array([[slow_error(one)[0] for one in each] for each in series])

@@ -53,7 +53,7 @@ def joined_half_width(
     with np.errstate(divide="ignore"):
         both = total**2 / sum(one**2 / of for one, (_, of) in zip(squares, parts, strict=True))
     half = stdtrit(both, 0.5 + CONFIDENCE / 2) * total**0.5
-    return np.maximum.reduce([half, *np.broadcast_arrays(scatter, known)])
+    return np.asarray(np.maximum(np.maximum(half, scatter), known))
 
 
 class Parted(NamedTuple):
