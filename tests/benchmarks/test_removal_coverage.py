@@ -16,7 +16,8 @@ def test_the_recorded_coverage_is_that_of_a_95_percent_interval() -> None:
     error = np.sqrt(0.95 * 0.05 / (known["trials"] * known["available"]))
     even = known["setting"] == "even removal"  # the interval cannot lie below the true zero
     assert (known["coverage"] >= 0.93 - error).all()
-    assert (known["coverage"][~even] <= 0.97 + error[~even]).all()
+    few = known["packings"] == 2  # joined intervals of two packings are up to 1 % too safe
+    assert (known["coverage"][~even & ~few] <= 0.97 + error[~even & ~few]).all()
     assert set(RECORD.loc[RECORD["available"] < 1, "quantity"]) <= {
         "5th percentile", "95th percentile"
     }  # fmt: skip

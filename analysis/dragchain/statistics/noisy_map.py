@@ -19,8 +19,11 @@ from dragchain.statistics.estimate import CONFIDENCE, Estimate
 LARGEST_ERROR = 0.4
 """With a larger relative error of a patch there, a percentile is not available."""
 
-_PRIORS, _DRAWS, _GRID, _STEPS = 40, 5, 40, 40
-"""Fitted priors and maps drawn of each, values of a prior, and steps of its fit (EM algorithm)."""
+_PRIORS, _DRAWS, _STEPS, _SPACING, _MOST = 40, 5, 40, 0.5, 250
+"""Fitted priors, maps drawn of each, and steps of its fit (EM algorithm).
+
+Distance of the values of a prior in errors of a patch, and the largest number of values.
+"""
 
 
 class MapSpread(NamedTuple):
@@ -114,7 +117,8 @@ def _drawn(value: Floats, area: Floats, events: float, differences: float) -> Fl
     highest = 2 * math.sqrt(float(value.max()) * mean_area / events)
     if root > 0.0:
         highest = 2 / root * math.asinh(root * highest / 2)
-    scale = np.linspace(0.0, 1.05 * highest, _GRID + 1)[1:]
+    count = min(_MOST, math.ceil(1.05 * highest / _SPACING))
+    scale = np.linspace(0.0, 1.05 * highest, count + 1)[1:]
     wide = events / area[:, None] + differences * true(scale)
     form = true(scale) / wide
     measured = np.maximum(value, 0.02 * events / area)[:, None]
@@ -122,7 +126,7 @@ def _drawn(value: Floats, area: Floats, events: float, differences: float) -> Fl
     chance = np.exp(chance - chance.max(axis=1, keepdims=True)) + 1e-300
     random = np.random.default_rng(0)
     weights = random.dirichlet(np.ones(len(value)), _PRIORS).T
-    prior = np.full((_GRID, _PRIORS), 1 / _GRID)
+    prior = np.full((count, _PRIORS), 1 / count)
     for _ in range(_STEPS):
         prior *= chance.T @ (weights / (chance @ prior))
     maps = []
