@@ -255,9 +255,14 @@ def azimuth_profile(
 
 
 def depth_profile(
-    frame: Ints, frames: int, depth_m: Floats, normal_force_n: Floats, bins: int = DEPTH_BINS
+    frame: Ints,
+    frames: int,
+    depth_m: Floats,
+    normal_force_n: Floats,
+    bins: int = DEPTH_BINS,
+    edges_m: Floats | None = None,
 ) -> tuple[Floats, list[Estimate], list[Estimate]]:
-    """How the normal force changes with depth.
+    """How the normal force changes with depth, in equal bins or those of other edges.
 
     Returns
     -------
@@ -268,7 +273,8 @@ def depth_profile(
     line_load_n_per_m : list of Estimate
         Sum of the normal forces of a frame by depth, in N per metre of depth.
     """
-    edges = np.linspace(depth_m.min(), depth_m.max(), bins + 1)
+    equal = np.linspace(depth_m.min(), depth_m.max(), bins + 1)
+    edges = equal if edges_m is None else edges_m
     row = np.clip(np.searchsorted(edges, depth_m, side="right") - 1, 0, bins - 1)
     force = np.zeros((frames, bins))
     count = np.zeros((frames, bins))

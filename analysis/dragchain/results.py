@@ -22,7 +22,9 @@ from dragdeck.errors import RejectedRunError
 from dragdeck.records.case import load_case
 from dragdeck.records.run import read_accepted
 
-_ON_WORKPIECE = ("workpiece_force", "workpiece_contacts", "facets", "contact_events")
+_ON_WORKPIECE = (
+    *("workpiece_force", "workpiece_contacts", "sphere_contacts", "facets", "contact_events"),
+)
 _NETWORK = ("particles", "contacts", "network", "clusters", "chains")
 _TABLES: Mapping[str, tuple[str, ...]] = {
     "process": (*_ON_WORKPIECE, *_NETWORK, "thermo"),
@@ -76,6 +78,8 @@ class FinishedRun(RunData):
         Content of ``case.json``: the simulated case and its settings.
     force, workpiece_contacts, facets, events : DataFrame
         Process only: force on the workpiece, contacts on it, its facets, and contact events.
+    sphere_contacts : DataFrame
+        Process with clumps only: contacts of their spheres on the workpiece.
     particles, contacts, network, clusters, chains : DataFrame
         Process only: the frames of the contact network. A filling also has ``particles``.
     impacts : DataFrame
@@ -91,6 +95,7 @@ class FinishedRun(RunData):
 
     force = _table("workpiece_force", "sample")
     workpiece_contacts = _table("workpiece_contacts", "contact on the workpiece and sample")
+    sphere_contacts = _table("sphere_contacts", "contact of a clump's sphere and sample")
     facets = _table("facets", "facet (mesh element) of the workpiece")
     events = _table("contact_events", "contact event on the workpiece")
     particles = _table("particles", "particle and frame")

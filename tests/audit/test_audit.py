@@ -7,7 +7,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from plain_run import PlainRun, bottlenecks, coordination, loads
+import yaml
+from paths import DATA
+from plain_run import PlainRun, bottlenecks, coordination, loads, mean_contacts, rim_excess
 from snakemake_calls import copy_of_project, succeed
 
 pytestmark = [pytest.mark.audit, pytest.mark.engine]
@@ -15,12 +17,27 @@ pytestmark = [pytest.mark.audit, pytest.mark.engine]
 ROUNDING = {"rtol": 1e-9, "atol": 1e-12}
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    project = copy_of_project(tmp_path_factory.mktemp("audit"))
-    succeed(project, "all", "--config", "study=small")
+REMOVAL = {"coefficient_m2_n": 1e-15}
+RODS = {"count": 150, "radius_std_m": 0, "shape": {"kind": "cylinder", "aspect": 1.4, "spheres": 3}}
+
+
+def made(project: Path, **media: object) -> Path:
+    """The process run of the small study with a law of removal, and these media."""
+    study = yaml.safe_load((DATA / "small_study.yaml").read_text())
+    study |= {"removal": REMOVAL, "media": study["media"] | media}
+    succeed(copy_of_project(project, study), "all", "--config", "study=small")
     (run,) = (project / "results/small/process").iterdir()
     return run
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return made(tmp_path_factory.mktemp("audit"))
+
+
+@pytest.fixture(scope="module")
+def clumps(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return made(tmp_path_factory.mktemp("clumps"), **RODS)
 
 
 @pytest.fixture(scope="module")
@@ -98,15 +115,51 @@ def test_paths_from_the_workpiece_to_the_bowl(folder: Path, plain: PlainRun) -> 
             same(found, wanted, f"{step}: bottleneck forces")
 
 
-def test_loads_and_events(folder: Path, plain: PlainRun) -> None:
+def check_loads(folder: Path, plain: PlainRun) -> None:
     totals, by_facet, wanted = loads(plain)
-    found = json.loads((folder / "tables/loading.json").read_text())["totals"]
+    loading = json.loads((folder / "tables/loading.json").read_text())
     facets = table(folder, "facets").set_index("facet_id")
     events = table(folder, "contact_events").sort_values(["start_s", "particle_id"])
     assert events["particle_id"].tolist() == wanted["particle"].tolist()
     by_facet = by_facet.reindex(facets.index, fill_value=0.0)
     for name, total in totals.items():
-        same(found[name], total, f"total {name}")
+        same(loading["totals"][name], total, f"total {name}")
         same(events[name], wanted[name], f"events' {name}")
         same(facets[name], by_facet[name], f"facets' {name}")
     same(events["peak_normal_force_n"], wanted["peak_normal_force_n"], "peaks")
+    wear = json.loads((folder / "tables/wear.json").read_text())
+    patch, area = np.array(wear["patch"]), np.array(wear["area_m2"])
+    action = np.bincount(patch, by_facet["force_slide_n_m"])
+    density = action / (np.bincount(patch, area) * loading["time_s"])
+    same(wear["patch_w_m2"], density[patch], "depth of patches")
+
+
+def test_loads_and_events(folder: Path, plain: PlainRun) -> None:
+    check_loads(folder, plain)
+    same(
+        json.loads((folder / "tables/loading.json").read_text())["mean_contacts"]["value"],
+        np.mean([len(of) for step, of in plain.on_workpiece() if plain.counted(step)]),
+        "contacts",
+    )
+
+
+def test_loads_of_bodies_with_several_contacts(clumps: Path) -> None:
+    """Amounts are those of the contacts of their spheres, the number of contacts that of bodies."""
+    plain = PlainRun(clumps)
+    check_loads(clumps, plain)
+    contacts = json.loads((clumps / "tables/loading.json").read_text())["mean_contacts"]["value"]
+    same(contacts, mean_contacts(plain), "contacts")
+    merged, spheres = table(clumps, "workpiece_contacts"), table(clumps, "sphere_contacts")
+    loud = spheres[(spheres[["force_x_n", "force_y_n", "force_z_n"]] != 0.0).any(axis=1)]
+    assert len(loud) > len(loud.drop_duplicates(["step", "particle_id"]))
+    assert len(merged) == len(spheres.drop_duplicates(["step", "particle_id"]))
+
+
+def test_the_excess_along_the_rim(folder: Path, plain: PlainRun) -> None:
+    """Areas are known to 0.5 % and distances to a tenth of the narrowest band."""
+    edges = json.loads((folder / "tables/wear.json").read_text())["edges"]
+    widths = edges["distance_m"][1:]
+    for found, (within, excess) in zip(
+        edges["excess_w"]["value"], rim_excess(plain, widths), strict=True
+    ):
+        assert found == pytest.approx(excess, abs=0.1 * within)

@@ -1,5 +1,7 @@
 """The main tables of a process run computed once more from its raw dumps, contact by contact.
 
+Of clumps it knows the loads on the workpiece.
+
 It shares no code with the packages: it reads ``case.json``, ``columns.json`` and the raw outputs by
 itself, and loops over contacts. The rules are those of docs/reference/results.md. It knows a circle
 whose orientation follows the path, without superposed motions, in a bowl of primitive walls.
@@ -68,6 +70,14 @@ class PlainRun:
         self.start, self.end = drag["start_step"], drag["end_step"]
         self.sense = 1.0 if motion["direction"] == "ccw" else -1.0
         self.turning = self.sense * motion["axis_speed_m_s"] / motion["radius_m"]
+
+    def body(self, sphere: int) -> int:
+        """The body of a sphere, whose spheres have ids one after the other; itself if it is one."""
+        for size in self.case.get("bodies", ()):
+            spheres = len(size["radii_m"])
+            if 0 <= (number := (sphere - size["first_sphere"]) // spheres) < size["count"]:
+                return int(size["first_id"] + number)
+        return sphere
 
     def friction(self, body: str) -> float:
         return float(self.case["contact_moduli"][body]["friction"])
@@ -234,8 +244,17 @@ def bottlenecks(contacts: list[Contact]) -> list[float]:
     return sorted(found.get(number, 0.0) for number in starts)
 
 
+def mobilised(run: PlainRun, along: float, sideways: float) -> bool:
+    """Whether friction is, of a contact with these normal and tangential forces."""
+    most = run.friction("workpiece") * along
+    return bool(sideways >= 0.99 * most) if most > 0.0 else True
+
+
 def loads(run: PlainRun) -> tuple[pd.Series, pd.DataFrame, pd.DataFrame]:
-    """Totals, sums of each facet, and contact events of the counted samples."""
+    """Totals, sums of each facet, and contact events of the counted samples.
+
+    Amounts are of the contacts of spheres, events of particles.
+    """
     interval = run.outputs["workpiece_contacts"]["period_steps"] * run.dt
     samples = [(step, contacts) for step, contacts in run.on_workpiece() if run.counted(step)]
     rows = []
@@ -244,8 +263,7 @@ def loads(run: PlainRun) -> tuple[pd.Series, pd.DataFrame, pd.DataFrame]:
             along = one.force @ one.normal
             sideways = np.linalg.norm(one.force - along * one.normal)
             slip, _ = run.slip(one)
-            most = run.friction("workpiece") * along
-            slides = sideways >= 0.99 * most if most > 0.0 else True
+            slides = mobilised(run, along, sideways)
             path = np.linalg.norm(slip) * interval
             amounts = {
                 "normal_impulse_n_s": along * interval,
@@ -255,7 +273,8 @@ def loads(run: PlainRun) -> tuple[pd.Series, pd.DataFrame, pd.DataFrame]:
                 "force_slide_n_m": along * path * slides,
                 "friction_work_j": -(one.force @ slip) * interval,
             }
-            rows.append({"particle": one.particle, "sample": number, "facet": one.facet, **amounts})
+            place = {"particle": run.body(one.particle), "sample": number, "facet": one.facet}
+            rows.append({**place, **amounts})
     table = pd.DataFrame(rows).sort_values(["particle", "sample"])
     begins = (table["particle"].diff() != 0) | (table["sample"].diff() > 1)
     table["event"] = begins.cumsum()
@@ -266,3 +285,63 @@ def loads(run: PlainRun) -> tuple[pd.Series, pd.DataFrame, pd.DataFrame]:
     events["peak_normal_force_n"] = together.groupby("event").max()
     events = first.join(events).sort_values(["sample", "particle"])
     return table[names].sum(), table.groupby("facet")[names].sum(), events
+
+
+def mean_contacts(run: PlainRun) -> float:
+    """Particles that touch the workpiece in a counted sample, on average: of clumps, bodies."""
+    counts = [
+        len({run.body(one.particle) for one in contacts})
+        for step, contacts in run.on_workpiece()
+        if run.counted(step)
+    ]
+    return sum(counts) / len(counts)
+
+
+def rim_excess(run: PlainRun, widths: list[float]) -> list[tuple[float, float]]:
+    """What a rod loses within each width of the rim of its tip but the last, W, and the excess.
+
+    Excess: beyond what the same area has between that width and the next one. The rim is a polygon.
+    """
+    turn = -run.case["motion"]["start_direction_rad"]
+    text = (run.folder / "workpiece.stl").read_text().split("vertex")[1:]
+    corners = np.unique([[float(word) for word in one.split()[:3]] for one in text], axis=0)
+    rim = corners[(abs(corners[:, 2]) < 1e-9) & (np.hypot(*corners[:, :2].T) > 0.00399)]
+    rim = rim[np.argsort(np.arctan2(rim[:, 1], rim[:, 0]))]
+    sides = np.linalg.norm(np.roll(rim, -1, axis=0) - rim, axis=1)
+    apothem = float(np.hypot(*(0.5 * (rim + np.roll(rim, -1, axis=0)))[:, :2].T).min())
+    c, s = math.cos(turn), math.sin(turn)
+    rim[:, :2] = rim[:, :2] @ np.array([[c, s], [-s, c]])
+
+    def area(width: float) -> float:
+        end = apothem * sides.sum() / 2
+        return sides.sum() * width + end * (1 - max(0.0, 1 - width / apothem) ** 2)
+
+    def distance(point: Vector) -> float:
+        found = []
+        for a, b in zip(rim, np.roll(rim, -1, axis=0), strict=True):
+            part = min(1.0, max(0.0, (point - a) @ (b - a) / ((b - a) @ (b - a))))
+            found.append(float(np.linalg.norm(point - a - part * (b - a))))
+        return min(found)
+
+    within, samples = [0.0] * len(widths), 0
+    places = {row["step"]: row for row in run.forces()}
+    for step, contacts in run.on_workpiece():
+        if not run.counted(step):
+            continue
+        samples += 1
+        place = places[step]
+        angle = math.atan2(place["ref_y_m"], place["ref_x_m"]) + run.sense * math.pi / 2
+        c, s = math.cos(angle), math.sin(angle)
+        for one in contacts:
+            x, y, z = one.point - vector(place, "ref_*_m")
+            away = distance(np.array([x * c + y * s, y * c - x * s, z]))
+            along, slip = one.force @ one.normal, np.linalg.norm(run.slip(one)[0])
+            sideways = float(np.linalg.norm(one.force - along * one.normal))
+            if mobilised(run, along, sideways):
+                for number, width in enumerate(widths):
+                    within[number] += along * slip * (away < width)
+    areas, means = [area(one) for one in widths], [one / samples for one in within]
+    return [
+        (means[n], means[n] - (means[n + 1] - means[n]) * areas[n] / (areas[n + 1] - areas[n]))
+        for n in range(len(widths) - 1)
+    ]

@@ -184,6 +184,7 @@ CautionCode = Literal[
     "skin",
     "stable_timestep",
     "steps_per_contact",
+    "trials",
 ]
 """What a `Caution` is about."""
 

@@ -105,7 +105,8 @@ def find_events(rows: pd.DataFrame, frames: int, interval_s: float) -> tuple[pd.
     rows : DataFrame
         N contacts with force: ``frame`` (0 to `frames` - 1), ``time_s``,
         ``particle_id``, ``facet_id``, ``normal_force_n``, `POINT` and `SLIP` in the
-        workpiece's frame, ``mobilised`` and `AMOUNTS`.
+        workpiece's frame, ``mobilised``, `AMOUNTS`, and ``contacts``: 0 for those that are not
+        counted, else 1.
     frames : int
         Number of frames.
     interval_s : float
@@ -116,7 +117,7 @@ def find_events(rows: pd.DataFrame, frames: int, interval_s: float) -> tuple[pd.
     events : DataFrame
         A row an event, in the order of time and particle. Sums are over all
         contacts of the particle; where it has several at once, paths follow the one
-        with the largest normal force.
+        with the largest normal force. ``slid_m`` is ``sliding_m`` of the contacts that count.
     event : (N,) ndarray of int64
         The event of each row.
     """
@@ -137,7 +138,8 @@ def find_events(rows: pd.DataFrame, frames: int, interval_s: float) -> tuple[pd.
         events[name] = np.bincount(path[0], path[1], len(events))
     rolled = events["rolling_m"] / (events["samples"] - 1).where(events["samples"] > 1)
     events["rolling_m_s"] = rolled / interval_s
-    events["slide_to_roll"] = events["sliding_m"] / (events["duration_s"] * events["rolling_m_s"])
+    events["slid_m"] = np.bincount(event, rows["sliding_m"] * rows["contacts"], len(events))
+    events["slide_to_roll"] = events["slid_m"] / (events["duration_s"] * events["rolling_m_s"])
     return events, event
 
 
@@ -219,7 +221,7 @@ def event_types(
     """
     longest = max(limits.impact_times * surfaces(case).contact_time_s, interval_s)
     speed = drag_surface_speed(case)
-    sliding, rolling = events["sliding_m"] / events["duration_s"], events["rolling_m_s"]
+    sliding, rolling = events["slid_m"] / events["duration_s"], events["rolling_m_s"]
     short = events["complete"] & (events["duration_s"] <= longest * (1 + 1e-9))
     rests = sliding + rolling < limits.rest * speed
     slides = sliding >= limits.slide_to_roll * rolling

@@ -50,6 +50,9 @@ _KEPT = [
 ]
 """What is held of every contact."""
 
+SPHERES = "sphere_contacts"
+"""Table of the contacts of the spheres of clumps, whose amounts add up."""
+
 DRAWN = ["workpiece_z_m", "depth_m", "azimuth_rad", "force_slide_n_m"]
 """What is left of it for the picture, which needs memory itself."""
 
@@ -61,9 +64,9 @@ class Sampled:
     Attributes
     ----------
     rows : DataFrame
-        A contact with force: as `find_events` takes them, and `WORKPIECE` and
-        ``workpiece_work_j``, the work that the workpiece does on the particle through it, seen from
-        the bowl.
+        A contact with force, of a clump each of a sphere: as `find_events` takes them, and
+        `WORKPIECE` and ``workpiece_work_j``, the work that the workpiece does on the particle
+        through it, seen from the bowl.
     frames : int
         Number of counted samples, those without contact included.
     interval_s : float
@@ -81,8 +84,8 @@ class Sampled:
     path_m: float
     workpiece_impulse_n_s: Floats
 
-    def per_frame(self, weights: ArrayLike | None = None) -> Floats:
-        """Sums of a weight of each row by frame, (frames,); numbers of rows if None."""
+    def per_frame(self, weights: ArrayLike) -> Floats:
+        """Sums of a weight of each row by frame, (frames,)."""
         sums = np.bincount(self.rows["frame"], weights, self.frames)
         return np.asarray(sums, dtype=np.float64)
 
@@ -102,7 +105,8 @@ def sample(run_dir: Path, case: CaseOfRun, table: str = "workpiece_contacts") ->
         _workpiece_between(force, steps) if table == TOUCHED else _workpiece_at(force, steps)
     )
     parts = []
-    for contacts in _read_contacts(tables / f"{table}.parquet", run_dir, case):
+    of = table if table == TOUCHED or not case.bodies else SPHERES
+    for contacts in _read_contacts(tables / f"{of}.parquet", run_dir, case):
         contacts["frame"] = np.searchsorted(steps, contacts["step"])
         at = workpiece.reindex(contacts["step"])
         parts.append(_with_amounts(contacts, at, case, interval_s))
@@ -113,7 +117,21 @@ def sample(run_dir: Path, case: CaseOfRun, table: str = "workpiece_contacts") ->
         )
     impulse = workpiece[_ALONG].to_numpy().sum(axis=0) * interval_s
     path = axis_speed(case) * interval_s * len(steps)
-    return Sampled(pd.concat(parts, ignore_index=True), len(steps), interval_s, path, impulse)
+    rows = pd.concat(parts, ignore_index=True)
+    rows["contacts"] = _numbers(rows, case)
+    return Sampled(rows, len(steps), interval_s, path, impulse)
+
+
+def _numbers(rows: pd.DataFrame, case: CaseOfRun) -> Floats:
+    """What each row adds to the number of contacts: of those of a clump in a sample the strongest.
+
+    1 for that and for a contact of a sphere that is a particle, else 0.
+    """
+    if not case.bodies:
+        return np.ones(len(rows))
+    numbers = np.zeros(len(rows))
+    numbers[rows.groupby(["frame", "particle_id"])["normal_force_n"].idxmax()] = 1.0
+    return numbers
 
 
 def _workpiece_at(file: Path, steps: Ints) -> pd.DataFrame:
@@ -257,7 +275,7 @@ def facet_table(sampled: Sampled, surface: Surface, events: pd.DataFrame) -> pd.
     facet = rows["facet_id"].to_numpy()
     peak = np.zeros(count)
     np.maximum.at(peak, facet, rows["normal_force_n"])
-    samples = np.bincount(facet, minlength=count)
+    samples = np.bincount(facet, rows["contacts"], count).astype(np.int64)
     names = [name for name in (*AMOUNTS, *WORKPIECE, *BODY) if name in rows]
     sums = {name: np.bincount(facet, rows[name], count) for name in names}
     errors = {f"{name}_se": standard_errors(sampled, name, count) for name in _UNCERTAIN}

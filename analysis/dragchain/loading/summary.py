@@ -83,7 +83,7 @@ def _totals(sampled: Sampled, events: pd.DataFrame) -> Totals:
             *(sampled.per_frame(rows[name]) for name in _KNOWN),
             *(sampled.per_frame(rows[name] * ahead) for name in _KNOWN),
             *(sampled.per_frame(rows[name] * (1.0 - ahead)) for name in _KNOWN),
-            sampled.per_frame(),
+            sampled.per_frame(rows["contacts"]),
             sampled.per_frame(rows["normal_impulse_n_s"] * rows["mobilised"]),
             sampled.per_frame(rows["normal_impulse_n_s"] * (1.0 - rows["mobilised"])),
             np.bincount(events["frame"], minlength=sampled.frames),
@@ -124,7 +124,7 @@ def _totals(sampled: Sampled, events: pd.DataFrame) -> Totals:
 
 def _types(sampled: Sampled, events: pd.DataFrame, event: Ints) -> dict[str, ContactType]:
     """Number, fractions and intensity of the contacts of each type."""
-    rows = sampled.rows.assign(samples=1.0)
+    rows = sampled.rows.rename(columns={"contacts": "samples"})
     kind, frames = events["type"].to_numpy(), sampled.frames
     of_rows = kind[event]
     amounts = [sampled.per_frame(rows[name] * (of_rows == t)) for t in TYPES for name in _BY_TYPE]

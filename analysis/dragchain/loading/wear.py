@@ -79,6 +79,8 @@ class Wear(Document):
     action_w : Estimate
         Of the law of the study on the whole workpiece per process time, W: of laws that are added
         up, each times its coefficient over that of the study. Without a law that of Archard.
+    patch : tuple of int
+        Number of the patch of each facet.
     patch_w_m2, patch_se_w_m2 : tuple of float
         By facet: the same per area, a mean over its patch, and its standard error, W/m2.
     impact_share : Estimate
@@ -94,6 +96,7 @@ class Wear(Document):
     area_m2: tuple[float, ...]
     immersed: tuple[bool, ...]
     action_w: Estimate
+    patch: tuple[int, ...]
     patch_w_m2: tuple[float, ...]
     patch_se_w_m2: tuple[float, ...]
     impact_share: Estimate
@@ -139,13 +142,14 @@ def compute_wear(
         area_m2=tuple(surface.areas.tolist()),
         immersed=tuple((surface.centres[:, 2] <= immersion).tolist()),
         action_w=_sum(total),
+        patch=tuple(group.tolist()),
         patch_w_m2=tuple(np.sum(density, axis=0)[group].tolist()),
         patch_se_w_m2=tuple(np.linalg.norm(error, axis=0)[group].tolist()),
         impact_share=_share(total[-1], total[:-1]) if impact else share,
         touches=touched,
         edges=edge_bands(sampled, surface, immersion, size, factor * sampled.interval_s),
     )
-    return wear, None if events is None else events.drop(columns=["frame", *POINT])
+    return wear, None if events is None else events.drop(columns=["frame", "slid_m", *POINT])
 
 
 def acting(

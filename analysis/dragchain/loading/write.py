@@ -115,5 +115,5 @@ def compute_loading(run_dir: Path) -> WorkpieceLoading:
     if wear is not None and wear.touches is not None and touched is not None:
         facets = facets.assign(**touch_maps(touched, surface, wear.touches.time_s))
     drawn = replace(sampled, rows=sampled.rows[DRAWN].copy())
-    events = events.drop(columns="frame")
+    events = events.drop(columns=["frame", "slid_m"])
     return WorkpieceLoading(case, surface, drawn, facets, events, summary, wear, touched)

@@ -201,6 +201,7 @@ def _of_run(study: StudyRuns, target: Target) -> tuple[pd.DataFrame, Floats, Stu
         return found, action, study
     highest = needed(case.workpiece, "workpiece").immersion_depth_m
     changed = {"area_m2": areas, "patch_w_m2": action[0], "patch_se_w_m2": action[1],
+               "patch": np.arange(len(areas)),
                "immersed": target.surface.centres[:, 2] <= highest}  # fmt: skip
     update = {name: tuple(values.tolist()) for name, values in changed.items()}
     return found, action, replace(study, wear=study.wear.model_copy(update=update))

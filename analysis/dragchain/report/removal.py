@@ -8,13 +8,14 @@ approximation of Welch (1947) and Satterthwaite (1946); coverage in simulated pr
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
-from scipy.special import chdtri, stdtrit
+from scipy.special import stdtrit
 
 from dragchain.arrays import Floats
 from dragchain.errors import TableError
@@ -29,7 +30,8 @@ from dragchain.statistics.estimate import (
     mean_of,
     student_quantile,
 )
-from dragdeck.study.removal import Removal
+from dragchain.statistics.noisy_map import MapSpread, map_spread
+from dragdeck.study.removal import Removal, TrialsFit, fit_trials
 
 UM_PER_H = 3600e6
 """A depth per time in micrometres per hour over that in m/s."""
@@ -38,27 +40,34 @@ _ROUNDED_S = 1800.0
 """Time after which the radius of an edge is reported."""
 
 
-def joined_half_width(scatter: ArrayLike, known: ArrayLike, degrees: float) -> Floats:
-    """Half-widths of 95 % intervals, (...,), of which one has such degrees of freedom, as one.
+def joined_half_width(
+    scatter: ArrayLike, known: ArrayLike, degrees: float, known_degrees: float = math.inf
+) -> Floats:
+    """Half-widths of 95 % intervals, (...,), of two errors with such degrees of freedom, as one.
 
-    With few degrees, the approximation adds too many: not narrower than the scatter alone.
+    With few degrees, the approximation adds too many: not narrower than either alone.
     """
-    square = np.maximum(np.asarray(scatter) / student_quantile(degrees), 1e-60) ** 2
-    total = square + (np.asarray(known) / NORMAL_QUANTILE) ** 2
-    half = stdtrit(degrees * (total / square) ** 2, 0.5 + CONFIDENCE / 2) * total**0.5
-    return np.asarray(np.maximum(half, scatter))
+    parts = (np.asarray(scatter), degrees), (np.asarray(known), known_degrees)
+    squares = [(half / student_quantile(of)) ** 2 for half, of in parts]
+    total = np.maximum(sum(squares), 1e-120)
+    with np.errstate(divide="ignore"):
+        both = total**2 / sum(one**2 / of for one, (_, of) in zip(squares, parts, strict=True))
+    half = stdtrit(both, 0.5 + CONFIDENCE / 2) * total**0.5
+    return np.asarray(np.maximum(np.maximum(half, scatter), known))
 
 
 class Parted(NamedTuple):
     """A positive number with the relative half-widths of its two 95 % intervals.
 
-    `degrees`: degrees of freedom of that by the scatter of the load.
+    `degrees`, `coefficient_degrees`: degrees of freedom of that by the scatter of the load, and of
+    that by the coefficient.
     """
 
     value: float
     scatter: float
     coefficient: float
     degrees: float = math.inf
+    coefficient_degrees: float = math.inf
 
     def within(self, half: float) -> Estimate:
         """With an interval of this relative half-width, not below zero."""
@@ -67,43 +76,11 @@ class Parted(NamedTuple):
     @property
     def combined(self) -> Estimate:
         """With both together."""
-        return self.within(float(joined_half_width(self.scatter, self.coefficient, self.degrees)))
+        return self.within(float(joined_half_width(*self[1:])))
 
     def times(self, factor: float) -> "Parted":
         """A multiple."""
         return self._replace(value=factor * self.value)
-
-
-class TrialsFit(NamedTuple):
-    """Mass loss per time from weighed trials, by weighted least squares through the origin.
-
-    Attributes
-    ----------
-    rate_kg_s, half : float
-        Slope, and relative half-width of its interval; wider by Birge's ratio (1932) if the
-        trials scatter significantly more than by their uncertainties.
-    residuals : sequence of float
-        Measured minus fitted mass loss of each trial in its standard uncertainties.
-    """
-
-    rate_kg_s: float
-    half: float
-    residuals: Sequence[float]
-
-
-def fit_trials(removal: Removal) -> TrialsFit | None:
-    """The fit to the trials of a study, None if its coefficient is given."""
-    if removal.calibrate is None:
-        return None
-    trials = [(one.mass_loss_kg, one.time_s, one.sd_kg) for one in removal.calibrate]
-    mass, time, sd = np.array(trials).T
-    information = float(((time / sd) ** 2).sum())
-    rate = float((mass * time / sd**2).sum()) / information
-    residuals = (mass - rate * time) / sd
-    square, degrees = float((residuals**2).sum()), max(len(trials) - 1, 1)
-    birge = math.sqrt(square / degrees) if square > chdtri(degrees, 1 - CONFIDENCE) else 1.0
-    half = NORMAL_QUANTILE * birge / math.sqrt(information) / rate
-    return TrialsFit(rate, half, residuals.tolist())
 
 
 def predict(
@@ -117,8 +94,9 @@ def predict(
     """
     load = action_w.relative_half_width
     if fit := fit_trials(removal):
-        rate = Parted(fit.rate_kg_s / density_kg_m3, 0.0, fit.half)
-        return Parted(rate.value / action_w.value, load, fit.half, degrees), rate
+        half = student_quantile(fit.degrees) * fit.error
+        rate = Parted(fit.rate_kg_s / density_kg_m3, 0.0, half, coefficient_degrees=fit.degrees)
+        return rate._replace(value=rate.value / action_w.value, scatter=load, degrees=degrees), rate
     value = removal.coefficient_m2_n or math.nan
     half = NORMAL_QUANTILE * (removal.sd_m2_n or 0.0) / value
     return Parted(value, 0.0, half), Parted(value * action_w.value, load, half, degrees)
@@ -145,9 +123,9 @@ class RemovalOfCase:
     removal : Removal
     fit : TrialsFit or None
         To the trials, if there are any.
-    edges : sequence of (str, Estimate, Estimate)
+    edges : sequence of (str, Estimate or None, Estimate or None)
         Of each band along sharp edges: its distances in mm, depth per hour and, after half an
-        hour, the radius of the edge, both in micrometres.
+        hour, the radius of the edge, both in micrometres; None where there is no surface.
     edge_length_m : float
     facets : DataFrame
         ``area_m2``, ``immersed``, and of the patch of each facet the depth of removal per time
@@ -160,13 +138,13 @@ class RemovalOfCase:
         Mean depth over the immersed surface and mass loss per process time, and the coefficient.
     variation : (float, float)
         Coefficient of variation of the depth over the immersed area, and that without the scatter.
-    percentiles_um_h : (float, float)
-        Depths below which 5 % and 95 % of the immersed area stay.
+    wears : sequence of Wear
+        Of the packings.
     """
 
     removal: Removal
     fit: TrialsFit | None
-    edges: Sequence[tuple[str, Estimate, Estimate]]
+    edges: Sequence[tuple[str, Estimate | None, Estimate | None]]
     edge_length_m: float
     facets: pd.DataFrame
     impact_share: Estimate
@@ -174,15 +152,42 @@ class RemovalOfCase:
     mass_mg_h: Parted
     coefficient_m2_n: Parted
     variation: tuple[float, float]
-    percentiles_um_h: tuple[float, float]
+    wears: Sequence[Wear]
+
+    @cached_property
+    def spread(self) -> MapSpread:
+        """The spread of the depth over the immersed area, relative to its mean."""
+        own = np.flatnonzero(self.wears[0].immersed)
+        each = ([one.patch_w_m2, one.patch_se_w_m2] for one in self.wears)
+        values, errors = np.swapaxes(np.array(list(each))[..., own], 0, 1)
+        areas, patch = np.array(self.wears[0].area_m2), np.array(self.wears[0].patch)
+        return map_spread(values, errors, areas[own], patch[own])
+
+    @property
+    def percentiles_um_h(self) -> tuple[Estimate, Estimate]:
+        """Depths below which 5 % and 95 % of the immersed area stay; NaN if not available."""
+        mean, half = self.depth_um_h.value, self.depth_um_h.combined.relative_half_width
+        low, high = (
+            Estimate(
+                mean * one.value,
+                mean * max(0.0, one.value - math.hypot(one.value - one.ci95_low, half * one.value)),
+                mean * (one.value + math.hypot(one.ci95_high - one.value, half * one.value)),
+            )
+            for one in self.spread.percentiles
+        )
+        return low, high
 
     @property
     def minutes(self) -> Mapping[str, Estimate]:
-        """Minutes to the target depth, on average and where it takes longest."""
-        target_um, mean = 1e6 * (self.removal.target_depth_m or 0.0), self.depth_um_h
-        slow = mean.times(self.percentiles_um_h[0] / mean.value)
-        found = {"mean depth": mean, "95 % of the immersed area": slow}
-        return {name: _time_to(target_um, one.combined) for name, one in found.items() if target_um}
+        """Minutes to the target depth, on average and where it takes longest; NaN if not known."""
+        target_um = 1e6 * (self.removal.target_depth_m or 0.0)
+        if not target_um:
+            return {}
+        found = {
+            "mean depth": self.depth_um_h.combined,
+            "95 % of the immersed area": self.percentiles_um_h[0],
+        }
+        return {name: _time_to(target_um, one) for name, one in found.items()}
 
 
 def _time_to(depth_um: float, um_h: Estimate) -> Estimate:
@@ -218,9 +223,9 @@ def removal_of(case: ReportedCase) -> RemovalOfCase | None:
     between = len(wears) > 1 and not load.corrected
     degrees = len(wears) - 1 if between else math.inf
     coefficient, rate = predict(removal, action, density, degrees)
-    facets = _facets(wears, coefficient.value * factor, rate.coefficient)
+    facets = _facets(wears, coefficient.value * factor, rate)
     own = facets[facets["immersed"]]
-    _, variation, ends = depth_spread(own)
+    _, variation = depth_spread(own)
     removed = facets["depth_m_s"] * facets["area_m2"]
     share = float(removed[facets["immersed"]].sum() / removed.sum())
     edges = wears[0].edges
@@ -240,26 +245,30 @@ def removal_of(case: ReportedCase) -> RemovalOfCase | None:
         mass_mg_h=rate.times(UM_PER_H * density),
         coefficient_m2_n=coefficient,
         variation=variation,
-        percentiles_um_h=ends,
+        wears=wears,
     )
 
 
-def depth_spread(facets: pd.DataFrame) -> tuple[float, tuple[float, float], tuple[float, float]]:
-    """Mean depth over facets, um/h, coefficients of variation and percentiles (`RemovalOfCase`)."""
+def depth_spread(facets: pd.DataFrame) -> tuple[float, tuple[float, float]]:
+    """Mean depth over facets, um/h, and coefficients of variation (`RemovalOfCase`)."""
     depth, error, area = facets[["depth_m_s", "depth_m_s_se", "area_m2"]].to_numpy(np.float64).T
     mean = float(np.average(depth, weights=area))
     square, scatter = (float(np.average(x**2, weights=area)) for x in (depth - mean, error))
-    low, high = np.quantile(UM_PER_H * depth, (0.05, 0.95), weights=area, method="inverted_cdf")
     variation = (math.sqrt(square) / mean, math.sqrt(max(0.0, square - scatter)) / mean)
-    return UM_PER_H * mean, variation, (float(low), float(high))
+    return UM_PER_H * mean, variation
 
 
-def _facets(wears: Sequence[Wear], scale: float, uncertainty: float) -> pd.DataFrame:
-    """The map of the depth of removal per time; see `RemovalOfCase`."""
+def _facets(wears: Sequence[Wear], scale: float, rate: Parted) -> pd.DataFrame:
+    """The map of the depth of removal per time; see `RemovalOfCase` and `edge_rows`."""
     found = [np.array([one.patch_w_m2, one.patch_se_w_m2]) for one in wears]
     densities, errors = scale * np.swapaxes(found, 0, 1)
     mean, error, degrees = patch_means(densities, errors)
-    half = joined_half_width(student_quantile(degrees) * error, mean * uncertainty, degrees)
+    half = joined_half_width(
+        student_quantile(degrees) * error,
+        mean * rate.coefficient,
+        degrees,
+        rate.coefficient_degrees,
+    )
     columns = {
         "area_m2": wears[0].area_m2,
         "immersed": wears[0].immersed,
@@ -277,30 +286,36 @@ def _over_packings(values: Sequence[Estimate]) -> Estimate:
 
 def edge_rows(
     wears: Sequence[Wear], scale: float, rate: Parted
-) -> list[tuple[str, Estimate, Estimate]]:
-    """The bands along sharp edges; see `RemovalOfCase`.
+) -> list[tuple[str, Estimate | None, Estimate | None]]:
+    """The bands along sharp edges but the last; see `RemovalOfCase`.
 
-    By volume balance, all removal nearer to the edge than the far side of a band rounds it: an edge
-    of the interior angle b with the radius r lacks ``r^2 (1/tan(b/2) - (pi - b)/2)``. `scale` is
-    the removed volume per action, m2/N, and the uncertainty of the coefficient that of `rate`.
+    By volume balance, what is removed nearer to the edge than the far side of a band beyond the
+    depth of the next band rounds it: an edge of the interior angle b with the radius r lacks
+    ``r^2 (1/tan(b/2) - (pi - b)/2)``. Where that is not significantly above zero, the radius is an
+    upper limit: its interval starts at zero. `scale` is the removed volume per action, m2/N, and
+    the uncertainty of the coefficient that of `rate`.
     """
-    found, several = list[tuple[str, Estimate, Estimate]](), [one.edges for one in wears]
-    if (edges := several[0]) is None:
-        return found
+    bands = [one.edges for one in wears if one.edges]
+    if not bands:
+        return []
+    edges, degrees = bands[0], len(bands) - 1 or math.inf
 
-    def removed(bands: str, band: int) -> Parted:
-        own = _over_packings([getattr(one, bands).at(band) for one in several if one])
-        half = own.relative_half_width if own.value else 0.0
-        return Parted(scale * own.value, half, *rate[2:])
+    def removed(columns: str, band: int, per: float) -> Estimate | None:
+        own = _over_packings([getattr(one, columns).at(band) for one in bands])
+        if not per or math.isnan(own.value):
+            return None
+        known = abs(own.value) * rate.coefficient
+        half = joined_half_width(own.half_width, known, degrees, rate.coefficient_degrees)
+        return Estimate.around(own.value, float(half)).over(per / scale)
 
     lacks = 1 / math.tan(edges.angle_rad / 2) - (math.pi - edges.angle_rad) / 2
-    for band, (near, far) in enumerate(pairwise(edges.distance_m)):
-        depth = removed("action_w", band).times(UM_PER_H / edges.area_m2[band]).combined
-        rounded = removed("within_w", band).times(_ROUNDED_S / edges.length_m / lacks).combined
-        ends = (rounded.value, rounded.ci95_low, rounded.ci95_high)
-        radius = Estimate(*(1e6 * math.sqrt(one) for one in ends))
-        found.append((f"{1e3 * near:.2g} to {1e3 * far:.2g}", depth, radius))
-    return found
+    rows = list[tuple[str, Estimate | None, Estimate | None]]()
+    for band, (near, far) in enumerate(pairwise(edges.distance_m[:-1])):
+        depth = removed("action_w", band, edges.area_m2[band] / UM_PER_H)
+        square = removed("excess_w", band, edges.length_m * lacks / _ROUNDED_S)
+        radius = square.mapped(lambda one: 1e6 * math.sqrt(max(one, 0.0))) if square else None
+        rows.append((f"{1e3 * near:.2g} to {1e3 * far:.2g}", depth, radius))
+    return rows
 
 
 def touches_per_s(case: ReportedCase) -> tuple[int, Estimate]:

@@ -26,6 +26,7 @@ from dragchain.drag import (
 from dragchain.errors import SeriesError
 from dragchain.figures.network_picture import NetworkScene, load_scene
 from dragchain.figures.rendering import check_rendering
+from dragchain.loading.samples import SPHERES
 from dragchain.report.findings import (
     FILE,
     AheadBehind,
@@ -170,13 +171,16 @@ def process_findings(run: RunData) -> ProcessFindings:
     forces = summarise_forces(samples)
     if turning:
         forces[TORQUE] = estimate_mean(_own_torque(samples, run.case))
-    frame, frames, contacts = _workpiece_contacts(run, samples)
+    frame, frames, contacts = whole = _workpiece_contacts(run, samples)
+    at, _, loads = _workpiece_contacts(run, samples, SPHERES) if run.case.bodies else whole
     names = [one.name for one in run.case.classes]
-    azimuth, depth, force = (
-        contacts[name].to_numpy(np.float64) for name in ("azimuth_rad", "depth_m", "normal_force_n")
-    )
-    edges, around = azimuth_profile(frame, frames, azimuth, force)
+    depth, force = (contacts[name].to_numpy(np.float64) for name in ("depth_m", "normal_force_n"))
+    load, azimuth = (loads[name].to_numpy(np.float64) for name in ("normal_force_n", "azimuth_rad"))
+    edges, around = azimuth_profile(at, frames, azimuth, load)
     levels, contact, line = depth_profile(frame, frames, depth, force)
+    if run.case.bodies:  # a force per contact is that of a body, a sum that of its spheres
+        deep = loads["depth_m"].to_numpy(np.float64)
+        _, _, line = depth_profile(at, frames, deep, load, edges_m=levels)
     return ProcessFindings(
         run=run.case.run,
         process_time_zero_s=drag_start_s(run.case),
@@ -187,7 +191,7 @@ def process_findings(run: RunData) -> ProcessFindings:
         chains=_chains(run.chains, len(run.network)),
         confidence=CONFIDENCE,
         workpiece_frames=frames,
-        ahead_behind=AheadBehind(**ahead_behind(frame, frames, azimuth, force)),
+        ahead_behind=AheadBehind(**ahead_behind(at, frames, azimuth, load)),
         azimuth=AzimuthProfile(edges_rad=tuple(edges.tolist()), force_n=EstimateColumns.of(around)),
         depth=DepthProfile(
             edges_m=tuple(levels.tolist()),
@@ -197,7 +201,16 @@ def process_findings(run: RunData) -> ProcessFindings:
         ),
         wake=_wake(samples, run.case),
         segregation=_segregation(run) if names else {},
-        by_class=of_classes(names, frame, frames, contacts) if names else {},
+        by_class={
+            name: one._replace(load_fraction=part.load_fraction)
+            for (name, one), part in zip(
+                of_classes(names, frame, frames, contacts).items(),
+                of_classes(names, at, frames, loads).values(),
+                strict=True,
+            )
+        }
+        if names
+        else {},
     )
 
 
@@ -310,11 +323,13 @@ def _chains(chains: pd.DataFrame, frames: int) -> Chains:
     )
 
 
-def _workpiece_contacts(run: RunData, samples: pd.DataFrame) -> tuple[Ints, int, pd.DataFrame]:
+def _workpiece_contacts(
+    run: RunData, samples: pd.DataFrame, table: str = "workpiece_contacts"
+) -> tuple[Ints, int, pd.DataFrame]:
     """Frame of each counted contact, number of frames (those without contact too), contacts."""
     columns = ["step", "azimuth_rad", "depth_m", "normal_force_n", "in_statistics"]
     columns += ["class"] if run.case.classes else []
-    contacts = run.table("workpiece_contacts", columns)
+    contacts = run.table(table, columns)
     contacts = contacts[contacts["in_statistics"]]
     output = load_outputs(run.folder)["workpiece_contacts"]
     counted = samples["step"].to_numpy(np.int64)

@@ -28,6 +28,7 @@ from dragchain.report.summary import summary
 from dragchain.run.case import upstream_folders
 from dragchain.run.workpiece import read_surface
 from dragchain.statistics.correlated import RELIABLE_TIMES
+from dragchain.statistics.noisy_map import LARGEST_ERROR
 from dragchain.tables.network_contacts import Corrections
 from dragdeck.errors import DragdeckError
 from dragdeck.files import write_bytes
@@ -343,6 +344,7 @@ def _render(
         reliable_times=RELIABLE_TIMES,
         asked=[(one, answer) for one in cases for answer in answers(one)],
         removed=removed,
+        largest_error=LARGEST_ERROR,
         touched=[(one, rows, *touches_per_s(one)) for one in cases if (rows := touch_rows(one))],
     )
 

@@ -92,7 +92,7 @@ def quantity_of(measure: SearchedMeasure, run_dir: Path) -> float:
         own = own[((height >= low) & (height < high))[own.index]]
     if own.empty or not own["depth_m_s"].any():
         return math.nan
-    depth, variation, _ = depth_spread(own)
+    depth, variation = depth_spread(own)
     return depth if name == "removal_depth" else variation[1]
 
 

@@ -83,10 +83,15 @@ class Bodies:
             removed_n=_sum(at, rows.removed_n, len(first)),
         )
 
+    def of_spheres(self, contacts: WallContacts) -> WallContacts:
+        """Contacts of spheres with a wall under the ids of their bodies."""
+        return replace(contacts, particle_id=self.case.body_of(contacts.particle_id))
+
     def wall(self, contacts: WallContacts, at: Ints) -> tuple[WallContacts, Ints]:
         """Contacts of spheres with a wall at their steps as those of bodies; see `network`.
 
-        Point, facet and surface velocity are those of the contact with the largest normal force.
+        They tell how many there are; what is summed over contacts is of `of_spheres`. Point, facet
+        and surface velocity are those of the contact with the largest normal force.
         """
         body = self.case.body_of(contacts.particle_id)
         first, group = _groups(np.column_stack([at, body]))

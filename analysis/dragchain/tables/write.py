@@ -2,6 +2,7 @@
 
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, TypeVar
@@ -194,16 +195,19 @@ class WorkpieceSamples:
 
 
 def _write_workpiece_contacts(run: Run, file: Path) -> None:
-    shared = run.case.bowl.walls == "mesh"
+    shared, bodies = run.case.bowl.walls == "mesh", Bodies(run.case)
     closure = Closure(limit=SHARED_LIMIT if shared else LIMIT)
     samples = WorkpieceSamples(run.prints("workpiece_force"))
-    with table_writer(file, _contact_names(run.case)) as table:
+    with ExitStack() as stack:
+        files = (file, *([run.table("sphere_contacts.parquet")] if bodies else ()))
+        names = _contact_names(run.case)
+        tables = [stack.enter_context(table_writer(one, names)) for one in files]
         for frames in run.workpiece_frames():
             force, place = samples.at(frames.step)
-            contacts, at = _of_bodies(run.case, frames)
-            rows = workpiece_contact_rows(frames.step[at], contacts, place[at], run.case)
             used = closure.add(frames, force, counted_mask(frames.step, run.case))
-            table.write({**rows, "in_statistics": rows["in_statistics"] & used[at]})
+            for table, (contacts, at) in zip(tables, _contacts(bodies, frames), strict=False):
+                rows = workpiece_contact_rows(frames.step[at], contacts, place[at], run.case)
+                table.write({**rows, "in_statistics": rows["in_statistics"] & used[at]})
         closure.record().write(run.table("closure.json"))
         if (problem := closure.problem()) is not None:
             raise RejectedRunError(
@@ -216,7 +220,7 @@ def _write_touches(run: Run, file: Path) -> None:
     samples = WorkpieceSamples(run.prints("workpiece_force"))
     with table_writer(file, _contact_names(run.case)) as table:
         for frames in run.workpiece_frames(TOUCHES):
-            contacts, at = _of_bodies(run.case, frames)
+            *_, (contacts, at) = _contacts(Bodies(run.case), frames)
             steps = frames.step[at]
             place = samples.places_between(steps)
             table.write(workpiece_contact_rows(steps, contacts, place, run.case))
@@ -227,10 +231,13 @@ def _contact_names(case: CaseOfRun) -> tuple[str, ...]:
     return _with_classes(own, "workpiece_contacts", case)
 
 
-def _of_bodies(case: CaseOfRun, frames: WorkpieceFrames) -> tuple[WallContacts, Ints]:
-    """Contacts of particles with the workpiece and their frames: of bodies, if they are clumps."""
-    contacts, at, bodies = frames.workpiece, frames.workpiece_at, Bodies(case)
-    return bodies.wall(contacts, at) if bodies else (contacts, at)
+def _contacts(bodies: Bodies, frames: WorkpieceFrames) -> Iterator[tuple[WallContacts, Ints]]:
+    """Contacts of particles with the workpiece and their frames; of clumps also of spheres."""
+    contacts, at = frames.workpiece, frames.workpiece_at
+    if bodies:
+        yield bodies.wall(contacts, at)
+        contacts = bodies.of_spheres(contacts)
+    yield contacts, at
 
 
 def workpiece_contact_rows(

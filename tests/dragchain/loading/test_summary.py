@@ -119,6 +119,48 @@ def test_a_gap_of_one_sample_ends_a_stay_and_a_change_of_facet_does_not(run: Pat
     np.testing.assert_array_equal(events["particle_id"].to_numpy()[event], rows["particle_id"])
 
 
+CLUMP = {
+    "first_id": 1, "count": 2, "first_sphere": 1, "radius_m": 3e-3, "mass_kg": 1e-3,
+    "radii_m": [2e-3] * 3, "offsets_m": [[0, 0, 0], [2e-3, 0, 0], [0, 2e-3, 0]],
+    "inertia_kg_m2": [1e-9] * 3,
+}  # fmt: skip
+
+
+def test_the_spheres_of_a_clump_add_up_and_count_once(tmp_path: Path) -> None:
+    """Three slide under 1, 2 and 3 N in directions whose friction forces cancel in their sum."""
+    ways = [(1.0, 0.0), (-0.5, 3**0.5 / 2), (-0.5, -(3**0.5) / 2)]
+    load = [1.0, 2.0, 3.0]
+    spheres, bodies = [], []
+    for frame in range(20, 60):
+        for (y, z), force in zip(ways, load, strict=True):
+            place = (0.001 * y, 0.005 + 0.001 * z)
+            pushed = (-force, MU * force * y, MU * force * z)
+            spheres.append(contact(frame, 1, place, pushed, (0.04 * y, 0.04 * z)))
+        bodies.append(contact(frame, 1, place, (-6.0, -0.5 * MU, 0.0), (0.04 * y, 0.04 * z)))
+    folder = write_run(tmp_path / "run", bodies)
+    pd.DataFrame(spheres).to_parquet(folder / "tables/sphere_contacts.parquet")
+    (folder / "case.json").write_text(json.dumps(case_json() | {"bodies": [CLUMP]}))
+    made = compute_loading(folder)
+    way = 40 * 0.04 * DT
+    wanted = {
+        "normal_impulse_n_s": 40 * 6.0 * DT, "tangential_impulse_n_s": 40 * 6.0 * MU * DT,
+        "relative_path_m": 3 * way, "sliding_m": 3 * way, "force_slide_n_m": 6.0 * way,
+        "friction_work_j": 6.0 * MU * way,
+    }  # fmt: skip
+    for name, total in wanted.items():
+        assert made.summary.totals[name] == pytest.approx(total)
+        assert made.events[name].sum() == pytest.approx(total)
+        assert made.facets[name].sum() == pytest.approx(total)
+    assert made.summary.load_while_sliding_fraction.value == pytest.approx(1.0)
+    assert made.summary.mean_contacts.value == pytest.approx(40 / FRAMES)
+    assert made.facets["samples"].sum() == 40
+    (event,) = made.events.to_dict("records")
+    assert (event["samples"], event["mobilised_fraction"]) == (40, 1.0)
+    assert event["peak_normal_force_n"] == pytest.approx(6.0)
+    # the strongest sphere slides and stays where it is on the plate: 2 by the mean of the surfaces
+    assert (event["type"], event["slide_to_roll"]) == ("sliding", pytest.approx(2.0, rel=0.05))
+
+
 def test_a_particle_with_two_contacts_has_one_stay_with_the_sum_of_both(tmp_path: Path) -> None:
     both = [
         row
@@ -243,7 +285,7 @@ def test_longer_impacts_count_as_impacts_when_asked(run: Path, events: pd.DataFr
     case = load_case(run)
     times = 0.1 / surfaces(case).contact_time_s
     limits = Thresholds(impact_times=times * 1.001)
-    kinds = event_types(events, case, DT, limits)
+    kinds = event_types(events.assign(slid_m=events["sliding_m"]), case, DT, limits)
     assert kinds.tolist() == ["rolling", "sliding", "impact", "impact", "impact"]
 
 

@@ -9,27 +9,30 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+import trimesh
 from loading_files import PLATE, made_contacts, write_run
 from loading_files import case_json as contact_case
 from report_files import PICTURES, case_json, make_run, page_of, process_findings, write_quantities
 
 from dragchain.errors import TableError
+from dragchain.loading.contact_events import POINT
 from dragchain.loading.document import Loading
-from dragchain.loading.edges import EdgeBands
+from dragchain.loading.edges import EdgeBands, edge_bands
+from dragchain.loading.samples import Sampled
 from dragchain.loading.wear import Wear
 from dragchain.loading.write import write_loading
 from dragchain.report.removal import (
     Parted,
     edge_rows,
-    fit_trials,
     joined_half_width,
     patch_means,
     predict,
     touches_per_s,
 )
 from dragchain.report.study_report import write_study_report
+from dragchain.run.workpiece import Surface
 from dragchain.statistics.estimate import Estimate, EstimateColumns, student_quantile
-from dragdeck.study.removal import Removal
+from dragdeck.study.removal import Removal, disagreements, fit_trials
 
 GIVEN = {"coefficient_m2_n": 2e-11, "sd_m2_n": 1e-12, "target_depth_m": 1e-6}
 TRIAL = {"mass_loss_kg": 2e-5, "time_s": 3600.0, "sd_kg": 1e-6}
@@ -74,16 +77,22 @@ def test_the_joint_interval_of_few_packings_covers(packings: int) -> None:
     assert (off < joined_half_width(scatter, Z * known, degrees)).mean() > 0.94
 
 
-@pytest.mark.parametrize(("off", "birge"), [(0.5, 1.0), (6.0, 6.0)])
+@pytest.mark.parametrize(("off", "birge"), [(0.01, 0.6745), (0.5, 0.5), (6.0, 6.0)])
 def test_several_trials_are_fitted_through_the_origin(off: float, birge: float) -> None:
     """Of two equal trials that are off by as many standard uncertainties, up and down."""
-    sd = 1e-6
+    sd, t = 1e-6, 12.706205
     trials = [TRIAL | {"mass_loss_kg": 2e-5 + sign * off * sd / math.sqrt(2)} for sign in (1, -1)]
-    fit = fit_trials(Removal(calibrate=trials))
+    removal = Removal(calibrate=trials)
+    fit = fit_trials(removal)
     assert fit is not None
     assert fit.rate_kg_s == pytest.approx(2e-5 / 3600)
     assert fit.residuals == pytest.approx([off / math.sqrt(2), -off / math.sqrt(2)])
-    assert fit.half == pytest.approx(Z * birge * 0.05 / math.sqrt(2))
+    quantile = 1.0 if off == 0.01 else t  # at least the 50 % interval by the uncertainties
+    _, rate = predict(removal, LOAD, 7800.0)
+    assert rate.coefficient == pytest.approx(quantile * birge * 0.05 / math.sqrt(2))
+    assert (fit.degrees, rate.coefficient_degrees) == (1, 1)
+    said = " ".join(disagreements(removal))
+    assert "trial 1 is +4.24 sd_kg off the fit" in said if off > 2 else not said
 
 
 def test_longer_and_better_trials_count_more() -> None:
@@ -107,31 +116,77 @@ def test_patches_have_the_scatter_between_packings_or_else_over_time() -> None:
     assert degrees == 8
 
 
+def bands(area: list[float], action: list[float], excess: list[Estimate], angle: float) -> Wear:
+    """Bands of 1 mm along 80 mm of edges."""
+    edges = EdgeBands(
+        length_m=0.08, angle_rad=angle, area_m2=tuple(area),
+        distance_m=tuple(1e-3 * at for at in range(len(area) + 1)),
+        action_w=EstimateColumns.of([Estimate.around(one, 0.1 * one) for one in action]),
+        excess_w=EstimateColumns.of(excess),
+    )  # fmt: skip
+    return Wear.model_construct(edges=edges)
+
+
+COEFFICIENT = Parted(math.nan, 0.0, 0.2)
+
+
 @pytest.mark.parametrize("degrees", [60.0, 90.0, 140.0])
-def test_what_is_removed_near_an_edge_rounds_it(degrees: float) -> None:
+def test_what_an_edge_loses_beyond_its_faces_rounds_it(degrees: float) -> None:
     """An arc that is tangent to both faces lacks as much as was removed in half an hour."""
     angle, length, k = math.radians(degrees), 0.08, 1e-12
-    bands = [Estimate(3.0, 2.7, 3.3), Estimate(5.0, 4.5, 5.5)]
-    edges = EdgeBands(
-        length_m=length, angle_rad=angle, distance_m=(0.0, 1e-3, 2e-3), area_m2=(1e-4, 2e-4),
-        action_w=EstimateColumns.of(bands),
-        within_w=EstimateColumns.of([bands[0], Estimate(8.0, 7.2, 8.8)]),
-    )  # fmt: skip
-    rows = edge_rows([Wear.model_construct(edges=edges)], k, Parted(math.nan, 0.0, 0.2))
+    excess = [Estimate(1.5, 1.2, 1.8), Estimate(2.0, 1.7, 2.3)]
+    wear = bands([1e-4, 1e-4, 2e-4], [3.0, 2.0, 3.0], excess, angle)
+    rows = edge_rows([wear], k, COEFFICIENT)
     assert [name for name, _, _ in rows] == ["0 to 1", "1 to 2"]
-    for (_, depth, radius), action, within, area in zip(
-        rows, (3, 5), (3, 8), (1e-4, 2e-4), strict=True
-    ):
-        assert depth.value == pytest.approx(3600e6 * k * action / area)
+    for (_, depth, radius), action, beyond in zip(rows, (3, 2), (1.5, 2), strict=True):
+        assert depth is not None and radius is not None
+        assert depth.value == pytest.approx(3600e6 * k * action / 1e-4)
+        assert depth.relative_half_width == pytest.approx(math.hypot(0.1, 0.2), rel=1e-5)
         r, half = 1e-6 * radius.value, (math.pi - angle) / 2
         at = np.linspace(-half, half, 20_001)
         x = np.r_[0.0, r / math.sin(angle / 2) - r * np.cos(at)]  # the corner, and the arc
         y = np.r_[0.0, r * np.sin(at)]
         lacks = abs(np.dot(x, np.roll(y, 1)) - np.dot(y, np.roll(x, 1))) / 2
-        assert lacks * length == pytest.approx(k * within * 1800, rel=1e-6)
-        low, high = ((1 + side * math.hypot(0.1, 0.2)) ** 0.5 for side in (-1, 1))
+        assert lacks * length == pytest.approx(k * beyond * 1800, rel=1e-6)
+        low, high = ((1 + side * math.hypot(0.3 / beyond, 0.2)) ** 0.5 for side in (-1, 1))
         found = (radius.ci95_low / radius.value, radius.ci95_high / radius.value)
         assert found == pytest.approx((low, high), rel=1e-5)
+
+
+def test_an_edge_that_loses_no_more_than_its_faces_has_an_upper_limit() -> None:
+    excess = [Estimate(0.1, -0.2, 0.4), Estimate(-0.5, -0.7, -0.3), Estimate(*[math.nan] * 3)]
+    wear = bands([1e-4] * 3 + [0.0], [1.0] * 3 + [0.0], excess, math.pi / 2)
+    slight, less, unknown = (radius for *_, radius in edge_rows([wear], 1e-12, COEFFICIENT))
+    assert slight is not None and less is not None and unknown is None
+    assert 0.0 == slight.ci95_low < slight.value < slight.ci95_high
+    assert (less.value, less.ci95_low, less.ci95_high) == (0.0, 0.0, 0.0)
+
+
+def test_even_removal_leaves_an_edge_sharp() -> None:
+    """Contacts strewn evenly over a cube; then as many again on a line near its edges."""
+    random, even, line = np.random.default_rng(5), list[Wear](), list[Wear]()
+    cube = trimesh.creation.box((0.02,) * 3).subdivide().triangles
+    for wears, extra, packings in ((even, 0, 2), (line, 3000, 1)):
+        for _ in range(packings):
+            face, side, at = random.integers(3, size=8000), random.choice([-0.01, 0.01], 8000), 8000
+            points = random.uniform(-0.01, 0.01, (8000, 3))
+            points[np.arange(at), face] = side
+            points[:extra, :] = 0.01 * random.choice([-1, 1], (extra, 3))
+            points[np.arange(extra), face[:extra]] = random.uniform(-0.01, 0.01, extra)
+            rows = pd.DataFrame(points, columns=POINT).assign(
+                frame=random.integers(200, size=8000), force_slide_n_m=random.exponential(size=8000)
+            )
+            sampled = Sampled(rows, 200, 1e-3, 1.0, np.zeros(3))
+            edges = edge_bands(sampled, Surface(cube), 1.0, 3e-3, 1e-3)
+            wears.append(Wear.model_construct(edges=edges))
+    coefficient = 1e-12
+    for wears, total in ((even, 0.0), (line, 3000.0)):
+        for _, _, radius in edge_rows(wears, coefficient, Parted(1.0, 0.0, 0.0)):
+            volume = coefficient * total / 0.2 * 1800
+            true = 1e6 * math.sqrt(volume / (0.24 * (1 - math.pi / 4)))
+            assert radius is not None
+            assert radius.ci95_low <= true <= radius.ci95_high
+            assert (radius.ci95_low == 0.0) == (total == 0.0)
 
 
 # --- report --------------------------------------------------------------------------------------

@@ -17,6 +17,7 @@ from dragdeck.study.base import Json, Model, flat
 from dragdeck.study.model import BUILT_IN_FIDELITIES, AnyPath, Fidelity, Scaling, Study, Tolerance
 from dragdeck.study.plausible import implausible
 from dragdeck.study.recorded import Places, mesh_errors, recorded_file, with_recording
+from dragdeck.study.removal import disagreements
 from dragdeck.study.search import Search
 from dragdeck.study.workpiece import CylinderShape, Shape
 from dragdeck.study.yaml import located, shown
@@ -391,6 +392,8 @@ def warnings(study: Study) -> list[Caution]:
             f"timestep_fraction: {draft.timestep_fraction:g} to it"
         )
         found.append(Caution("fidelity", text))
+    if study.removal:
+        found += [Caution("trials", text) for text in disagreements(study.removal)]
     return found
 
 

@@ -5,9 +5,9 @@ times a coefficient in m2/N it is the removed volume. Laws add up: ``archard+oka
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,6 +98,79 @@ class Removal(Model):
     def laws(self) -> Sequence["Law"]:
         """The laws that are added up."""
         return [LAWS[part] for part in self.law.split("+")]
+
+
+class TrialsFit(NamedTuple):
+    """Mass loss per time from weighed trials, by weighted least squares through the origin.
+
+    Attributes
+    ----------
+    rate_kg_s, error : float
+        Slope, and its relative standard error.
+    degrees : float
+        Degrees of freedom of the error: one less than there are trials, infinite for one trial.
+    residuals : sequence of float
+        Measured minus fitted mass loss of each trial in its standard uncertainties.
+    """
+
+    rate_kg_s: float
+    error: float
+    degrees: float
+    residuals: Sequence[float]
+
+    @property
+    def disagreement(self) -> float:
+        """Probability of at least such a scatter if the uncertainties are the only cause."""
+        from scipy.special import chdtrc
+
+        square = math.fsum(one**2 for one in self.residuals)
+        return float(chdtrc(self.degrees, square)) if math.isfinite(self.degrees) else 1.0
+
+    @property
+    def disagrees(self) -> bool:
+        """Whether the trials scatter significantly beyond their uncertainties."""
+        return self.disagreement < 0.05
+
+
+_PROBABLE_ERROR = 0.6745
+"""Half-width of a normal interval of 50 %, in standard errors."""
+
+
+def fit_trials(removal: Removal) -> TrialsFit | None:
+    """The fit to the trials of a study, None if its coefficient is given.
+
+    The uncertainties give the weights, and the error of a single trial. That of several is
+    estimated from their scatter, times Birge's ratio (1932), so that whatever varies from trial to
+    trial is in it. Trials that agree by chance would have none: the interval of Student's t is at
+    least the 50 % interval by the uncertainties alone.
+    """
+    from scipy.special import stdtrit
+
+    if removal.calibrate is None:
+        return None
+    trials = [(one.mass_loss_kg, one.time_s, one.sd_kg) for one in removal.calibrate]
+    mass, time, sd = np.array(trials).T
+    information = float(((time / sd) ** 2).sum())
+    rate = float((mass * time / sd**2).sum()) / information
+    residuals = (mass - rate * time) / sd
+    error, degrees = 1 / math.sqrt(information) / rate, len(trials) - 1
+    if degrees:
+        birge = math.sqrt(float((residuals**2).sum()) / degrees)
+        error *= max(birge, _PROBABLE_ERROR / float(stdtrit(degrees, 0.975)))
+    return TrialsFit(rate, error, degrees or math.inf, residuals.tolist())
+
+
+def disagreements(removal: Removal) -> Iterator[str]:
+    """What to say of trials that scatter beyond their uncertainties."""
+    fit = fit_trials(removal)
+    if fit is not None and fit.disagrees:
+        worst = max(range(len(fit.residuals)), key=lambda at: abs(fit.residuals[at]))
+        yield (
+            f"removal.calibrate: the {len(fit.residuals)} trials scatter more than their sd_kg "
+            f"(p = {fit.disagreement:.2g}); trial {worst + 1} is {fit.residuals[worst]:+.3g} sd_kg "
+            "off the fit. The interval of the coefficient follows from the scatter; weigh again, "
+            "leave a faulty trial out, or add trials"
+        )
 
 
 # --- laws ----------------------------------------------------------------------------------------
