@@ -242,3 +242,38 @@ def test_a_changed_study_counts_its_own_particles(small: Small, write_study: Wri
     assert study.particle_count == 300
     changed = study.model_copy(update={"media": study.media.model_copy(update={"count": 7})})
     assert changed.particle_count == 7
+
+
+def _size_warnings(small: Small, write_study: Write, ratio: float, **frictions: float) -> list[str]:
+    """Warnings about the ratio of two sizes of ceramic particles, with other frictions."""
+    names = ("ceramic-ceramic", "ceramic-steel")
+    asked = zip(names, (frictions["media"], frictions["wall"]), strict=True)
+    pairs = {name: small["pairs"][name] | {"friction": friction} for name, friction in asked}
+    both = {name: {"material": "ceramic", "fraction": 0.5, "radius_mean_m": radius}
+            for name, radius in (("coarse", 3e-3), ("fine", 3e-3 / ratio))}  # fmt: skip
+    study = small | {"media": {"mass_kg": 0.01, "classes": both}, "pairs": pairs}
+    (case,) = load_cases(write_study(study))
+    return [str(one) for one in filling_cautions(case) if one.code == "size_ratio"]
+
+
+@pytest.mark.parametrize(
+    ("ratio", "media", "wall", "said"),
+    [
+        (12.6, 0.34, 0.28, "not measured"),  # 1 / 0.28^2 = 12.8
+        (12.9, 0.34, 0.28, "the bowl"),
+        (8.7, 0.34, 0.5, "the bowl"),  # the smaller friction counts: 1 / 0.34^2 = 8.65
+        (8.5, 0.34, 0.5, "not measured"),
+        (17.7, 0.34, 0.0, "not measured"),  # 1 / (sqrt(1 + 0.34^2) - 1) = 17.8
+        (18.0, 0.34, 0.0, "another large one"),
+        (2.5, 1.0, 0.0, "another large one"),
+        (2.3, 1.0, 0.0, ""),
+        (1.4, 1.0, 1.0, ""),  # stayed nowhere
+        (1.6, 1.0, 1.0, "the bowl"),
+        (5.9, 0.34, 0.28, ""),
+    ],
+)
+def test_a_size_ratio_at_which_friction_holds_small_particles_is_named(
+    ratio: float, media: float, wall: float, said: str, small: Small, write_study: Write
+) -> None:
+    found = _size_warnings(small, write_study, ratio, media=media, wall=wall)
+    assert len(found) == bool(said) and all(said in text for text in found)

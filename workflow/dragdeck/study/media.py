@@ -33,8 +33,7 @@ MOST_SIZES = 5
 _LEVELS = 4096
 """Quantiles from which the moments of a distribution are computed."""
 
-MOST_SIEVES = 100
-
+MOST_SIEVES = MOST_CLASSES = 100
 
 _SIZES = ("radius_mean_m", "radius_std_m", "distribution")
 
@@ -114,6 +113,18 @@ class Grains(Model):
         assert self.radius_mean_m is not None
         return quantiles(self.distribution, self.radius_mean_m, self.radius_std_m, count)
 
+    def most_numerous(self) -> str:
+        """The sieves between which most particles are, in words; empty without a sieve analysis."""
+        if self.sieve is None:
+            return ""
+        number = _numbers(self.sieve)[1]
+        at = int(number.argmax())
+        (low, below), (high, above) = self.sieve[at : at + 2]
+        return (
+            f", {100 * number[at] / number.sum():.3g} % of these between the sieves of {low:g} and "
+            f"{high:g} m ({100 * (above - below):.3g} % of their mass)"
+        )
+
     @property
     def mean_volume_m3(self) -> float:
         """Mean volume of a particle, m3."""
@@ -178,15 +189,20 @@ def _log_normal(mean_m: float, std_m: float, count: int) -> Array:
 _SPREAD = {"normal": _normal, "uniform": _uniform, "log_normal": _log_normal}
 
 
+def _numbers(rows: Sequence[Sieve]) -> tuple[Array, Array]:
+    """``1 / d^2`` of sieves, and what is proportional to the numbers between each and the next."""
+    diameter, passing = np.array(rows, dtype=np.float64).T
+    inverse = diameter**-2
+    return inverse, np.diff(passing) / np.diff(diameter) * (inverse[:-1] - inverse[1:])
+
+
 def _sieved(rows: Sequence[Sieve], count: int) -> Array:
     """Radii whose mass follows a sieve analysis.
 
     Between two sieves a and b the mass is uniform in the diameter d, so that the number density
     goes as ``1 / d^3`` and the number finer than d as ``1 / a^2 - 1 / d^2``.
     """
-    diameter, passing = np.array(rows, dtype=np.float64).T
-    inverse = diameter**-2
-    number = np.diff(passing) / np.diff(diameter) * (inverse[:-1] - inverse[1:])
+    inverse, number = _numbers(rows)
     finer = np.concatenate([[0.0], np.cumsum(number)])
     level = finer[-1] * (np.arange(count) + 0.5) / count
     at = np.searchsorted(finer, level, side="right") - 1
@@ -219,6 +235,7 @@ class Media(Grains):
     )
     classes: dict[Name, MediaClass] = Field(
         default_factory=dict,
+        max_length=MOST_CLASSES,
         description="several classes by name, each with material, sizes and fraction, instead of "
         "material and sizes here",
         exclude_if=lambda value: not value,
