@@ -10,6 +10,7 @@ tilted and left to rest. A run that is there already is not repeated.
 
 import argparse
 import math
+import re
 import shutil
 import subprocess
 import sys
@@ -21,7 +22,7 @@ import numpy as np
 import pandas as pd
 from scipy.spatial import cKDTree
 
-from dragdeck.physics.contact_mechanics import rayleigh_time
+from dragdeck.physics.contact_mechanics import effective_modulus, rayleigh_time, wedge_ratio
 from dragdeck.physics.packing import pour
 from dragdeck.study.workpiece import Material
 
@@ -39,7 +40,11 @@ _ROLL_S = 0.4
 """Time in a groove, s: without friction's help a particle has left it after a third."""
 
 _BOWL_M, _SMALL_SHARE, _MOST_SMALL = 0.018, 0.1, 700
-"""Radius of the bowl, and volume of the small particles over that of all, of a bed."""
+"""Radius of the bowl, and volume of the small particles over that of all, and largest number of
+small particles, of a bed."""
+
+_TILTS = ((0, 0), (1, 0), (0, 1), (-1, 0), (0, -1), (0, 0))
+"""Horizontal directions of gravity, one after the other."""
 
 _HEAD = """units si
 atom_style granular
@@ -149,7 +154,8 @@ def groove(
     left = int(np.argmin(touching)) if not touching.all() else len(touching)
     return {
         "ratio": ratio, "friction": friction, "timestep_fraction": fraction,
-        "youngs_modulus_scale": scale, "left": int(left < len(touching)),
+        "youngs_modulus_scale": scale,
+        "wedged": int(ratio > wedge_ratio(friction, wall)), "left": int(left < len(touching)),
         "last_angle_deg": angle[max(left - 1, 0)],
         "inwards": inwards[:left].max(),
         "inwards_at_60_deg": np.interp(60, angle[:left], inwards[:left]),
@@ -158,57 +164,56 @@ def groove(
 
 def bed(
     folder: Path, ratio: float, friction: float, fraction: float, seed: int
-) -> tuple[dict[str, float], np.ndarray]:
-    """A bed of two sizes: filled, tilted by 45 degrees four times, at rest; and its overlaps.
+) -> dict[str, float]:
+    """A bed of two sizes: filled, tilted by 45 degrees four times, and at rest.
 
-    Returns
-    -------
-    dict
-    (N,) array
-        Largest overlap of each small particle that touches one, over its radius.
+    A small particle counts as trapped if a force on it exceeds the largest between two large
+    particles, which carry the load of the bed.
     """
     large, small = LARGE_M, LARGE_M / ratio
     n_large = min(120, round(_MOST_SMALL * (1 - _SMALL_SHARE) / _SMALL_SHARE / ratio**3))
     n_small = max(1, round(n_large * ratio**3 * _SMALL_SHARE / (1 - _SMALL_SHARE)))
     particles = pour([np.full(n_large, large), np.full(n_small, small)], _BOWL_M, seed)
-    top = max(0.2, particles.top_m)
     script, dt = _script(small, 1e-3, fraction, friction)
     script += _WALL.format(name="floor", where="zplane 0.0")
     script += _WALL.format(name="side", where=f"zcylinder {_BOWL_M} 0.0 0.0")
     tilts = []
-    ways = [(0, 0), (1, 0), (0, 1), (-1, 0), (0, -1), (0, 0)]
-    for (x, y), seconds in zip(ways, (0.25, *4 * (0.08,), 0.35), strict=True):
+    for (x, y), seconds in zip(_TILTS, (0.25, *4 * (0.08,), 0.35), strict=True):
         tilts.append(f"fix gravity all gravity 9.81 vector {x} {y} -1")
-        tilts.append(f"run {round(seconds / dt)}")
-        tilts.append("unfix gravity")
+        tilts += [f"run {round(seconds / dt)}", "unfix gravity"]
     script += _BED.format(every=max(1, round(0.01 / dt)), tilts="\n".join(tilts))
     rows = np.column_stack([2 * particles.radii_m, particles.positions_m]).tolist()
-    run(folder, script, rows, top)
+    run(folder, script, rows, max(0.2, particles.top_m))
     last = np.loadtxt(folder / "bed.txt", skiprows=9)
     places, radii = last[:, 1:4], last[:, 4]
     pairs = cKDTree(places).query_pairs(2 * radii.max(), output_type="ndarray")
     gaps = np.linalg.norm(places[pairs[:, 0]] - places[pairs[:, 1]], axis=1)
     overlap = radii[pairs].sum(axis=1) - gaps
     pairs, overlap = pairs[overlap > 0], overlap[overlap > 0]
-    deepest = np.zeros(len(radii))
+    modulus = effective_modulus(CERAMIC, CERAMIC, 1e-3)
+    force = 4 / 3 * modulus * np.sqrt(1 / (1 / radii[pairs]).sum(axis=1)) * overlap**1.5
+    of_large = (radii[pairs] > 0.99 * large).all(axis=1)
+    strongest, deepest = np.zeros(len(radii)), np.zeros(len(radii))
     for side in (0, 1):
+        np.maximum.at(strongest, pairs[:, side], force)
         np.maximum.at(deepest, pairs[:, side], overlap)
-    is_small = radii < 0.99 * large
-    of_small = deepest[is_small & (deepest > 0)] / small
-    of_large = deepest[~is_small] / large
-    energies = [
-        float(line.split()[1])
-        for line in (folder / "log").read_text(encoding="utf-8").splitlines()
-        if len(line.split()) == 2 and line.split()[0].isdigit()
-    ]
+    loaded = (radii < 0.99 * large) & (strongest > 0)
+    thermo = re.findall(
+        r"^ *\d+ +([\d.e+-]+) *$", (folder / "log").read_text("utf-8"), re.MULTILINE
+    )
     weight = CERAMIC.density_kg_m3 * 4 / 3 * math.pi * (radii**3).sum() * GRAVITY * 2 * small
     return {
-        "ratio": ratio, "friction": friction, "timestep_fraction": fraction, "seed": seed,
-        "large": n_large, "small": n_small, "kinetic_energy_ratio": energies[-1] / weight,
-        "small_touching": len(of_small),
-        **{f"small_overlap_p{level:g}": np.percentile(of_small, level) for level in (50, 90, 99)},
-        "small_overlap_most": of_small.max(), "large_overlap_most": of_large.max(),
-    }, of_small  # fmt: skip
+        "ratio": ratio, "friction": friction, "timestep_fraction": fraction,
+        "large": n_large, "small": n_small, "loaded": int(loaded.sum()),
+        "trapped": int((strongest[loaded] > force[of_large].max()).sum()),
+        "force_most": strongest[loaded].max() / force[of_large].max(),
+        **{
+            f"overlap_p{level}": np.percentile(deepest[loaded], level) / (2 * small)
+            for level in (50, 99, 100)
+        },
+        "overlap_of_large_most": overlap[of_large].max() / (2 * large),
+        "kinetic_energy_ratio": float(thermo[-1]) / weight,
+    }  # fmt: skip
 
 
 def grooves(folder: Path, wall: bool) -> Iterator[dict[str, float]]:
@@ -223,18 +228,11 @@ def grooves(folder: Path, wall: bool) -> Iterator[dict[str, float]]:
 
 
 def beds(folder: Path) -> Iterator[dict[str, float]]:
-    """All beds; small particles count as trapped beyond the overlaps at the shorter step."""
-    for friction, ratio, seed in product((0.34, 1.0), RATIOS, (1,)):
-        made = {
-            fraction: bed(
-                folder / f"bed-{ratio:g}-{friction:g}-{fraction:g}-{seed}",
-                ratio, friction, fraction, seed,
-            )
-            for fraction in FRACTIONS
-        }  # fmt: skip
-        most = np.percentile(made[min(FRACTIONS)][1], 99)
-        for row, overlaps in made.values():
-            yield {**row, "small_beyond": int((overlaps > most).sum())}
+    """All beds at the long step; those with the largest ratio also at the short one."""
+    points = [*product(RATIOS, (0.34, 1.0), FRACTIONS[1:]), (RATIOS[-1], 1.0, FRACTIONS[0])]
+    for ratio, friction, fraction in points:
+        name = f"bed-{ratio:g}-{friction:g}-{fraction:g}"
+        yield bed(folder / name, ratio, friction, fraction, 1)
 
 
 def main() -> int:
@@ -248,7 +246,10 @@ def main() -> int:
         ("groove_wall", grooves(asked.folder, wall=True)),
         ("mixed_beds", beds(asked.folder)),
     ):
-        pd.DataFrame(rows).to_csv(asked.out / f"{name}.csv", index=False, float_format="%.4g")
+        table = []
+        for row in rows:
+            table.append(row)
+            pd.DataFrame(table).to_csv(asked.out / f"{name}.csv", index=False, float_format="%.4g")
     return 0
 
 

@@ -9,7 +9,7 @@ ordinary fillings; the same command resumes an interrupted measurement.
 
 import argparse
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ import numpy as np
 import pandas as pd
 
 from dragchain.tables.write import write_tables
-from dragdeck.cases.bed import bed_classes, bed_radii
+from dragdeck.cases.bed import bed_classes, bed_radii, bed_volume, expected_surface
 from dragdeck.cases.case import Case
 from dragdeck.command_line import guarded
 from dragdeck.decks.templates import environment
@@ -78,33 +78,27 @@ def _classes(ratio: float, fine: float) -> dict[str, Any]:
 
 def media() -> Iterator[tuple[str, dict[str, Any], dict[str, Any]]]:
     """Name, `media` and other fields of each bed."""
-    yield "sphere", dict(_MEAN), {}
     for name, shape in _SHAPES.items():
-        yield name, {**_MEAN, "shape": shape}, {}
-    for spread in (0.1, 0.2, 0.3):
-        yield "sphere", {**_MEAN, "radius_std_m": spread * _RADIUS_M}, {}
-    for ratio, fine in ((1.5, 0.3), (2.0, 0.3), (3.0, 0.1), (3.0, 0.3)):
-        yield "sphere", _classes(ratio, fine), {}
-    for friction in (0.1, 0.7):
-        for name in (None, "tetrahedron"):
-            body = {"shape": _SHAPES[name]} if name else {}
-            yield name or "sphere", {**_MEAN, **body}, {"pairs.ceramic-ceramic.friction": friction}
-    yield "sphere", dict(_MEAN), {"bowl.radius_m": 12 * _RADIUS_M}
+        yield name, {**_MEAN, "shape": shape, "count": _COUNT_OF_CLUMPS}, {}
+    spheres = {**_MEAN, "count": _COUNT}
+    mass = 2656 * 4 / 3 * np.pi * _RADIUS_M**3 * _COUNT
+    for seed in (1, 2):
+        for spread in (0.0, 0.1, 0.2):
+            yield "sphere", {**spheres, "radius_std_m": spread * _RADIUS_M}, {"seed": seed}
+        for ratio in (1.5, 2.0):
+            yield "sphere", {**_classes(ratio, 0.3), "mass_kg": mass}, {"seed": seed}
+        for friction in (0.1, 0.7):
+            fields = {"pairs.ceramic-ceramic.friction": friction, "seed": seed}
+            yield "sphere", dict(spheres), fields
+    yield "sphere", {**spheres, "count": 3 * _COUNT}, {"bowl.radius_m": 12 * _RADIUS_M}
+    yield "sphere", {**_classes(3.0, 0.3), "mass_kg": mass}, {}
 
 
-def cases(seeds: Sequence[int]) -> Iterator[tuple[str, Case]]:
+def cases() -> Iterator[tuple[str, Case]]:
     """Shape and case of each packing."""
-    for seed in seeds:
-        for name, own, others in media():
-            count = _COUNT if name == "sphere" else _COUNT_OF_CLUMPS
-            if "classes" in own:
-                own["mass_kg"] = 2656 * 4 / 3 * np.pi * _RADIUS_M**3 * count
-            else:
-                own["count"] = count
-            if "bowl.radius_m" in others:
-                own["count"] = 3 * count
-            values = {**others, "seed": seed}
-            yield name, settle_case(Path("study.yaml"), {**_STUDY, "media": own}, values)
+    for name, own, others in media():
+        values = {"seed": 1, **others}
+        yield name, settle_case(Path("study.yaml"), {**_STUDY, "media": own}, values)
 
 
 def row(shape: str, case: Case, bed: Packing) -> dict[str, Any]:
@@ -124,13 +118,14 @@ def row(shape: str, case: Case, bed: Packing) -> dict[str, Any]:
         "seed": study.seed,
         "bed_height_m": bed.bed_height_m,
         "solid_fraction": bed.solid_fraction,
+        "expected": bed_volume(study) / expected_surface(study) / np.pi / study.bowl.radius_m**2,
     }
 
 
-def measure(out: Path, folder: Path, seeds: Sequence[int]) -> None:
+def measure(out: Path, folder: Path) -> None:
     """Make the beds that are missing, and write the record."""
     batch, rows = Batch(folder, environment(find_project(Path.cwd()).templates)), []
-    for shape, case in cases(seeds):
+    for shape, case in cases():
         run = FILLING.run_id(case)
         file = folder / run / "tables" / "packing.json"
         if not file.is_file():
@@ -146,9 +141,8 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("out", type=Path)
     parser.add_argument("--folder", type=Path, default=Path("results/solid_fraction"))
-    parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2])
     asked = parser.parse_args()
-    return guarded("solid_fraction", partial(measure, asked.out, asked.folder, asked.seeds))
+    return guarded("solid_fraction", partial(measure, asked.out, asked.folder))
 
 
 if __name__ == "__main__":

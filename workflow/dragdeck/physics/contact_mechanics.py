@@ -22,9 +22,6 @@ Size = TypeVar("Size", float, NDArray[np.float64])
 COORDINATION_ESTIMATE = 5.0
 """Contacts of a particle in a poured bed with friction, an estimate used only for expectations."""
 
-DENSEST_RANDOM_PACKING = 0.64
-"""Random close packing of equal particles (Scott and Kilgour 1969, 0.6366)."""
-
 
 @dataclass(frozen=True)
 class Elastic:

@@ -20,6 +20,7 @@ from dragdeck.cases.bed import (
     bed_volume,
     body_sizes,
     buoyancy_density,
+    expected_surface,
     farthest_point,
     media_classes,
     outrun,
@@ -34,8 +35,6 @@ from dragdeck.decks import outputs
 from dragdeck.decks.deck import Body, Deck, LeftOut, Scene, data_file
 from dragdeck.errors import Caution, InputError
 from dragdeck.physics.contact_mechanics import (
-    DENSEST_RANDOM_PACKING,
-    bed_height,
     bed_overlap,
     bed_pressure,
     effective_modulus,
@@ -65,7 +64,7 @@ from dragdeck.scenes.scene import (
 from dragdeck.study.base import Json
 from dragdeck.study.media import MOST_SIZES, Media
 from dragdeck.study.model import Study
-from dragdeck.study.shapes import SOLID_FRACTION_ESTIMATE
+from dragdeck.study.shapes import SOLID_FRACTION_STD
 
 _CHECK_INTERVAL_S = 0.02
 """Time between two looks at the kinetic energy, about the fall over one particle."""
@@ -231,25 +230,24 @@ def _first_particles(
 
 
 def _check_capacity(case: Case) -> None:
-    """Refuse more particles than the bowl can hold.
+    """Refuse more particles than the bowl is sure to hold.
 
     Raises
     ------
     InputError
-        Even the densest random packing would stand above the rim.
+        The highest particle may lie above the rim.
     """
-    study = case.study
-    bowl = study.bowl
-    height = _height(study, DENSEST_RANDOM_PACKING)
-    if height > bowl.height_m:
-        most = math.floor(study.particle_count * bowl.height_m / height)
+    study, bed = case.study, expected_bed(case.study)
+    rim, over = study.bowl.height_m, bed.top_m - bed.surface_m
+    if bed.top_m + bed.margin_m > rim:
+        most = max(0, math.floor(study.particle_count * (rim - over) / bed.highest_m))
         raise InputError(
             "more particles than fit into the bowl",
             file=case.file,
             field="media.count",
-            value=f"{study.particle_count}, which fill it to at least {height:.4g} m",
-            limit=f"{most} particles in a bowl {bowl.height_m:g} m high, at a solid fraction of "
-            f"{DENSEST_RANDOM_PACKING} (random close packing)",
+            value=f"{study.particle_count}, which fill it to {bed.surface_m:.4g} m +- "
+            f"{bed.margin_m:.2g} m, with a particle on top",
+            limit=f"{most} particles in a bowl {rim:g} m high",
             remedy="use fewer particles, or a wider or higher bowl",
         )
 
@@ -279,20 +277,11 @@ def _check_cells(case: Case) -> None:
         )
 
 
-def expected_surface(study: Study) -> float:
-    """Height of the settled bed before it exists, m: an estimate."""
-    return _height(study, SOLID_FRACTION_ESTIMATE)
-
-
 def expected_bed(study: Study) -> Bed:
-    """The settled bed before it exists: an estimate."""
+    """The settled bed before it exists: an estimate with a margin of two standard deviations."""
     surface = expected_surface(study)
-    return Bed(surface, surface + 2 * study.media.typical_radius_m)
-
-
-def _height(study: Study, solid_fraction: float) -> float:
-    """Height of the study's particles in its bowl at a solid fraction, m."""
-    return bed_height(bed_volume(study), study.bowl.radius_m, solid_fraction)
+    top = surface + 2 * study.media.typical_radius_m
+    return Bed(surface, top, 2 * SOLID_FRACTION_STD * surface)
 
 
 def box_top(study: Study) -> float:

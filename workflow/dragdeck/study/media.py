@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from dragdeck.study.base import MaterialName, Model, Name, NonNegative, Number, Positive, Whole
-from dragdeck.study.shapes import FEWEST_SPHERES, SOLID_FRACTION_ESTIMATE, AnyShape
+from dragdeck.study.shapes import FEWEST_SPHERES, AnyShape, solid_fraction
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -30,7 +30,7 @@ _LARGEST_SPREAD = 0.3
 MOST_SIZES = 5
 """Sizes of a class among media of which some are no spheres: LIGGGHTS inserts each by itself."""
 
-_LEVELS = 4096
+LEVELS = 4096
 """Quantiles from which the moments of a distribution are computed."""
 
 MOST_SIEVES = MOST_CLASSES = 100
@@ -128,7 +128,7 @@ class Grains(Model):
     @property
     def mean_volume_m3(self) -> float:
         """Mean volume of a particle, m3."""
-        return float(4 / 3 * math.pi * (self.radii(_LEVELS) ** 3).mean())
+        return float(4 / 3 * math.pi * (self.radii(LEVELS) ** 3).mean())
 
 
 def _check_sieve(rows: Sequence[Sieve]) -> None:
@@ -290,19 +290,33 @@ class Media(Grains):
         main = self.main
         if main.radius_mean_m is not None:
             return main.radius_mean_m
-        sizes = main.radii(_LEVELS)
+        sizes = main.radii(LEVELS)
         return float((sizes**3).sum() / (sizes**2).sum())
 
     @property
     def typical_std_m(self) -> float:
         """Standard deviation of the radii of the first class, m."""
         main = self.main
-        return main.radius_std_m if main.sieve is None else float(main.radii(_LEVELS).std())
+        return main.radius_std_m if main.sieve is None else float(main.radii(LEVELS).std())
 
     @property
     def clumped(self) -> bool:
         """Whether some particles are no spheres; then all are clumps."""
         return any(part.shape is not None for part in self.parts.values())
+
+    def solid_fraction(self, radii_m: Array, numbers: Array) -> float:
+        """That of a poured bed, an estimate.
+
+        Parameters
+        ----------
+        radii_m, numbers : (N,) array
+            Class by class, each with as many entries.
+        """
+        parts = list(self.parts.values())
+        denser = [part.shape.denser if part.shape else 1.0 for part in parts]
+        volumes = np.array_split(numbers * radii_m**3, len(parts))
+        whole = float(np.average(denser, weights=[one.sum() for one in volumes]))
+        return solid_fraction(radii_m, numbers, whole)
 
     def spheres_of(self, part: Grains) -> int:
         """Spheres of which a particle of a class consists in LIGGGHTS."""
@@ -343,8 +357,13 @@ def class_counts(
     else:
         weight = volume if media.mass_kg is None else mass
         of_all = sum(number * weight[name] for name, number in by_number.items())
-        solid = SOLID_FRACTION_ESTIMATE * bowl_area_m2 * (media.fill_height_m or 0.0)
-        scale = (solid if media.mass_kg is None else media.mass_kg) / of_all
+        total = media.mass_kg
+        if media.fill_height_m is not None:
+            radii = np.concatenate([part.radii(LEVELS) for part in media.parts.values()])
+            numbers = np.repeat(list(by_number.values()), LEVELS)
+            total = media.fill_height_m * bowl_area_m2 * media.solid_fraction(radii, numbers)
+        assert total is not None
+        scale = total / of_all
     return _whole_numbers({name: scale * number for name, number in by_number.items()})
 
 
