@@ -18,7 +18,7 @@ import numpy as np
 import pandas as pd
 
 from dragchain.tables.write import write_tables
-from dragdeck.cases.bed import bed_classes, bed_radii, bed_volume, expected_surface
+from dragdeck.cases.bed import bed_radii, bed_volume, expected_surface
 from dragdeck.cases.case import Case
 from dragdeck.command_line import guarded
 from dragdeck.decks.templates import environment
@@ -105,15 +105,12 @@ def row(shape: str, case: Case, bed: Packing) -> dict[str, Any]:
     """A packing of the record."""
     study, radii = case.study, bed_radii(case.study)
     around = (radii - radii.mean()) / radii.mean()
-    clump = bed_classes(study)[0].clump
     return {
         "shape": shape,
         "spread": around.std(),
-        "skewed": (around**3).mean(),
         "size_ratio": radii.max() / radii.min(),
-        "reach": clump.reach,
         "friction": study.pairs["ceramic-ceramic"].friction,
-        "bowl_to_particle": study.bowl.radius_m / radii.mean(),
+        "bowl_m": study.bowl.radius_m,
         "particles": len(radii),
         "seed": study.seed,
         "bed_height_m": bed.bed_height_m,

@@ -24,16 +24,14 @@ SOLID_FRACTION_STD = 0.03
 """Standard deviation of measured solid fractions over those of `solid_fraction`, less 1
 (docs/data/scenes/solid_fraction.csv)."""
 
-_ONE_SIZE = 0.05
-"""Spread up to which particles count as of about one size."""
+_ONE_SIZE, _WIDEST, _BY_SPREAD = 0.05, 0.47, (0.23, 0.55)
+"""Spread of the radii (standard deviation over mean) up to which particles count as of about one
+size; the widest that was measured; parts by which the solid fraction grows with what the spread is
+above the former, and with its square."""
 
 
 def solid_fraction(radii_m: Corners, numbers: Corners, denser: float) -> float:
-    """Solid fraction of a poured bed before it exists.
-
-    The spread of the sizes adds the part ``(0.0658 d + 0.0857 S d^2) / 0.634`` to it: d is the
-    standard deviation of the radii over their mean, S their skewness (Desmond and Weeks 2014,
-    Physical Review E 90, 022204, for random close packings).
+    """Solid fraction of a poured bed before it exists, from docs/data/scenes/solid_fraction.csv.
 
     Parameters
     ----------
@@ -43,13 +41,10 @@ def solid_fraction(radii_m: Corners, numbers: Corners, denser: float) -> float:
         Solid fraction of the shapes over that of spheres.
     """
     mean = np.average(radii_m, weights=numbers)
-    away = radii_m / mean - 1
-    squares, cubes = (float(np.average(away**power, weights=numbers)) for power in (2, 3))
-    spread = math.sqrt(squares)
-    if spread <= _ONE_SIZE * (1 + 1e-9):
-        return SOLID_FRACTION_ESTIMATE * denser
-    added = 0.0658 * (spread - _ONE_SIZE) + 0.0857 * cubes / spread
-    return SOLID_FRACTION_ESTIMATE * denser * (1 + max(0.0, added) / 0.634)
+    spread = math.sqrt(np.average((radii_m / mean - 1) ** 2, weights=numbers))
+    wider = min(max(spread, _ONE_SIZE), _WIDEST) - _ONE_SIZE
+    growth = _BY_SPREAD[0] * wider + _BY_SPREAD[1] * wider**2
+    return SOLID_FRACTION_ESTIMATE * denser * (1 + growth)
 
 
 FEWEST_SPHERES, MOST_SPHERES = 2, 40
@@ -78,7 +73,7 @@ class ParticleShape(Model):
         was measured, the mean of all shapes (docs/data/scenes/solid_fraction.csv).
     """
 
-    denser: ClassVar[float] = 1.05
+    denser: ClassVar[float] = 1.04
 
     spheres: Annotated[Whole, Field(ge=FEWEST_SPHERES, le=MOST_SPHERES)] = Field(
         description="number of spheres; `dragdeck shapes` lists the errors"
@@ -99,7 +94,7 @@ def _ring(height: float, cut: float = 0.0) -> Corners:
 class CylinderParticle(ParticleShape):
     """A cylinder, its ends straight or cut at an angle."""
 
-    denser: ClassVar[float] = 1.07
+    denser: ClassVar[float] = 1.06
 
     kind: Literal["cylinder"] = Field(description="cylinder with straight ends, or cut at an angle")
     aspect: _Aspect = Field(description="length / diameter")
@@ -132,7 +127,7 @@ class ConeParticle(ParticleShape):
 class TetrahedronParticle(ParticleShape):
     """A regular tetrahedron."""
 
-    denser: ClassVar[float] = 1.02
+    denser: ClassVar[float] = 1.01
 
     kind: Literal["tetrahedron"] = Field(description="regular tetrahedron")
 
@@ -144,7 +139,7 @@ class TetrahedronParticle(ParticleShape):
 class PrismParticle(ParticleShape):
     """A straight prism on an equilateral triangle."""
 
-    denser: ClassVar[float] = 1.02
+    denser: ClassVar[float] = 1.01
 
     kind: Literal["triangular_prism"] = Field(
         description="straight prism on an equilateral triangle"
