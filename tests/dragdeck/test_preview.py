@@ -11,6 +11,7 @@ from made_study import Load, Made
 from matplotlib.colors import to_rgb
 from PIL import Image
 
+from dragdeck.cases.bed import expected_surface
 from dragdeck.cases.case import Case
 from dragdeck.cli import main
 from dragdeck.errors import InputError
@@ -19,7 +20,6 @@ from dragdeck.mesh.shapes import cylinder, prism
 from dragdeck.preview.layout import COLOURS, CaseLayout, layout
 from dragdeck.preview.swept import swept_volume
 from dragdeck.project import Project
-from dragdeck.scenes.filling import expected_surface
 from dragdeck.scenes.workpiece import check_fit, clearances
 
 BAR = {"workpiece.shape": {"kind": "mesh", "file": "bar.stl", "unit": "m"}}

@@ -34,6 +34,7 @@ from dragdeck.decks.templates import environment
 from dragdeck.engine.batch import Batch
 from dragdeck.engine.process import LAUNCHER_VARIABLE, find_engine
 from dragdeck.engine.reports import say
+from dragdeck.engine.space import check_amount
 from dragdeck.errors import DragdeckError, InputError, choices, together
 from dragdeck.files import write_bytes
 from dragdeck.outlook.explain import expected_cost, explanation, measured_speeds, show
@@ -45,7 +46,7 @@ from dragdeck.outlook.process import (
     not_corrected,
     workpiece_notes,
 )
-from dragdeck.outlook.runs import expected_runs, plan_in_words
+from dragdeck.outlook.runs import expected_runs, plan_in_words, written
 from dragdeck.outlook.timestep import stable_step_cautions, stable_step_note, timestep_notes
 from dragdeck.physics.packing import Bed
 from dragdeck.preview.layout import CaseLayout, layout
@@ -205,6 +206,7 @@ def _built(kind: SceneType, case: Case, bed: Bed | None) -> StudyScene:
         if not kind.single_particle and LAUNCHER_VARIABLE not in os.environ:
             check_ranks(case.ranks, case.file)
         scene = kind.build(case, bed)
+        check_amount(*written(kind, scene))
     except InputError as error:
         error.file = error.file or case.file
         raise located(error) from None

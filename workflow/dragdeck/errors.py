@@ -181,6 +181,7 @@ CautionCode = Literal[
     "mesh",
     "overlap",
     "ranks",
+    "size_ratio",
     "skin",
     "stable_timestep",
     "steps_per_contact",

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from dragchain.run.run_parts import iter_frames
-from dragdeck.cases.bed import tip_pressure
+from dragdeck.cases.bed import expected_surface, tip_pressure
 from dragdeck.cases.case import Case
 from dragdeck.decks.deck import Body, Liquid, data_file
 from dragdeck.decks.outputs import load_outputs
@@ -26,7 +26,7 @@ from dragdeck.physics.contact_mechanics import fall_energy
 from dragdeck.physics.packing import Bed
 from dragdeck.project import Project
 from dragdeck.scenes.drop_test import DROP_TEST
-from dragdeck.scenes.filling import FILLING, expected_surface, filling_scene, floor_overlap
+from dragdeck.scenes.filling import FILLING, filling_scene, floor_overlap
 from dragdeck.scenes.process import PROCESS, process_scene
 from dragdeck.scenes.workpiece import describe, workpiece_buoyancy
 from dragdeck.study.contact_law import Pair

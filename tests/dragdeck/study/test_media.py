@@ -1,27 +1,38 @@
 """The media: sizes come out as asked, totals are met, and what cannot be is refused."""
 
 import math
+import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
+import pandas as pd
 import pytest
 import yaml
 from made_scenes import rendered
+from paths import ROOT
 from pydantic import ValidationError
 
 from dragchain import write_tables
-from dragdeck.cases.bed import bed_classes, bed_density, bed_radii, bed_rayleigh_time
+from dragdeck.cases.bed import (
+    bed_classes,
+    bed_density,
+    bed_radii,
+    bed_rayleigh_time,
+    expected_surface,
+    farthest_point,
+)
 from dragdeck.engine.run_folder import run
 from dragdeck.errors import InputError
 from dragdeck.physics.contact_mechanics import rayleigh_time
+from dragdeck.physics.packing import Bed
 from dragdeck.project import Project
 from dragdeck.records.packing import Packing
-from dragdeck.scenes.filling import filling_cautions, filling_scene, first_particles
+from dragdeck.scenes.filling import expected_bed, filling_cautions, filling_scene, first_particles
 from dragdeck.scenes.process import process_scene
 from dragdeck.study.media import Grains
-from dragdeck.study.shapes import SOLID_FRACTION_ESTIMATE
+from dragdeck.study.shapes import SOLID_FRACTION_STD, AnyShape, ParticleShape, solid_fraction
 from dragdeck.sweep.cases import load_cases
 
 Small = dict[str, Any]
@@ -107,7 +118,7 @@ def test_asked_fractions_and_totals_are_obtained(
     amounts = {"number": np.array([len(one.radii_m) for one in classes]), "mass": mass}
     amount = amounts.get(fractions_of, volume)
     assert amount / amount.sum() == pytest.approx([0.7, 0.3], abs=2e-3)
-    height = volume.sum() / SOLID_FRACTION_ESTIMATE / (math.pi * study.bowl.radius_m**2)
+    height = expected_surface(study)
     got = {"count": study.particle_count, "mass_kg": mass.sum(), "fill_height_m": height}
     ((name, asked),) = ((name, value) for name, value in total.items() if value)
     assert got[name] == pytest.approx(asked, rel=2e-3)
@@ -134,7 +145,7 @@ def test_every_particle_has_the_density_and_the_type_of_its_class(
 
 def test_pairs_of_all_materials_are_in_the_script(small: Small, write_study: Write) -> None:
     (case,) = load_cases(write_study(mixed(small)))
-    law = process_scene(case).deck.materials.law
+    law = process_scene(case, Bed(0.022, 0.026)).deck.materials.law
     restitution = next(table for table in law.tables if table.name == "restitution").values
     known = small["pairs"]
     both = [known["ceramic-ceramic"]["restitution"], known["ceramic-steel"]["restitution"]]
@@ -242,3 +253,140 @@ def test_a_changed_study_counts_its_own_particles(small: Small, write_study: Wri
     assert study.particle_count == 300
     changed = study.model_copy(update={"media": study.media.model_copy(update={"count": 7})})
     assert changed.particle_count == 7
+
+
+def _size_warnings(small: Small, write_study: Write, ratio: float, **frictions: float) -> list[str]:
+    """Warnings about the ratio of two sizes of ceramic particles, with other frictions."""
+    names = ("ceramic-ceramic", "ceramic-steel")
+    asked = zip(names, (frictions["media"], frictions["wall"]), strict=True)
+    pairs = {name: small["pairs"][name] | {"friction": friction} for name, friction in asked}
+    both = {name: {"material": "ceramic", "fraction": 0.5, "radius_mean_m": radius}
+            for name, radius in (("coarse", 3e-3), ("fine", 3e-3 / ratio))}  # fmt: skip
+    study = small | {"media": {"mass_kg": 0.01, "classes": both}, "pairs": pairs}
+    (case,) = load_cases(write_study(study))
+    return [str(one) for one in filling_cautions(case) if one.code == "size_ratio"]
+
+
+@pytest.mark.parametrize(
+    ("ratio", "media", "wall", "said"),
+    [
+        (12.6, 0.34, 0.28, "not measured"),  # 1 / 0.28^2 = 12.8
+        (12.9, 0.34, 0.28, "the bowl"),
+        (8.7, 0.34, 0.5, "the bowl"),  # the smaller friction counts: 1 / 0.34^2 = 8.65
+        (8.5, 0.34, 0.5, "not measured"),
+        (17.7, 0.34, 0.0, "not measured"),  # 1 / (sqrt(1 + 0.34^2) - 1) = 17.8
+        (18.0, 0.34, 0.0, "another large one"),
+        (2.5, 1.0, 0.0, "another large one"),
+        (2.3, 1.0, 0.0, ""),
+        (1.4, 1.0, 1.0, ""),  # stayed nowhere
+        (1.6, 1.0, 1.0, "the bowl"),
+        (5.9, 0.34, 0.28, ""),
+    ],
+)
+def test_a_size_ratio_at_which_friction_holds_small_particles_is_named(
+    ratio: float, media: float, wall: float, said: str, small: Small, write_study: Write
+) -> None:
+    found = _size_warnings(small, write_study, ratio, media=media, wall=wall)
+    assert len(found) == bool(said) and all(said in text for text in found)
+
+
+RECORD = ROOT / "docs/data/scenes/solid_fraction.csv"
+
+
+def test_measured_beds_are_within_the_margin_of_what_is_expected() -> None:
+    """The factors of the shapes and the margin are those of the record."""
+    beds = pd.read_csv(RECORD)
+    narrow = beds[beds.bowl_m < 0.03]
+    ones = narrow.query("shape == 'sphere' and spread < 0.15 and friction == 0.34")
+    spheres = ones.solid_fraction.mean()
+    kinds = {get_args(kind.model_fields["kind"].annotation)[0]: kind
+             for kind in get_args(get_args(AnyShape)[0])}  # fmt: skip
+    bodies = beds[beds["shape"] != "sphere"]
+    by_kind = bodies.solid_fraction.groupby(bodies["shape"].str.split(r"[ ,]").str[0]).mean()
+    for name, solid in by_kind.items():
+        kind = kinds["triangular_prism" if name == "prism" else str(name)]
+        assert kind.denser == pytest.approx(solid / spheres, abs=0.006)
+    assert ParticleShape.denser == pytest.approx((by_kind / spheres).mean(), abs=0.006)
+    several = narrow.query("shape == 'sphere' and spread > 0 and friction == 0.34")
+    wider = several.spread - 0.05
+    growth = several.solid_fraction / spheres - 1 - 0.23 * wider - 0.55 * wider**2
+    assert growth.abs().max() < 0.02
+    ratio = beds.solid_fraction / beds.expected
+    assert ratio.std() <= SOLID_FRACTION_STD
+    assert (ratio - 1).abs().max() < 2 * SOLID_FRACTION_STD
+
+
+def test_a_depth_that_fits_the_lowest_expected_bed_is_accepted_and_no_deeper_one(
+    small: Small, write_study: Write
+) -> None:
+    (case,) = load_cases(write_study(small))
+    bed, largest = expected_bed(case.study), 2 * farthest_point(case.study)
+    assert bed.margin_m == pytest.approx(2 * SOLID_FRACTION_STD * bed.surface_m)
+    for deeper_m in (-1e-5, 1e-5):
+        small["motion"]["immersion_depth_m"] = bed.lowest_m - largest + deeper_m
+        (case,) = load_cases(write_study(small))
+        if deeper_m < 0:
+            process_scene(case)
+            continue
+        with pytest.raises(InputError, match="crush particles"):
+            process_scene(case)
+        process_scene(case, Bed(bed.surface_m, bed.top_m))  # obtained as expected
+
+
+@pytest.mark.parametrize("shape", [None, {"kind": "cylinder", "aspect": 1.2, "spheres": 4}])
+def test_a_bed_that_may_reach_above_the_rim_is_refused(
+    shape: Any, small: Small, write_study: Write
+) -> None:
+    """Even where the expected surface is below it; the number in the message is accepted."""
+    small["media"] |= {"radius_std_m": 0.0, "shape": shape}
+    (case,) = load_cases(write_study(small))
+    bed = expected_bed(case.study)
+    for rim in (bed.top_m + bed.margin_m + 1e-5, bed.top_m):
+        small["bowl"]["height_m"] = rim
+        (case,) = load_cases(write_study(small))
+        if rim > bed.top_m:
+            filling_scene(case)
+    with pytest.raises(InputError, match="more particles than fit") as caught:
+        filling_scene(case)
+    most = re.match(r"(\d+) particles", caught.value.limit or "")
+    assert most
+    small["media"]["count"] = int(most[1])
+    filling_scene(load_cases(write_study(small))[0])
+    small["media"]["count"] = int(most[1]) + 1
+    with pytest.raises(InputError, match="more particles than fit"):
+        filling_scene(load_cases(write_study(small))[0])
+
+
+@pytest.mark.parametrize(("height_m", "refused"), [(0.1, False), (0.1001, True), (9.0, True)])
+def test_a_fill_height_above_the_rim_is_refused(
+    height_m: float, refused: bool, small: Small, write_study: Write
+) -> None:
+    small["media"] = {"material": "ceramic", "radius_mean_m": 3e-3, "fill_height_m": height_m}
+    file = write_study(small)
+    if not refused:
+        load_cases(file)
+        return
+    with pytest.raises(InputError, match=r"fill_height_m.*above the rim") as caught:
+        load_cases(file)
+    assert "at most 0.1 m" in str(caught.value)
+
+
+@pytest.mark.parametrize("shape", [None, {"kind": "tetrahedron", "spheres": 4}])
+@pytest.mark.parametrize("sizes", [{"radius_std_m": 6e-4}, {"distribution": "log_normal"}])
+def test_a_bed_by_its_height_is_expected_to_have_it(
+    shape: Any, sizes: Small, small: Small, write_study: Write
+) -> None:
+    media = {"material": "ceramic", "radius_mean_m": 2e-3, "fill_height_m": 0.06, **sizes}
+    (case,) = load_cases(write_study(small | {"media": media | {"shape": shape}}))
+    assert expected_surface(case.study) == pytest.approx(0.06, rel=2e-3)
+
+
+def test_particles_of_different_sizes_pack_more_densely() -> None:
+    radii, numbers = np.array([1.0, 2.0]), np.array([8.0, 1.0])
+    spread = math.sqrt(8 / 81) / (10 / 9)
+    growth = 0.23 * (spread - 0.05) + 0.55 * (spread - 0.05) ** 2
+    assert solid_fraction(radii, numbers, 1.0) == pytest.approx(0.59 * (1 + growth))
+    for alike in ([1.0, 1.0], [0.96, 1.04]):
+        assert solid_fraction(np.array(alike), np.ones(2), 1.0) == 0.59
+    for ratio in (5.0, 50.0):  # not measured: as the widest that was
+        assert solid_fraction(np.array([1.0, ratio]), numbers, 1.0) == pytest.approx(0.59 * (1 + 0.23 * 0.42 + 0.55 * 0.42**2))

@@ -12,14 +12,20 @@ from itertools import chain
 
 import numpy as np
 
-from dragdeck.cases.bed import bed_timestep, full_stiffness_number, softest_scale, widest_skin
+from dragdeck.cases.bed import (
+    bed_timestep,
+    expected_surface,
+    full_stiffness_number,
+    softest_scale,
+    widest_skin,
+)
 from dragdeck.cases.case import Case, of_each_workpiece
 from dragdeck.errors import InputError
 from dragdeck.outlook.timestep import largest_fraction, stable_fraction, stable_step_cautions
 from dragdeck.physics.rounding import rounded
 from dragdeck.records.advised import AdvisedSettings
 from dragdeck.records.tradeoff import DropEntry, TradeoffRecord, measured_tradeoff
-from dragdeck.scenes.filling import FILLING, expected_surface, expected_time, filling_cautions
+from dragdeck.scenes.filling import FILLING, expected_time, filling_cautions
 from dragdeck.scenes.lead import FIRST_WINDOWS, covered_fraction, window_count, window_fraction
 from dragdeck.scenes.motion import plunge_point
 from dragdeck.scenes.workpiece import (

@@ -20,9 +20,9 @@ from dragdeck.physics.contact_mechanics import (
 )
 from dragdeck.physics.rounding import round_to, rounded, timestep
 from dragdeck.records.case import BodiesOfRun
-from dragdeck.study.media import Array, Media, few_sizes
+from dragdeck.study.media import LEVELS, Array, Media, few_sizes
 from dragdeck.study.model import Study
-from dragdeck.study.shapes import SOLID_FRACTION_ESTIMATE, AnyShape
+from dragdeck.study.shapes import AnyShape
 from dragdeck.study.workpiece import Material
 
 JUST_BEYOND = 1 + 1e-6
@@ -176,6 +176,15 @@ def bed_density(study: Study) -> float:
     return densities[0] if len(densities) == 1 else float(np.average(densities, weights=volumes))
 
 
+def expected_surface(study: Study) -> float:
+    """Height of the settled bed before it exists, m: an estimate."""
+    classes, parts = bed_classes(study), study.media.parts.values()
+    levels = [part.radii(LEVELS) for part in parts]
+    numbers = np.repeat([len(one.radii_m) for one in classes], LEVELS)
+    solid = study.media.solid_fraction(np.concatenate(levels), numbers)
+    return bed_height(bed_volume(study), study.bowl.radius_m, solid)
+
+
 def submerged_fraction(study: Study, depth_m: float | None = None) -> float:
     """Part of the expected bed that is below the compound's surface.
 
@@ -185,7 +194,7 @@ def submerged_fraction(study: Study, depth_m: float | None = None) -> float:
     depth_m : float, optional
         Of the part of the bed that counts, from its surface; all of it by default.
     """
-    surface = bed_height(bed_volume(study), study.bowl.radius_m, SOLID_FRACTION_ESTIMATE)
+    surface = expected_surface(study)
     depth = min(depth_m or surface, surface)
     return min(max((study.liquid_level_m - surface) / depth + 1, 0.0), 1.0)
 

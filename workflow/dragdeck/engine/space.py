@@ -8,7 +8,7 @@ from pathlib import Path
 from dragdeck.decks.outputs import OutputOfRun
 from dragdeck.engine.checkpoints import CHECKPOINTS_KEPT
 from dragdeck.engine.reports import shown_bytes
-from dragdeck.errors import EngineError
+from dragdeck.errors import EngineError, InputError
 from dragdeck.files import FULL_DISK
 
 _BINARY_BYTES, _TEXT_BYTES = 8, 12
@@ -17,6 +17,17 @@ _BINARY_BYTES, _TEXT_BYTES = 8, 12
 _CHECKPOINT_BYTES = 600
 """Of a particle with six contacts in a checkpoint."""
 
+
+MOST_BYTES = 1e12
+"""More than any run is worth: a rate in the wrong unit."""
+
+_FIELDS = {
+    "workpiece_force": "outputs.workpiece_force_hz",
+    "first_touch": "outputs.first_touch_fraction",
+    "workpiece": "outputs.workpiece_contacts_hz",
+    "": "outputs.network_hz",
+}
+"""By the beginning of an output's name: the field that says how often it is written."""
 
 SPARE_BYTES = 2_000_000
 """What a run leaves free on its disk, beside what it still needs."""
@@ -36,6 +47,27 @@ def expected_bytes(outputs: Mapping[str, OutputOfRun], particles: int) -> float:
     """What the outputs of a whole run and its checkpoints will take."""
     written = sum(_output_bytes(output, particles) for output in outputs.values())
     return written + (CHECKPOINTS_KEPT + 1) * _CHECKPOINT_BYTES * particles
+
+
+def check_amount(outputs: Mapping[str, OutputOfRun], particles: int) -> None:
+    """Refuse a run whose outputs take more than any disk is meant for.
+
+    Raises
+    ------
+    InputError
+        Names the output that takes most, and its field.
+    """
+    needed = expected_bytes(outputs, particles)
+    if needed <= MOST_BYTES:
+        return
+    most = max(outputs, key=lambda name: _output_bytes(outputs[name], particles))
+    part = _output_bytes(outputs[most], particles)
+    raise InputError(
+        f"a run would write {shown_bytes(needed)}, {shown_bytes(part)} of it as {most}",
+        field=next(field for name, field in _FIELDS.items() if most.startswith(name)),
+        limit=shown_bytes(MOST_BYTES),
+        remedy="reduce this value, the length of the path or the number of particles",
+    )
 
 
 def _output_bytes(output: OutputOfRun, particles: int) -> float:

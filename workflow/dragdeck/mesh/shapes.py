@@ -76,7 +76,7 @@ def cylinder(
         If the facets are coarser than the radius or too many.
     """
     along_m = facet_size_m if facet_length_m is None else facet_length_m
-    _require_facet_size(facet_size_m, radius_m, length_m)
+    _require_facet_size(facet_size_m, radius_m, length_m, along_m)
     sides = polygon_sides(radius_m, facet_size_m)
     return prism(sides, polygon_radius(radius_m, sides), length_m, facet_size_m, along_m)
 
@@ -86,7 +86,7 @@ def cylinder_radius(radius_m: float, length_m: float, facet_size_m: float) -> fl
 
     Parameters and errors are those of `cylinder`.
     """
-    _require_facet_size(facet_size_m, radius_m, length_m)
+    _require_facet_size(facet_size_m, radius_m, length_m, math.inf)
     sides = polygon_sides(radius_m, facet_size_m)
     x, y, _ = _ring(sides, polygon_radius(radius_m, sides)).T
     return float(np.hypot(x, y).max())
@@ -95,8 +95,12 @@ def cylinder_radius(radius_m: float, length_m: float, facet_size_m: float) -> fl
 def cylinder_facets(
     radius_m: float, length_m: float, facet_size_m: float, facet_length_m: float | None = None
 ) -> int:
-    """Number of facets of a `cylinder`, without making the mesh; parameters are those of it."""
+    """Number of facets of a `cylinder`, without making the mesh.
+
+    Parameters and errors are those of `cylinder`.
+    """
     along_m = facet_size_m if facet_length_m is None else facet_length_m
+    _require_facet_size(facet_size_m, radius_m, length_m, along_m)
     sides = polygon_sides(radius_m, facet_size_m)
     inner = _ring_counts(sides, polygon_radius(radius_m, sides), facet_size_m)
     return 2 * (2 * sum(inner) + sides) + 2 * sides * _levels(length_m, along_m)
@@ -161,7 +165,9 @@ def tube(radius_m: float, length_m: float, facet_size_m: float) -> Trimesh:
     return _turned(_side(sides, corner_radius_m, length_m, 4 * facet_size_m))
 
 
-def _require_facet_size(facet_size_m: float, radius_m: float, length_m: float) -> None:
+def _require_facet_size(
+    facet_size_m: float, radius_m: float, length_m: float, along_m: float | None = None
+) -> None:
     if facet_size_m > radius_m:
         raise InputError(
             "the mesh elements are too coarse for the curvature of the surface",
@@ -170,12 +176,15 @@ def _require_facet_size(facet_size_m: float, radius_m: float, length_m: float) -
             limit=f"at most the radius, {radius_m:g} m",
             remedy="use a smaller facet size",
         )
-    facets = 2.0 * math.tau * radius_m * (length_m + radius_m) / facet_size_m**2
+    along_m = along_m or facet_size_m
+    lengthwise, across = length_m / along_m, radius_m / facet_size_m
+    facets = 2.0 * math.tau * radius_m / facet_size_m * (lengthwise + across)
     if facets > _MAX_FACETS:
+        short = along_m < facet_size_m
         raise InputError(
             f"the mesh would need about {facets:.3g} facets",
-            field="facet_size_m",
-            value=facet_size_m,
+            field="facet_length_m" if short else "facet_size_m",
+            value=along_m if short else facet_size_m,
             limit=f"at most {_MAX_FACETS} facets",
             remedy="use a larger facet size, in metres",
         )

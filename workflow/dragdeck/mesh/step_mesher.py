@@ -94,7 +94,6 @@ def _mesh(gmsh: Any, file: str, unit: str, size: float, edge_size: float) -> Mes
             gmsh.option.setNumber(name, value)
         gmsh.option.setString("Geometry.OCCTargetUnit", unit)
         solid = _solid(gmsh, file)
-        _refuse_too_many(gmsh, size)
         _set_sizes(gmsh, size, edge_size)
         points, triangles = _surface(gmsh)
         volume = gmsh.model.occ.getMass(3, solid)
@@ -122,19 +121,26 @@ def _solid(gmsh: Any, file: str) -> int:
     raise Refusal("the STEP file contains several parts", value, limit, parts)
 
 
-def _refuse_too_many(gmsh: Any, size: float) -> None:
-    area = sum(gmsh.model.occ.getMass(2, face) for _, face in gmsh.model.getEntities(2))
-    facets = area / (0.433 * size**2)
+def _refuse_too_many(gmsh: Any, size: float, edge_size: float, sharp: list[int]) -> None:
+    """Refuse sizes that make too many facets; beside an edge, ``1 / size^2`` is integrated."""
+    area, length = (
+        sum(gmsh.model.occ.getMass(dimension, one) for one in ones)
+        for dimension, ones in ((2, [face for _, face in gmsh.model.getEntities(2)]), (1, sharp))
+    )
+    facets = (area / size**2 + 2 * _GROWTH * length * (1 / edge_size - 1 / size)) / 0.433
     if facets > _MOST_FACETS:
-        remedy = "use a larger facet_size_m: a fifth of a particle's diameter is fine"
+        field = "facet_size_m" if edge_size >= size else "facet_size_m or edge_facet_size_m"
+        remedy = f"use a larger {field}: a fifth of a particle's diameter is fine"
         limit = f"at most {_MOST_FACETS}"
         raise Refusal("the mesh would have too many facets", f"about {facets:.3g}", limit, remedy)
 
 
 def _set_sizes(gmsh: Any, size: float, edge_size: float) -> None:
     gmsh.option.setNumber("Mesh.MeshSizeMax", size)
-    sharp = [curve for _, curve in gmsh.model.getEntities(1) if _is_sharp(gmsh, curve)]
-    if edge_size >= size or not sharp:
+    finer = edge_size < size
+    sharp = [one for _, one in gmsh.model.getEntities(1) if finer and _is_sharp(gmsh, one)]
+    _refuse_too_many(gmsh, size, edge_size, sharp)
+    if not sharp:
         return
     field = gmsh.model.mesh.field
     distance, target = field.add("Distance"), field.add("Threshold")

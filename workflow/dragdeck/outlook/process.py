@@ -4,13 +4,7 @@ import math
 
 from dragdeck.cases.case import Case, of_each_workpiece
 from dragdeck.cases.ranks import cores_here
-from dragdeck.scenes.filling import (
-    MOST_OVERLAP,
-    expected_bed,
-    expected_surface,
-    floor_overlap,
-    rank_split,
-)
+from dragdeck.scenes.filling import MOST_OVERLAP, expected_bed, floor_overlap, rank_split
 from dragdeck.scenes.workpiece import clearances, closest, describe, fastest_surface
 from dragdeck.study.contact_law import compared_labels
 
@@ -27,14 +21,14 @@ _RATIOS = {
 
 def workpiece_notes(case: Case) -> list[tuple[str, str]]:
     """What ``check``, ``explain`` and ``preview`` say of a process: a heading and a text each."""
-    surface = expected_surface(case.study)
-    gaps = clearances(case, surface)
+    bed = expected_bed(case.study)
+    gaps = clearances(case, bed.surface_m)
     return [
         ("gap between workpiece and wall", _gap(case, gaps.wall_m)),
         ("gap between workpiece and floor", _gap(case, gaps.floor_m)),
         *_between(case),
         ("highest surface speed of the workpiece", _speed(case)),
-        ("bed height", f"{1e3 * surface:.3g} mm, an estimate"),
+        ("bed height", f"{1e3 * bed.surface_m:.3g} mm, +- {1e3 * bed.margin_m:.2g} mm (estimate)"),
         *_rotation(case),
     ]
 

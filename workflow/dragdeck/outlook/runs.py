@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from dragdeck.cases.case import Case
+from dragdeck.decks.outputs import OutputOfRun
 from dragdeck.engine.reports import shown_bytes, shown_time
 from dragdeck.engine.space import expected_bytes
 from dragdeck.engine.status import RunStatus, run_status
@@ -127,6 +128,12 @@ def alike_but_for_seed(runs: Mapping[Path, Case]) -> list[dict[Path, Case]]:
     return list(found.values())
 
 
+def written(kind: SceneType, scene: StudyScene) -> tuple[dict[str, OutputOfRun], int]:
+    """The outputs of a run by their names, and its number of spheres."""
+    count = 1 if kind.single_particle else scene.case.media.n_spheres
+    return {output.name: output.as_part() for output in scene.deck.outputs}, count
+
+
 def expected_runs(
     kind: SceneType,
     runs: Mapping[Path, Case],
@@ -149,9 +156,7 @@ def expected_runs(
             scene = build(group) if build else kind.build(first, None)
         except InputError:
             continue
-        count = 1 if kind.single_particle else scene.case.media.n_spheres
-        outputs = {output.name: output.as_part() for output in scene.deck.outputs}
-        size, cost = expected_bytes(outputs, count), expected_cost(kind, scene, speeds)
+        size, cost = expected_bytes(*written(kind, scene)), expected_cost(kind, scene, speeds)
         ranks = 1 if kind.single_particle else first.ranks
         for folder, case in group.items():
             after = folder.parents[1] / FILLING.name / FILLING.run_id(case)

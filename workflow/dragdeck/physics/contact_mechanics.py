@@ -22,9 +22,6 @@ Size = TypeVar("Size", float, NDArray[np.float64])
 COORDINATION_ESTIMATE = 5.0
 """Contacts of a particle in a poured bed with friction, an estimate used only for expectations."""
 
-DENSEST_RANDOM_PACKING = 0.64
-"""Random close packing of equal particles (Scott and Kilgour 1969, 0.6366)."""
-
 
 @dataclass(frozen=True)
 class Elastic:
@@ -124,6 +121,25 @@ def fall_speed(height_m: float, gravity_m_s2: float) -> float:
 def fall_time(height_m: float, gravity_m_s2: float) -> float:
     """Duration of a free fall from rest, s."""
     return math.sqrt(2 * height_m / gravity_m_s2)
+
+
+def wedge_ratio(friction: float, wall: bool) -> float:
+    """Size ratio from which friction can hold a sphere between two touching bodies.
+
+    The line through the two contacts of a sphere of radius r makes the angle a with both normals,
+    and forces along it need a friction of ``tan(a)``. Between two spheres of radius R this is
+    ``sqrt((1 + r / R)^2 - 1)``, between one and a plane ``sqrt(r / R)``.
+
+    Parameters
+    ----------
+    friction : float
+        The smaller one of the two contacts.
+    wall : bool
+        Whether one of the bodies is a plane.
+    """
+    if friction == 0:
+        return math.inf
+    return 1 / friction**2 if wall else 1 / (math.sqrt(1 + friction**2) - 1)
 
 
 def bed_height(volume_m3: float, bowl_radius_m: float, solid_fraction: float) -> float:

@@ -32,10 +32,23 @@ class Bed:
         Its mean height above the floor.
     top_m : float
         The highest point of any particle.
+    margin_m : float
+        By how much the surface may be lower or higher, if it is an estimate.
     """
 
     surface_m: float
     top_m: float
+    margin_m: float = 0.0
+
+    @property
+    def lowest_m(self) -> float:
+        """Lowest height of the surface, m."""
+        return self.surface_m - self.margin_m
+
+    @property
+    def highest_m(self) -> float:
+        """Highest height of the surface, m."""
+        return self.surface_m + self.margin_m
 
 
 @dataclass(frozen=True)

@@ -170,9 +170,8 @@ def _total(study: Study, rig: Repose | Drum) -> tuple[int, float]:
     """Number of particles, and radius of cylinder or drum, m."""
     if isinstance(rig, Repose):
         return rig.count, rig.cylinder_radius_m
-    section = math.pi * (rig.radius_m - 2 * study.media.typical_radius_m) ** 2
-    solid = SOLID_FRACTION_ESTIMATE * rig.fill_fraction * section * rig.width_m
-    return round(solid / study.media.mean_volume_m3), rig.radius_m
+    count = rig.count(study.media.typical_radius_m, study.media.mean_volume_m3)
+    return count, rig.radius_m
 
 
 def _heap(study: Study, rig: Repose, speed_m_s: float) -> _Placed:

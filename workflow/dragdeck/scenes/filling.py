@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +20,7 @@ from dragdeck.cases.bed import (
     bed_volume,
     body_sizes,
     buoyancy_density,
+    expected_surface,
     farthest_point,
     media_classes,
     outrun,
@@ -33,8 +35,6 @@ from dragdeck.decks import outputs
 from dragdeck.decks.deck import Body, Deck, LeftOut, Scene, data_file
 from dragdeck.errors import Caution, InputError
 from dragdeck.physics.contact_mechanics import (
-    DENSEST_RANDOM_PACKING,
-    bed_height,
     bed_overlap,
     bed_pressure,
     effective_modulus,
@@ -43,6 +43,7 @@ from dragdeck.physics.contact_mechanics import (
     particle_mass,
     pull_off_force,
     rayleigh_time,
+    wedge_ratio,
 )
 from dragdeck.physics.coulomb import FrictionLimit
 from dragdeck.physics.domain_split import FilledBowl, Split, rank_warnings, split
@@ -63,7 +64,7 @@ from dragdeck.scenes.scene import (
 from dragdeck.study.base import Json
 from dragdeck.study.media import MOST_SIZES, Media
 from dragdeck.study.model import Study
-from dragdeck.study.shapes import SOLID_FRACTION_ESTIMATE
+from dragdeck.study.shapes import SOLID_FRACTION_STD
 
 _CHECK_INTERVAL_S = 0.02
 """Time between two looks at the kinetic energy, about the fall over one particle."""
@@ -71,6 +72,9 @@ _CHECK_INTERVAL_S = 0.02
 MOST_OVERLAP = 0.01
 """Overlap over the diameter, by the weight of the bed, above which a warning is given: an
 assumption; forces on the workpiece are several times those of the weight."""
+
+_CELL_BYTES, _MOST_CELL_BYTES = 8, 2e9
+"""Memory of LIGGGHTS for a cell of its contact search, and for all of them together."""
 
 _SETTLING_ESTIMATE_S = 0.5
 """Time from the last particle's arrival to rest, an estimate used for expectations only."""
@@ -103,6 +107,7 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
     """
     study = case.study
     _check_capacity(case)
+    _check_cells(case)
     fidelity = study.chosen_fidelity()
     rayleigh = bed_rayleigh_time(study)
     dt = bed_timestep(study, "filling_timestep_fraction")
@@ -225,43 +230,58 @@ def _first_particles(
 
 
 def _check_capacity(case: Case) -> None:
-    """Refuse more particles than the bowl can hold.
+    """Refuse more particles than the bowl is sure to hold.
 
     Raises
     ------
     InputError
-        Even the densest random packing would stand above the rim.
+        The highest particle may lie above the rim.
     """
-    study = case.study
-    bowl = study.bowl
-    height = _height(study, DENSEST_RANDOM_PACKING)
-    if height > bowl.height_m:
-        most = math.floor(study.particle_count * bowl.height_m / height)
+    study, bed = case.study, expected_bed(case.study)
+    rim, over = study.bowl.height_m, bed.top_m - bed.surface_m
+    if bed.top_m + bed.margin_m > rim:
+        most = max(0, math.floor(study.particle_count * (rim - over) / bed.highest_m))
         raise InputError(
             "more particles than fit into the bowl",
             file=case.file,
             field="media.count",
-            value=f"{study.particle_count}, which fill it to at least {height:.4g} m",
-            limit=f"{most} particles in a bowl {bowl.height_m:g} m high, at a solid fraction of "
-            f"{DENSEST_RANDOM_PACKING} (random close packing)",
+            value=f"{study.particle_count}, which fill it to {bed.surface_m:.4g} m +- "
+            f"{bed.margin_m:.2g} m, with a particle on top",
+            limit=f"{most} particles in a bowl {rim:g} m high",
             remedy="use fewer particles, or a wider or higher bowl",
         )
 
 
-def expected_surface(study: Study) -> float:
-    """Height of the settled bed before it exists, m: an estimate."""
-    return _height(study, SOLID_FRACTION_ESTIMATE)
+def _check_cells(case: Case) -> None:
+    """Refuse a box so wide for its particles that the cells of LIGGGHTS' search fill the memory.
+
+    A cell is half as wide as the largest particle and the neighbour skin.
+
+    Raises
+    ------
+    InputError
+    """
+    study = case.study
+    largest = max(float(one.radii_m[-1] * one.clump.radii.max()) for one in bed_classes(study))
+    box = 4 * _half_width(study) ** 2 * (box_top(study) + study.media.typical_radius_m)
+    cells = box / (largest + skin(study) / 2) ** 3
+    if cells * _CELL_BYTES > _MOST_CELL_BYTES:
+        raise InputError(
+            "the bowl is too large for its particles: LIGGGHTS would divide it into "
+            f"{cells:.3g} cells, with {cells * _CELL_BYTES / 1e9:.3g} GB of memory",
+            file=case.file,
+            field="bowl.radius_m",
+            value=study.bowl.radius_m,
+            limit=f"{_MOST_CELL_BYTES / 1e9:g} GB",
+            remedy="use a smaller bowl (radius_m, height_m), or larger particles",
+        )
 
 
 def expected_bed(study: Study) -> Bed:
-    """The settled bed before it exists: an estimate."""
+    """The settled bed before it exists: an estimate with a margin of two standard deviations."""
     surface = expected_surface(study)
-    return Bed(surface, surface + 2 * study.media.typical_radius_m)
-
-
-def _height(study: Study, solid_fraction: float) -> float:
-    """Height of the study's particles in its bowl at a solid fraction, m."""
-    return bed_height(bed_volume(study), study.bowl.radius_m, solid_fraction)
+    top = surface + 2 * study.media.typical_radius_m
+    return Bed(surface, top, 2 * SOLID_FRACTION_STD * surface)
 
 
 def box_top(study: Study) -> float:
@@ -310,6 +330,7 @@ def filling_cautions(case: Case) -> Iterator[Caution]:
     yield from _overlap_caution(study)
     yield from _cohesion_caution(study)
     yield from _class_cautions(study)
+    yield from _size_cautions(study)
     start = _start(study)
     speed = math.hypot(start.fastest_m_s, _arrival_speed(study, start.top_m))
     yield from outrun(study, "filling_timestep_fraction", "particles fall", speed)
@@ -373,6 +394,42 @@ def _class_cautions(study: Study) -> Iterator[Caution]:
                 f"{dearer:.2g} times as long, by its number and its Rayleigh time: without it they "
                 f"would take {100 / dearer:.2g} % of that",
             )
+
+
+_NEVER_HELD, _WIDEST_BED = 1.5, 6.0
+"""Size ratio at which no small particle stayed in a groove, whatever its friction; largest of the
+beds that were measured (docs/data/liggghts)."""
+
+
+def _size_cautions(study: Study) -> Iterator[Caution]:
+    """A warning where small particles can be held between large ones, or one and a wall."""
+    classes = bed_classes(study) if not study.media.clumped else ()
+    walls = {"the bowl": study.bowl.material, "the workpiece": study.workpiece.material}
+    found = []
+    for small, large in product(classes, classes):
+        ratio = float(large.radii_m[-1] / small.radii_m[0])
+        friction = study.pair(small.material, large.material).friction
+        found.append((wedge_ratio(friction, wall=False) / ratio, ratio, "another large one"))
+        for wall, material in walls.items():
+            least = min(friction, study.pair(small.material, material).friction)
+            found.append((wedge_ratio(least, wall=True) / ratio, ratio, wall))
+    held = [one for one in found if one[0] < 1 and one[1] > _NEVER_HELD]
+    if held:
+        part, ratio, partner = min(held)
+        yield Caution(
+            "size_ratio",
+            f"diameters differ by a factor of {ratio:.3g}; above {part * ratio:.3g}, friction can "
+            f"hold a small particle between a large one and {partner}, where the integration of "
+            "LIGGGHTS squeezes it in as it rolls (docs/development/liggghts.md): leave out the "
+            "fines, or compare with a run at a quarter of the fidelity.timestep_fraction",
+        )
+    elif found and (widest := max(ratio for _, ratio, _ in found)) > _WIDEST_BED:
+        yield Caution(
+            "size_ratio",
+            f"diameters differ by a factor of {widest:.3g}: beds above {_WIDEST_BED:g} were not "
+            "measured (docs/development/liggghts.md); leave out the fines, or compare with a run "
+            "at a quarter of the fidelity.timestep_fraction",
+        )
 
 
 def bed_limits(study: Study, top_m: float, speed_m_s: float) -> RunLimits:

@@ -109,9 +109,9 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
     drag = courses[0].drag
     steps = covered(whole, drag)
     for one, way in zip(each, courses, strict=True):
-        check_fit(one, bed.surface_m, dt)
+        check_fit(one, bed.lowest_m, dt)
         moved.append(moved_workpiece(one, way, meshes[one.study.workpiece.shape], steps.entry))
-        check_headroom(one, way.start_m[2] - reference_height(one), top)
+        check_headroom(one, way.start_m[2] + bed.margin_m - reference_height(one), top)
     types, parts = study.type_names(), rank_split(whole)
     materials = material_table(study, types, fidelity.youngs_modulus_scale, whole)
     touches = study.outputs.first_touch_fraction if steps.end == drag.end else 0.0

@@ -317,7 +317,7 @@ def check_fit(case: Case, surface_m: float, timestep_s: float) -> None:
     ----------
     case : Case
     surface_m : float
-        Height of the bed's surface, m.
+        Lowest height of the bed's surface, m.
     timestep_s : float
 
     Raises
@@ -452,8 +452,8 @@ def _below(case: Case, tip_m: float) -> Iterator[InputError]:
             file=case.file,
             field="motion.immersion_depth_m",
             value=depth,
-            limit=f"at most {depth + tip_m - largest:.4g} m: a packing {depth + tip_m:.4g} m "
-            "high minus the diameter of the largest particle",
+            limit=f"at most {depth + tip_m - largest:.4g} m: a packing at least "
+            f"{depth + tip_m:.4g} m high minus the diameter of the largest particle",
             remedy="reduce the immersion depth, or use more particles",
         )
 

@@ -7,6 +7,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from dragdeck.study.base import Line, Model, Number, Positive, Whole
+from dragdeck.study.shapes import SOLID_FRACTION_ESTIMATE
 
 NARROWEST = 5
 """Least diameter of a cylinder or drum, over that of a particle: narrower ones jam."""
@@ -14,6 +15,9 @@ NARROWEST = 5
 FASTEST = 0.1
 """Largest Froude number of a drum, centrifugal acceleration over gravity: an assumption; the
 surface of a faster one is not plane."""
+
+MOST_FREE, MOST_GLUED = 20_000, 100_000
+"""Particles of a heap or drum, of which dozens are simulated, and of its glued layer."""
 
 Rig = Literal["repose", "drum"]
 Measured = Annotated[Number, Field(gt=0, lt=90)]
@@ -25,7 +29,7 @@ class Repose(Model):
     angle_deg: Measured = Field(description="angle of the heap to the horizontal, degrees")
     angle_std_deg: Positive = Field(description="its standard uncertainty, degrees")
     cylinder_radius_m: Positive = Field(description="inner radius of the cylinder, m")
-    count: Annotated[Whole, Field(ge=300, le=20_000)] = Field(description="number of particles")
+    count: Annotated[Whole, Field(ge=300, le=MOST_FREE)] = Field(description="number of particles")
 
 
 class Drum(Model):
@@ -44,6 +48,12 @@ class Drum(Model):
         description="volume of the bed / volume of the drum inside the glued layer"
     )
     rpm: Positive = Field(description="rotational speed of the drum, 1/min")
+
+    def count(self, radius_m: float, volume_m3: float) -> int:
+        """Number of particles of a mean radius, of the glued layer too, and of a mean volume."""
+        section = math.pi * max(self.radius_m - 2 * radius_m, 0.0) ** 2
+        solid = SOLID_FRACTION_ESTIMATE * self.fill_fraction * section * self.width_m
+        return round(solid / volume_m3)
 
     @property
     def rad_s(self) -> float:
@@ -70,8 +80,10 @@ class Angles(Model):
         every: Mapping[Rig, Repose | Drum | None] = {"repose": self.repose, "drum": self.drum}
         return {name: rig for name, rig in every.items() if rig is not None}
 
-    def problems(self, radius_m: float, gravity_m_s2: float) -> Iterator[tuple[str, str, str]]:
-        """What cannot work with particles of this radius: field, problem and limit."""
+    def problems(
+        self, radius_m: float, volume_m3: float, gravity_m_s2: float
+    ) -> Iterator[tuple[str, str, str]]:
+        """What cannot work with particles of this radius and volume: field, problem and limit."""
         sizes = {"repose.cylinder_radius_m": (self.repose and self.repose.cylinder_radius_m, 0)}
         if self.drum:
             sizes["drum.radius_m"] = self.drum.radius_m, 2
@@ -80,6 +92,18 @@ class Angles(Model):
             if self.drum.rpm > most:
                 limit = f"at most {most:.3g}, a Froude number of {FASTEST:g}"
                 yield "drum.rpm", "the drum is too fast for a plane surface", limit
+            if (count := self.drum.count(radius_m, volume_m3)) > MOST_FREE:
+                problem = f"the drum has {count:.3g} particles, too many for dozens of runs"
+                yield "drum.fill_fraction", problem, f"{MOST_FREE} particles, in a smaller drum"
+        across = {name: (size or 0.0) / (2 * radius_m) for name, (size, _) in sizes.items()}
+        layers = {"repose.cylinder_radius_m": math.pi * across["repose.cylinder_radius_m"] ** 2}
+        if self.drum:
+            width = across["drum.width_m"]
+            layers["drum.radius_m"] = math.tau * across["drum.radius_m"] * width
+        for field, glued in layers.items():
+            if glued > MOST_GLUED:
+                problem = f"a glued layer of {glued:.3g} particles, too many for dozens of runs"
+                yield field, problem, f"{MOST_GLUED} particles, on a smaller surface"
         for field, (size, more) in sizes.items():
             least = (NARROWEST + more) * radius_m
             if size and size < least:

@@ -15,7 +15,7 @@ from pydantic_core import ErrorDetails
 from dragdeck.errors import Caution, InputError, RecordError, choices, near, together
 from dragdeck.study.base import Json, Model, flat
 from dragdeck.study.model import BUILT_IN_FIDELITIES, AnyPath, Fidelity, Scaling, Study, Tolerance
-from dragdeck.study.plausible import implausible
+from dragdeck.study.plausible import implausible, plausible_range
 from dragdeck.study.recorded import Places, mesh_errors, recorded_file, with_recording
 from dragdeck.study.removal import disagreements
 from dragdeck.study.search import Search
@@ -115,6 +115,36 @@ def _media(study: Study) -> _Found:
             if not count:
                 field = f"media.classes.{name}" if name else "media"
                 yield field, "not one particle of it", "a larger total or fraction"
+        yield from _crowd(study)
+    if (media.fill_height_m or 0.0) > study.bowl.height_m:
+        problem = "the bed would stand above the rim of the bowl"
+        yield "media.fill_height_m", problem, f"at most {study.bowl.height_m:g} m"
+
+
+def _crowd(study: Study) -> _Found:
+    """More spheres than a run can have, and the class and sieves that make most of them."""
+    media, known = study.media, plausible_range("media.count")
+    assert known is not None
+    spheres = {
+        name: count * media.spheres_of(media.parts[name])
+        for name, count in study.class_counts.items()
+    }
+    name, total, most = (
+        max(spheres, key=lambda one: spheres[one]),
+        study.sphere_count,
+        known.refused_above,
+    )
+    if total <= most or (media.count or 0) > most:
+        return
+    part = media.parts[name]
+    field = f"media.classes.{name}" if name else "media"
+    own = f"{spheres[name]:.3g} of them in class {name}" if name else "all of one class"
+    yield (
+        f"{field}.sieve" if part.sieve else field,
+        f"the media would be {total:.3g} spheres in LIGGGHTS, {own}{part.most_numerous()}",
+        f"{most:.3g}: a total smaller by a factor of {total / most:.3g}, or larger particles; "
+        "fines can be left out, with their fraction of the mass",
+    )
 
 
 def _compound(study: Study) -> _Found:
@@ -139,7 +169,7 @@ def _angles(study: Study) -> _Found:
     if angles and media.classes:
         yield "calibration.angles", "the media have several classes", "media of one class"
     elif angles:
-        found = angles.problems(media.typical_radius_m, study.gravity_m_s2)
+        found = angles.problems(media.typical_radius_m, media.mean_volume_m3, study.gravity_m_s2)
         yield from ((f"calibration.angles.{field}", what, limit) for field, what, limit in found)
 
 
@@ -458,6 +488,8 @@ def _problem(issue: ErrorDetails) -> InputError:
     problem, limit, remedy = *words, None
     if kind in _WORDS:
         context = issue.get("ctx", {})
+        if "actual_length" in context:  # pydantic does not count the entries of a mapping
+            context = {**context, "actual_length": len(issue["input"])}
         problem, limit = problem.format(**context), limit and limit.format(**context)
     value: object = issue["input"]
     if kind == "union_tag_invalid" and isinstance(value, Mapping):

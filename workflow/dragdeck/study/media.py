@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from dragdeck.study.base import MaterialName, Model, Name, NonNegative, Number, Positive, Whole
-from dragdeck.study.shapes import FEWEST_SPHERES, SOLID_FRACTION_ESTIMATE, AnyShape
+from dragdeck.study.shapes import FEWEST_SPHERES, AnyShape, solid_fraction
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -30,11 +30,10 @@ _LARGEST_SPREAD = 0.3
 MOST_SIZES = 5
 """Sizes of a class among media of which some are no spheres: LIGGGHTS inserts each by itself."""
 
-_LEVELS = 4096
+LEVELS = 4096
 """Quantiles from which the moments of a distribution are computed."""
 
-MOST_SIEVES = 100
-
+MOST_SIEVES = MOST_CLASSES = 100
 
 _SIZES = ("radius_mean_m", "radius_std_m", "distribution")
 
@@ -114,10 +113,22 @@ class Grains(Model):
         assert self.radius_mean_m is not None
         return quantiles(self.distribution, self.radius_mean_m, self.radius_std_m, count)
 
+    def most_numerous(self) -> str:
+        """The sieves between which most particles are, in words; empty without a sieve analysis."""
+        if self.sieve is None:
+            return ""
+        number = _numbers(self.sieve)[1]
+        at = int(number.argmax())
+        (low, below), (high, above) = self.sieve[at : at + 2]
+        return (
+            f", {100 * number[at] / number.sum():.3g} % of these between the sieves of {low:g} and "
+            f"{high:g} m ({100 * (above - below):.3g} % of their mass)"
+        )
+
     @property
     def mean_volume_m3(self) -> float:
         """Mean volume of a particle, m3."""
-        return float(4 / 3 * math.pi * (self.radii(_LEVELS) ** 3).mean())
+        return float(4 / 3 * math.pi * (self.radii(LEVELS) ** 3).mean())
 
 
 def _check_sieve(rows: Sequence[Sieve]) -> None:
@@ -178,15 +189,20 @@ def _log_normal(mean_m: float, std_m: float, count: int) -> Array:
 _SPREAD = {"normal": _normal, "uniform": _uniform, "log_normal": _log_normal}
 
 
+def _numbers(rows: Sequence[Sieve]) -> tuple[Array, Array]:
+    """``1 / d^2`` of sieves, and what is proportional to the numbers between each and the next."""
+    diameter, passing = np.array(rows, dtype=np.float64).T
+    inverse = diameter**-2
+    return inverse, np.diff(passing) / np.diff(diameter) * (inverse[:-1] - inverse[1:])
+
+
 def _sieved(rows: Sequence[Sieve], count: int) -> Array:
     """Radii whose mass follows a sieve analysis.
 
     Between two sieves a and b the mass is uniform in the diameter d, so that the number density
     goes as ``1 / d^3`` and the number finer than d as ``1 / a^2 - 1 / d^2``.
     """
-    diameter, passing = np.array(rows, dtype=np.float64).T
-    inverse = diameter**-2
-    number = np.diff(passing) / np.diff(diameter) * (inverse[:-1] - inverse[1:])
+    inverse, number = _numbers(rows)
     finer = np.concatenate([[0.0], np.cumsum(number)])
     level = finer[-1] * (np.arange(count) + 0.5) / count
     at = np.searchsorted(finer, level, side="right") - 1
@@ -219,6 +235,7 @@ class Media(Grains):
     )
     classes: dict[Name, MediaClass] = Field(
         default_factory=dict,
+        max_length=MOST_CLASSES,
         description="several classes by name, each with material, sizes and fraction, instead of "
         "material and sizes here",
         exclude_if=lambda value: not value,
@@ -273,19 +290,33 @@ class Media(Grains):
         main = self.main
         if main.radius_mean_m is not None:
             return main.radius_mean_m
-        sizes = main.radii(_LEVELS)
+        sizes = main.radii(LEVELS)
         return float((sizes**3).sum() / (sizes**2).sum())
 
     @property
     def typical_std_m(self) -> float:
         """Standard deviation of the radii of the first class, m."""
         main = self.main
-        return main.radius_std_m if main.sieve is None else float(main.radii(_LEVELS).std())
+        return main.radius_std_m if main.sieve is None else float(main.radii(LEVELS).std())
 
     @property
     def clumped(self) -> bool:
         """Whether some particles are no spheres; then all are clumps."""
         return any(part.shape is not None for part in self.parts.values())
+
+    def solid_fraction(self, radii_m: Array, numbers: Array) -> float:
+        """That of a poured bed, an estimate.
+
+        Parameters
+        ----------
+        radii_m, numbers : (N,) array
+            Class by class, each with as many entries.
+        """
+        parts = list(self.parts.values())
+        denser = [part.shape.denser if part.shape else 1.0 for part in parts]
+        volumes = np.array_split(numbers * radii_m**3, len(parts))
+        whole = float(np.average(denser, weights=[one.sum() for one in volumes]))
+        return solid_fraction(radii_m, numbers, whole)
 
     def spheres_of(self, part: Grains) -> int:
         """Spheres of which a particle of a class consists in LIGGGHTS."""
@@ -326,8 +357,13 @@ def class_counts(
     else:
         weight = volume if media.mass_kg is None else mass
         of_all = sum(number * weight[name] for name, number in by_number.items())
-        solid = SOLID_FRACTION_ESTIMATE * bowl_area_m2 * (media.fill_height_m or 0.0)
-        scale = (solid if media.mass_kg is None else media.mass_kg) / of_all
+        total = media.mass_kg
+        if media.fill_height_m is not None:
+            radii = np.concatenate([part.radii(LEVELS) for part in media.parts.values()])
+            numbers = np.repeat(list(by_number.values()), LEVELS)
+            total = media.fill_height_m * bowl_area_m2 * media.solid_fraction(radii, numbers)
+        assert total is not None
+        scale = total / of_all
     return _whole_numbers({name: scale * number for name, number in by_number.items()})
 
 

@@ -24,7 +24,7 @@ from dragdeck.study.base import (
 )
 from dragdeck.study.calibration import Calibration
 from dragdeck.study.contact_law import Contact, Pair
-from dragdeck.study.media import Media, class_counts
+from dragdeck.study.media import MOST_CLASSES, Media, class_counts
 from dragdeck.study.paths.circle import CirclePath
 from dragdeck.study.paths.figure_eight import FigureEightPath
 from dragdeck.study.paths.line import LinePath
@@ -530,7 +530,7 @@ class Study(Model):
     gravity_m_s2: Positive = Field(
         default=9.81, description="gravitational acceleration along -z, m/s2"
     )
-    materials: dict[MaterialName, Material]
+    materials: dict[MaterialName, Material] = Field(max_length=MOST_CLASSES)
     pairs: dict[str, Pair] = Field(
         description="'a-b': contact coefficients of the materials a and b"
     )

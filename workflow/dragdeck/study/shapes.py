@@ -6,7 +6,7 @@ name in `AnyShape`.
 """
 
 import math
-from typing import Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +17,35 @@ from dragdeck.study.base import Model, Number, Positive, Whole
 Corners = NDArray[np.float64]
 
 SOLID_FRACTION_ESTIMATE = 0.59
-"""Solid fraction of a poured bed about twelve particles wide, an estimate used only for
-expectations before the bed exists (measured beds replace it)."""
+"""Solid fraction of a poured bed of spheres of about one size, about twelve of them wide, an
+estimate used only for expectations before the bed exists (measured beds replace it)."""
+
+SOLID_FRACTION_STD = 0.03
+"""Standard deviation of measured solid fractions over those of `solid_fraction`, less 1
+(docs/data/scenes/solid_fraction.csv)."""
+
+_ONE_SIZE, _WIDEST, _BY_SPREAD = 0.05, 0.47, (0.23, 0.55)
+"""Spread of the radii (standard deviation over mean) up to which particles count as of about one
+size; the widest that was measured; parts by which the solid fraction grows with what the spread is
+above the former, and with its square."""
+
+
+def solid_fraction(radii_m: Corners, numbers: Corners, denser: float) -> float:
+    """Solid fraction of a poured bed before it exists, from docs/data/scenes/solid_fraction.csv.
+
+    Parameters
+    ----------
+    radii_m, numbers : (N,) array
+        Radii of spheres of equal volume, and how many there are of each.
+    denser : float
+        Solid fraction of the shapes over that of spheres.
+    """
+    mean = np.average(radii_m, weights=numbers)
+    spread = math.sqrt(np.average((radii_m / mean - 1) ** 2, weights=numbers))
+    wider = min(max(spread, _ONE_SIZE), _WIDEST) - _ONE_SIZE
+    growth = _BY_SPREAD[0] * wider + _BY_SPREAD[1] * wider**2
+    return SOLID_FRACTION_ESTIMATE * denser * (1 + growth)
+
 
 FEWEST_SPHERES, MOST_SPHERES = 2, 40
 """Spheres of a clump: LIGGGHTS accepts no single one, and more cost more than a shape is worth."""
@@ -38,7 +65,15 @@ class ParticleShape(Model):
     """A convex body as a clump of overlapping spheres.
 
     Mass and inertia are those of the body; spheres stand for its surface only.
+
+    Attributes
+    ----------
+    denser : float
+        Measured solid fraction of a poured bed over that of spheres in the same bowl; where none
+        was measured, the mean of all shapes (docs/data/scenes/solid_fraction.csv).
     """
+
+    denser: ClassVar[float] = 1.04
 
     spheres: Annotated[Whole, Field(ge=FEWEST_SPHERES, le=MOST_SPHERES)] = Field(
         description="number of spheres; `dragdeck shapes` lists the errors"
@@ -59,6 +94,8 @@ def _ring(height: float, cut: float = 0.0) -> Corners:
 class CylinderParticle(ParticleShape):
     """A cylinder, its ends straight or cut at an angle."""
 
+    denser: ClassVar[float] = 1.06
+
     kind: Literal["cylinder"] = Field(description="cylinder with straight ends, or cut at an angle")
     aspect: _Aspect = Field(description="length / diameter")
     cut_deg: Annotated[Number, Field(ge=0, le=60)] = Field(
@@ -77,6 +114,8 @@ class CylinderParticle(ParticleShape):
 class ConeParticle(ParticleShape):
     """A circular cone."""
 
+    denser: ClassVar[float] = 1.07
+
     kind: Literal["cone"] = Field(description="circular cone")
     aspect: _Aspect = Field(description="height / diameter of the base")
 
@@ -88,6 +127,8 @@ class ConeParticle(ParticleShape):
 class TetrahedronParticle(ParticleShape):
     """A regular tetrahedron."""
 
+    denser: ClassVar[float] = 1.01
+
     kind: Literal["tetrahedron"] = Field(description="regular tetrahedron")
 
     def corners(self) -> Corners:
@@ -97,6 +138,8 @@ class TetrahedronParticle(ParticleShape):
 
 class PrismParticle(ParticleShape):
     """A straight prism on an equilateral triangle."""
+
+    denser: ClassVar[float] = 1.01
 
     kind: Literal["triangular_prism"] = Field(
         description="straight prism on an equilateral triangle"
@@ -112,6 +155,8 @@ class PrismParticle(ParticleShape):
 
 class EllipsoidParticle(ParticleShape):
     """An ellipsoid."""
+
+    denser: ClassVar[float] = 1.06
 
     kind: Literal["ellipsoid"] = Field(description="ellipsoid")
     axes: tuple[Positive, Positive, Positive] = Field(

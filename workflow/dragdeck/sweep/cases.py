@@ -17,6 +17,7 @@ Fields are those of the study by their dotted names, or the settings of a scene 
 
 import copy
 import itertools
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -37,6 +38,9 @@ Settings = Mapping[str, Any]
 
 _MIDDLE = 0.382
 """A part of a range at which a field of whole numbers, or a switch, is no fraction by chance."""
+
+MOST_POINTS = 10_000
+"""Points of a design, over all its scenes and packings: more than anyone has run."""
 
 
 # --- designs -------------------------------------------------------------------------------------
@@ -72,6 +76,12 @@ class Variation(Model):
         alias="with",
         description="dotted field name: value at all these points",
     )
+
+    @property
+    def count(self) -> int:
+        """Number of its points, without listing them."""
+        alone = sum(map(len, self.one_by_one.values())) or 1
+        return math.prod(map(len, self.vary.values())) * alone
 
     def points(self) -> Iterator[DesignPoint]:
         """The points, the last field of `vary` changing before the first."""
@@ -114,11 +124,25 @@ class Design(Model, Generic[Block]):
             found = cls.model_validate(data if name is None else data[name])
         except ValidationError as error:
             raise explained(error, file) from None
-        if len(list(found.reference.points())) != 1:
+        check_number(sum(block.count for block in found.points), file)
+        if found.reference.count != 1:
             raise InputError(
                 "the reference must be a single point", file=file, field="reference.vary"
             )
         return found
+
+
+def check_number(points: int, file: Path) -> None:
+    """Refuse a design of more points than can be listed.
+
+    Raises
+    ------
+    InputError
+        It has more than `MOST_POINTS`.
+    """
+    if points > MOST_POINTS:
+        problem, limit = f"the design has {points:,} points", f"at most {MOST_POINTS:,}"
+        raise InputError(problem, file=file, field="points", limit=limit, remedy="vary less")
 
 
 # --- cases ---------------------------------------------------------------------------------------

@@ -25,6 +25,7 @@ from dragdeck.sweep.cases import (
     Settings,
     Variation,
     beside_each_other,
+    check_number,
     settle_case,
 )
 
@@ -118,6 +119,8 @@ def plan_points(
         A point names no field of a study, or one beyond its limits.
     """
     blocks = [plan.reference, *plan.points]
+    packings = sum(block.count * (block.seeds or plan.seeds) for block in blocks)
+    check_number(len(plan.scenes) * packings, plan_file)
     found: dict[str, Case] = {}
     for scene, block in itertools.product(plan.scenes.values(), blocks):
         for settings in _settings(plan, block, base.study, scene):
