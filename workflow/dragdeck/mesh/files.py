@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from dragdeck.errors import InputError
 from dragdeck.mesh.step import mesh_step
-from dragdeck.mesh.surface import CAD_VOLUME, MERGED, Floats, Integers, surface, weld
+from dragdeck.mesh.surface import CAD_VOLUME, MERGED, Floats, Integers, obtuse_third, surface, weld
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
@@ -215,12 +215,3 @@ def stl_text(mesh: Trimesh) -> str:
         for normal, facet in zip(normals.tolist(), lines[corners].tolist(), strict=True)
     ]
     return "solid mesh\n" + "".join(facets) + "endsolid mesh\n"
-
-
-def obtuse_third(nodes: Floats, facets: Integers) -> Integers:
-    """(M, 3) array: the facets, turned cyclically so that an obtuse corner is the third."""
-    corners = nodes[facets]
-    before, after = (np.roll(corners, shift, axis=1) - corners for shift in (1, -1))
-    cosines = (before * after).sum(axis=2)  # times lengths; not einsum, whose rounding varies
-    first = np.where(cosines.min(axis=1) < 0.0, cosines.argmin(axis=1) + 1, 0)
-    return np.take_along_axis(facets, (first[:, None] + np.arange(3)) % 3, axis=1)
