@@ -83,6 +83,18 @@ def test_the_numbers_are_those_of_check(case: Case, capsys: pytest.CaptureFixtur
     assert stated and float(stated[1]) == pytest.approx(wall, rel=0.01)
 
 
+def test_one_particle_diameter_on_a_screen(made: Made, capsys: pytest.CaptureFixture[str]) -> None:
+    """Of clumps, too: that of the sphere around them, in notes and warnings alike."""
+    shape = {"kind": "cylinder", "aspect": 1.2, "spheres": 4}
+    made({"media.shape": shape, "media.radius_std_m": 0, "motion.path.radius_m": 0.011})
+    assert main(["preview", "small"]) == 0
+    shown = capsys.readouterr().out
+    stated = re.findall(r"workpiece and wall: (\S+) particle", shown)
+    warned = re.findall(r"workpiece and bowl is (\S+) particle", shown)
+    assert len(stated) == len(warned) == 1
+    assert float(stated[0]) == pytest.approx(float(warned[0]), rel=0.05)
+
+
 @pytest.mark.parametrize("missing_m", [-1e-4, 1e-4])
 def test_the_check_refuses_by_the_clearances(made: Made, missing_m: float) -> None:
     """One largest particle between tip and floor is enough, and a little less is not."""

@@ -1,5 +1,7 @@
 """Contacts that LIGGGHTS overlooks: the model of its rules against LIGGGHTS, and what mends it."""
 
+import math
+import re
 import subprocess
 from pathlib import Path
 
@@ -12,11 +14,17 @@ from numpy.typing import NDArray
 from trimesh import Trimesh
 from trimesh.convex import convex_hull
 
+from dragdeck.decks import outputs
 from dragdeck.decks.deck import Body, data_file
+from dragdeck.decks.outputs import WORKPIECE_FORCE
+from dragdeck.engine.acceptance import check_run
 from dragdeck.engine.process import find_engine
+from dragdeck.errors import InputError
 from dragdeck.mesh import files, shapes
 from dragdeck.mesh import surface as surfaces
-from dragdeck.mesh.contacts import EngineMesh, turned_mesh
+from dragdeck.mesh.contacts import EngineMesh, report, turned_mesh
+from dragdeck.physics.run_limits import thrown_speed
+from dragdeck.records.run import CaseFile, CountOfRun, RanksOfRun, RunPart
 
 Floats = NDArray[np.float64]
 RADIUS = 0.004
@@ -240,6 +248,37 @@ def largest_force(folder: Path, stl: str, case: str) -> float:
 
 
 @pytest.mark.engine
+@pytest.mark.parametrize("name", ["raw", "written"])
+def test_a_run_with_a_thrown_particle_is_refused(tmp_path: Path, name: str):
+    """The knife throws the sphere with 34 m/s, which a fall and the knife cannot give."""
+    centre, move = KNIFE_MOVES["straight"]
+    output = outputs.workpiece_force(50, 2500, "part")
+    columns = " ".join(f"$({one.engine})" for one in output.columns)
+    titles = " ".join(one.name for one in output.columns)
+    run(
+        tmp_path,
+        "variable speed atom sqrt(vx*vx+vy*vy+vz*vz)\n"
+        "compute fastest_particle all reduce max v_speed\n"
+        f"timestep 4e-5\nfix move all move/mesh mesh part {move}\n"
+        f'fix out all print 50 "{columns}" file {output.name}.1.txt screen no title "{titles}"\n'
+        "run 2500\n",
+        as_given(knife()) if name == "raw" else files.stl_text(knife()),
+        np.array([centre]),
+    )
+    raw = output.as_part()
+    limit = thrown_speed(9.81, 0.2, 0.1)
+    inputs = CaseFile(
+        study="any", title="", scene="process", run="a", timestep_s=4e-5, rayleigh_time_s=1e-4,
+        versions={}, fidelity=RanksOfRun(ranks=1), media=CountOfRun(count=1), thrown_m_s=limit,
+    )  # fmt: skip
+    part = RunPart(part=1, checkpoint=None, from_step=0)
+    checks = check_run(tmp_path, inputs, {WORKPIECE_FORCE: raw}, 0, [part], ranks=1)
+    (check,) = (check for check in checks if check.code == "none_thrown")
+    assert check.passed is (name == "written")
+    assert check.number == pytest.approx(34 if name == "raw" else 0.172, rel=0.02)
+
+
+@pytest.mark.engine
 @pytest.mark.parametrize(
     ("case", "as_written", "turned"),
     [("straight", 569, 0.357), ("clear", 0.357, 0.357), ("spin", 0, 0.313)],
@@ -253,3 +292,56 @@ def test_a_sphere_and_a_knife(tmp_path: Path, case: str, as_written: float, turn
         folder = tmp_path / name
         folder.mkdir()
         assert largest_force(folder, text, case) == pytest.approx(expected, rel=2e-3)
+
+
+# --- dragdeck mesh -------------------------------------------------------------------------------
+
+
+def percents(text: str, name: str) -> list[float]:
+    """A fraction and its confidence interval, from the line of this name."""
+    (line,) = (line for line in text.splitlines() if name in line)
+    return [float(word) for word in re.findall(r"\d\S*(?= %| to)|(?<=CI )\d\S*", line)]
+
+
+def test_the_command_counts_and_mends(tmp_path: Path):
+    """In any unit: what a file loses, and that the file that it writes loses nothing."""
+    blade, mm = twisted_blade(), 1e3
+    file, out = tmp_path / "blade.stl", tmp_path / "turned.stl"
+    file.write_text(as_given(surfaces.surface(mm * blade.vertices, blade.faces)))
+    said = report(file, "mm", RADIUS, None, out)
+    share, low, high = percents(said, "as written")
+    assert 20 < low < share < high < 35
+    assert percents(said, "turned: ")[0] == 0
+    assert percents(report(out, "mm", RADIUS, None, None), "as written")[0] == 0
+    assert_turned_only(files.read(file, "m"))
+    _, corners = written(out.read_text())
+    assert np.sort(corners, axis=1) == pytest.approx(np.sort(mm * blade.triangles, axis=1))
+
+
+def test_a_mesh_without_convex_edges_loses_nothing(tmp_path: Path):
+    (tmp_path / "bowl.stl").write_text(as_given(shapes.bowl(0.04, 0.08, 0.01)))
+    assert "no convex edges" in report(tmp_path / "bowl.stl", "m", RADIUS, None, None)
+
+
+@pytest.mark.parametrize(
+    ("name", "radius_m", "size_m", "out", "words"),
+    [
+        ("blade.stl", 0.0, None, None, "--radius: not a length"),
+        ("blade.stl", math.nan, None, None, "--radius: not a length"),
+        ("blade.step", RADIUS, None, None, "add the facet_size_m of the study"),
+        ("blade.step", RADIUS, -1.0, None, "--facet-size: not a length"),
+        ("blade.stl", RADIUS, None, "blade.stl", "the file would be replaced"),
+        ("none.stl", RADIUS, None, None, "there is no such mesh file"),
+        ("needle.stl", RADIUS, None, None, "too sharp for LIGGGHTS"),
+    ],
+)
+def test_what_the_command_refuses(
+    tmp_path: Path, name: str, radius_m: float, size_m: float | None, out: str | None, words: str
+):
+    (tmp_path / "blade.stl").write_text(as_given(twisted_blade()))
+    needle = [[0, 0, 0], [0.02, 0, 0], [0.01, 0.00002, 0]]
+    (tmp_path / "needle.stl").write_text(as_given(surfaces.surface(needle, [[0, 1, 2]])))
+    before = (tmp_path / "blade.stl").read_bytes()
+    with pytest.raises(InputError, match=words):
+        report(tmp_path / name, "m", radius_m, size_m, out and tmp_path / out)
+    assert (tmp_path / "blade.stl").read_bytes() == before

@@ -172,18 +172,15 @@ def _implausible_size(mesh: Trimesh, scene: Surroundings) -> list[Finding]:
     problem = "the size of the workpiece is not plausible in this bowl"
     value = " x ".join(f"{length:.4g}" for length in mesh.extents) + " m"
     limit = (
-        f"narrower than the bowl (diameter {2 * scene.bowl_radius_m:g} m), no longer than ten "
-        f"bowls, no smaller than a particle's radius ({scene.particle_radius_m:g} m)"
+        f"no larger than ten bowls (diameter {2 * scene.bowl_radius_m:g} m), no smaller than a "
+        f"particle's radius ({scene.particle_radius_m:g} m)"
     )
     return [Finding(problem, value, limit, _unit_remedy(mesh, scene))]
 
 
 def _plausible(mesh: Trimesh, factor: float, scene: Surroundings) -> bool:
-    width, depth, height = factor * mesh.extents
-    bowl_m = 2.0 * scene.bowl_radius_m
-    longest = max(width, depth, height)
-    narrow = max(width, depth) < bowl_m
-    return bool(narrow and scene.particle_radius_m <= longest <= 10.0 * bowl_m)
+    longest = factor * mesh.extents.max()
+    return bool(scene.particle_radius_m <= longest <= 10.0 * 2.0 * scene.bowl_radius_m)
 
 
 def _unit_remedy(mesh: Trimesh, scene: Surroundings) -> str:

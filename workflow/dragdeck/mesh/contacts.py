@@ -5,13 +5,19 @@ Source of the rules: ``tri_mesh_I.h`` and ``surface_mesh_I.h`` of LIGGGHTS 3.8.0
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dragdeck.errors import InputError
+from dragdeck.files import write_text
+from dragdeck.mesh.checks import check
+from dragdeck.mesh.files import STEP, UNITS, read, stl_text
 from dragdeck.mesh.surface import NODE_PRECISION_M, Floats, Integers, obtuse_third, surface
 
 if TYPE_CHECKING:
@@ -267,3 +273,61 @@ def overlooked(mesh: Trimesh, radius_m: float, seed: int = 1) -> Overlooked:
 def turned_mesh(mesh: Trimesh) -> Trimesh:
     """The same facets in the same order, an obtuse corner third."""
     return surface(mesh.vertices, obtuse_third(mesh.vertices, mesh.faces))
+
+
+def report(
+    file: Path, unit: str, radius_m: float, facet_size_m: float | None, out: Path | None
+) -> str:
+    """What LIGGGHTS overlooks on the mesh of a file; the turned mesh is written to another one.
+
+    Raises
+    ------
+    InputError
+        The mesh cannot be read or LIGGGHTS would refuse it, a length is not positive, or the
+        file would be replaced.
+    """
+    for field, length in (("--radius", radius_m), ("--facet-size", facet_size_m)):
+        if length is not None and not 0 < length < math.inf:
+            raise InputError("not a length", field=field, value=length, limit="above 0 m")
+    if file.suffix.lower() in STEP and facet_size_m is None:
+        remedy = "add the facet_size_m of the study, for example --facet-size 0.001"
+        raise InputError("a STEP file is meshed here", file=file, remedy=remedy)
+    if out is not None and out.resolve() == file.resolve():
+        raise InputError("the file would be replaced", field="--out", remedy="give another name")
+    mesh = read(file, unit, facet_size_m)
+    check(mesh, file=file, workpiece=False)
+    lines = [
+        f"{file.name}: {len(mesh.faces):,} facets, {_not_third(mesh):,} with an obtuse corner that "
+        "is not the third"
+    ]
+    found, spheres = overlooked(mesh, radius_m), f"spheres with a radius of {1e3 * radius_m:g} mm"
+    if found.positions:
+        lines += [
+            f"contacts at convex edges that LIGGGHTS overlooks ({found.positions:,} positions, "
+            f"{spheres}):",
+            f"  as written: {_percent(found.as_written, found.positions)}",
+            f"  turned:     {_percent(found.turned, found.positions)}",
+        ]
+    else:
+        lines.append("no convex edges, so that no contact is overlooked there")
+    gaps = gap_fraction(mesh, radius_m)
+    lines.append(
+        f"gaps at convex edges below 0.26 degrees: {100 * gaps:.2g} % of the surface ({spheres})"
+    )
+    if out is not None:
+        write_text(out, stl_text(surface(mesh.vertices / UNITS[unit], mesh.faces)))
+        lines.append(f"{out}: the same facets, turned; unit {unit}")
+    return "\n".join(lines)
+
+
+def _not_third(mesh: Trimesh) -> int:
+    turned = obtuse_third(mesh.vertices, mesh.faces)
+    return int((turned != mesh.faces).any(axis=1).sum())
+
+
+def _percent(count: int, of: int) -> str:
+    """A fraction with its exact confidence interval (Clopper and Pearson 1934)."""
+    from scipy.stats import binomtest
+
+    low, high = binomtest(count, of).proportion_ci()
+    return f"{100 * count / of:.2g} % (95 % CI {100 * low:.2g} to {100 * high:.2g} %)"

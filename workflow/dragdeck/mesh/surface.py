@@ -204,12 +204,3 @@ def place(mesh: Trimesh, axis_m: tuple[float, float] | None = None) -> Trimesh:
     low, high = mesh.bounds
     x, y = axis_m or ((low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0)
     return surface(mesh.vertices - np.array([x, y, low[2]]), mesh.faces)
-
-
-def outer_radius(mesh: Trimesh) -> float:
-    """Distance of the outermost node from the z axis, m.
-
-    How near to a wall a workpiece's reference point may come, whichever way the workpiece turns.
-    """
-    used = mesh.vertices[mesh.referenced_vertices]
-    return float(np.hypot(used[:, 0], used[:, 1]).max())

@@ -18,6 +18,7 @@ from dragdeck.cases.bed import (
     bed_timestep,
     bed_volume,
     body_sizes,
+    box_half_width,
     buoyancy_density,
     farthest_point,
     media_classes,
@@ -285,7 +286,7 @@ def rank_split(case: Case) -> Split:
         particles=study.sphere_count,
         radius_m=study.bowl.radius_m,
         height_m=expected_surface(study),
-        half_width_m=_half_width(study),
+        half_width_m=box_half_width(study),
         bottom_m=-study.media.typical_radius_m,
         top_m=box_top(study),
         reach_m=(4 if study.media.clumped else 2) * farthest_point(study) + skin(study),
@@ -399,13 +400,8 @@ def _arrival_speed(study: Study, top_m: float) -> float:
     return fall_speed(max(top_m - expected_surface(study), 0.0), study.gravity_m_s2)
 
 
-def _half_width(study: Study) -> float:
-    """Half of the box's width, m."""
-    return study.bowl.radius_m + 2 * study.media.typical_radius_m
-
-
 def _particles_data(study: Study, top_m: float, types: int) -> str:
-    side = _half_width(study)
+    side = box_half_width(study)
     box = ((-side, side), (-side, side), (-study.media.typical_radius_m, top_m))
     if study.media.clumped:
         return data_file("the empty box", types, box, [])

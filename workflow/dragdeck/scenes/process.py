@@ -64,10 +64,10 @@ from dragdeck.scenes.workpiece import (
     fastest_motion,
     process_cautions,
     reference_height,
+    simulated_mesh,
     workpiece_buoyancy,
     workpiece_facets,
     workpiece_length,
-    workpiece_mesh,
     workpiece_radius,
     workpiece_reach,
 )
@@ -192,7 +192,7 @@ def _mesh_files(each: Sequence[Case]) -> Mapping[Shape, str]:
 
 
 def _stl(case: Case) -> str:
-    return stl_text(workpiece_mesh(case))
+    return stl_text(simulated_mesh(case))
 
 
 def _source(case: Case) -> str:
