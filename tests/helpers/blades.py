@@ -45,14 +45,14 @@ def twisted_blade(
             np.column_stack([low + place, low + beside, high + beside]),
             np.column_stack([low + place, high + beside, high + place]),
         ]
-    bottom, top = (rings + 1) * count, (rings + 1) * count + 1
-    last = rings * count
-    facets += [
-        np.column_stack([beside, place, np.full(count, bottom)]),
-        np.column_stack([last + place, last + beside, np.full(count, top)]),
-    ]
-    points = np.vstack([*nodes, [[0, 0, 0], [0, 0, length]]])
-    corners = np.vstack(facets)
+    front, back = np.arange(across), np.arange(1, across + 1)
+    across_front, across_back = (count - front) % count, count - back
+    strips = np.vstack([
+        np.column_stack([front, back, across_back])[:-1],
+        np.column_stack([front, across_back, across_front])[1:],
+    ])  # fmt: skip
+    points = np.vstack(nodes)
+    corners = np.vstack([*facets, strips[:, ::-1], rings * count + strips])
     first = np.arange(len(corners)) % 3
     return surface(points, np.take_along_axis(corners, (first[:, None] + np.arange(3)) % 3, 1))
 
