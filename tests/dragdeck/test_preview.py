@@ -16,11 +16,12 @@ from dragdeck.cli import main
 from dragdeck.errors import InputError
 from dragdeck.mesh.files import stl_text
 from dragdeck.mesh.shapes import cylinder, prism
+from dragdeck.outlook.process import workpiece_notes
 from dragdeck.preview.layout import COLOURS, CaseLayout, layout
 from dragdeck.preview.swept import swept_volume
 from dragdeck.project import Project
 from dragdeck.scenes.filling import expected_surface
-from dragdeck.scenes.workpiece import check_fit, clearances
+from dragdeck.scenes.workpiece import check_fit, clearances, process_cautions
 
 BAR = {"workpiece.shape": {"kind": "mesh", "file": "bar.stl", "unit": "m"}}
 """The small study drags a hexagonal bar from a file."""
@@ -83,16 +84,15 @@ def test_the_numbers_are_those_of_check(case: Case, capsys: pytest.CaptureFixtur
     assert stated and float(stated[1]) == pytest.approx(wall, rel=0.01)
 
 
-def test_one_particle_diameter_on_a_screen(made: Made, capsys: pytest.CaptureFixture[str]) -> None:
-    """Of clumps, too: that of the sphere around them, in notes and warnings alike."""
-    shape = {"kind": "cylinder", "aspect": 1.2, "spheres": 4}
-    made({"media.shape": shape, "media.radius_std_m": 0, "motion.path.radius_m": 0.011})
-    assert main(["preview", "small"]) == 0
-    shown = capsys.readouterr().out
-    stated = re.findall(r"workpiece and wall: (\S+) particle", shown)
-    warned = re.findall(r"workpiece and bowl is (\S+) particle", shown)
-    assert len(stated) == len(warned) == 1
-    assert float(stated[0]) == pytest.approx(float(warned[0]), rel=0.05)
+def test_notes_and_warnings_have_one_particle_diameter(made: Made) -> None:
+    """Of clumps, too: that of the sphere around them."""
+    shape = {"kind": "cylinder", "aspect": 1.2, "spheres": 2}
+    case = made({"media.shape": shape, "media.radius_std_m": 0, "motion.path.radius_m": 0.011})
+    stated = dict(workpiece_notes(case))["gap between workpiece and wall"]
+    (warned,) = (one.text for one in process_cautions(case) if one.code == "gap")
+    diameters = [float(re.search(r"(\S+) particle diam", text)[1]) for text in (stated, warned)]
+    assert diameters[0] == pytest.approx(diameters[1], rel=0.05)
+    assert diameters[0] < 0.9 * 1e3 * clearances(case, 0.03).wall_m / (2 * 3.27)
 
 
 @pytest.mark.parametrize("missing_m", [-1e-4, 1e-4])
