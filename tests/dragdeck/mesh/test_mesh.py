@@ -340,6 +340,18 @@ def test_wrong_unit_is_named(factor: float, remedy: str):
     assert remedy in str(caught.value.remedy)
 
 
+def test_only_what_is_in_the_bed_must_be_narrower_than_the_bowl():
+    bar = shapes.cylinder(0.005, 0.08, 0.005)
+    high = bar.vertices[:, 2:] > 0.05
+    flared = surfaces.surface(bar.vertices * np.where(high, [12, 12, 1], 1), bar.faces)
+    for depth, told in (
+        (0.02, []),
+        (0.07, ["the size of the workpiece is not plausible in this bowl"]),
+    ):
+        scene = checks.Surroundings(SCENE.bowl_radius_m, SCENE.particle_radius_m, depth)
+        assert problems(flared, surroundings=scene) == told
+
+
 # --- files ------------------------------------------------------------------------
 
 

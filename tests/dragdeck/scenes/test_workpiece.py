@@ -190,9 +190,12 @@ def test_a_part_that_is_wide_in_the_bed_is_refused(with_part: Callable[..., Case
     assert workpiece_radius(deep) == pytest.approx(np.hypot(*2 * [0.004 + 0.1 * 0.0185]))
 
 
-def test_facets_that_would_leave_the_box_are_not_written(with_part: Callable[..., Case]) -> None:
+@pytest.mark.parametrize("tilt_deg", [None, 5])
+def test_facets_that_would_leave_the_box_are_not_written(
+    with_part: Callable[..., Case], tilt_deg: float | None
+) -> None:
     """LIGGGHTS ends a run if the centre of a facet leaves its box."""
-    case = with_part(flared(0.09, above_m=0.02))
+    case = with_part(flared(0.09, above_m=0.02), tilt_deg=tilt_deg)
     lines = [line.split() for line in process_scene(case).files["workpiece.stl"]().splitlines()]
     corners = np.array([line[1:] for line in lines if line[0] == "vertex"], float)
     whole = workpiece_mesh(case)

@@ -21,6 +21,7 @@ from dragdeck.mesh.surface import (
     Integers,
     are_lengths,
     facing_out,
+    points_below,
 )
 
 if TYPE_CHECKING:
@@ -48,10 +49,13 @@ class Surroundings:
     ----------
     bowl_radius_m, particle_radius_m : float
         In metres; the particle's is the mean.
+    depth_m : float
+        Of what is in the bed and must be narrower than the bowl, above the lowest point, m.
     """
 
     bowl_radius_m: float
     particle_radius_m: float
+    depth_m: float = np.inf
 
 
 class Finding(NamedTuple):
@@ -172,15 +176,18 @@ def _implausible_size(mesh: Trimesh, scene: Surroundings) -> list[Finding]:
     problem = "the size of the workpiece is not plausible in this bowl"
     value = " x ".join(f"{length:.4g}" for length in mesh.extents) + " m"
     limit = (
-        f"no larger than ten bowls (diameter {2 * scene.bowl_radius_m:g} m), no smaller than a "
-        f"particle's radius ({scene.particle_radius_m:g} m)"
+        f"narrower than the bowl (diameter {2 * scene.bowl_radius_m:g} m), no longer than ten "
+        f"bowls, no smaller than a particle's radius ({scene.particle_radius_m:g} m)"
     )
     return [Finding(problem, value, limit, _unit_remedy(mesh, scene))]
 
 
 def _plausible(mesh: Trimesh, factor: float, scene: Surroundings) -> bool:
-    longest = factor * mesh.extents.max()
-    return bool(scene.particle_radius_m <= longest <= 10.0 * 2.0 * scene.bowl_radius_m)
+    low, high = mesh.bounds[:, 2]
+    in_bed = points_below(mesh, min(high, low + scene.depth_m / factor))
+    bowl_m, longest = 2.0 * scene.bowl_radius_m, factor * mesh.extents.max()
+    narrow = factor * np.ptp(in_bed[:, :2], axis=0).max() < bowl_m
+    return bool(narrow and scene.particle_radius_m <= longest <= 10.0 * bowl_m)
 
 
 def _unit_remedy(mesh: Trimesh, scene: Surroundings) -> str:

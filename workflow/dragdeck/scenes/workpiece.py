@@ -188,7 +188,9 @@ def _too_fine(case: Case) -> Iterator[Caution]:
 
 
 def _of_case(case: Case, shape: MeshShape) -> "tuple[Trimesh, list[Finding]]":
-    surroundings = Surroundings(case.study.bowl.radius_m, case.study.media.typical_radius_m)
+    study = case.study
+    sizes = study.bowl.radius_m, study.media.typical_radius_m, deepest(study.motion)
+    surroundings = Surroundings(*sizes)
     return _from_file(mesh_file(case, shape), shape, surroundings)
 
 
@@ -204,7 +206,7 @@ def simulated_mesh(case: Case) -> "Trimesh":
         A facet reaches from the bed out of the box.
     """
     mesh, motion = workpiece_mesh(case), case.study.motion
-    if motion.leans:
+    if motion.path.leans or motion.turns_about_inclined_axis:
         return mesh
     half_width_m = box_half_width(case.study)
     outside = np.hypot(*mesh.triangles_center[:, :2].T) + farthest_reach(motion) > half_width_m
@@ -245,7 +247,7 @@ def workpiece_radius(case: Case) -> float:
     if isinstance(shape, CylinderShape):
         return cylinder_radius(shape.radius_m, _generated_length(case), shape.facet_size_m)
     mesh, _ = _of_case(case, shape)
-    below = points_below(mesh, math.inf if motion.leans else deepest(motion))
+    below = points_below(mesh, mesh.bounds[1, 2] if motion.leans else deepest(motion))
     return float(np.hypot(*below[:, :2].T).max())
 
 
