@@ -17,10 +17,11 @@ from dragdeck.cli import main
 from dragdeck.errors import InputError
 from dragdeck.mesh.files import stl_text
 from dragdeck.mesh.shapes import cylinder, prism
+from dragdeck.outlook.process import workpiece_notes
 from dragdeck.preview.layout import COLOURS, CaseLayout, layout
 from dragdeck.preview.swept import swept_volume
 from dragdeck.project import Project
-from dragdeck.scenes.workpiece import check_fit, clearances
+from dragdeck.scenes.workpiece import check_fit, clearances, process_cautions
 
 BAR = {"workpiece.shape": {"kind": "mesh", "file": "bar.stl", "unit": "m"}}
 """The small study drags a hexagonal bar from a file."""
@@ -81,6 +82,17 @@ def test_the_numbers_are_those_of_check(case: Case, capsys: pytest.CaptureFixtur
     wall = (0.025 - 0.010 - 0.004) / 2 / 3.27e-3
     stated = re.search(r"workpiece and wall: (\S+) particle diameters", shown)
     assert stated and float(stated[1]) == pytest.approx(wall, rel=0.01)
+
+
+def test_notes_and_warnings_have_one_particle_diameter(made: Made) -> None:
+    """Of clumps, too: that of the sphere around them."""
+    shape = {"kind": "cylinder", "aspect": 1.2, "spheres": 2}
+    case = made({"media.shape": shape, "media.radius_std_m": 0, "motion.path.radius_m": 0.011})
+    stated = dict(workpiece_notes(case))["gap between workpiece and wall"]
+    (warned,) = (one.text for one in process_cautions(case) if one.code == "gap")
+    diameters = [float(re.search(r"(\S+) particle diam", text)[1]) for text in (stated, warned)]
+    assert diameters[0] == pytest.approx(diameters[1], rel=0.05)
+    assert diameters[0] < 0.9 * 1e3 * clearances(case, 0.03).wall_m / (2 * 3.27)
 
 
 @pytest.mark.parametrize("missing_m", [-1e-4, 1e-4])

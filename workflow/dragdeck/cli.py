@@ -79,6 +79,22 @@ COMMANDS = (
             "study. It writes nothing.",
             "commands:shapes", (STUDY, FIDELITY),
             "dragdeck shapes cylinders"),
+    Command("mesh", "count contacts that LIGGGHTS overlooks on a mesh",
+            "Show at how many positions at its convex edges LIGGGHTS overlooks the contact of a "
+            "sphere with a mesh: as the file is, and with the corners of its facets turned, as "
+            "input scripts of dragdeck always contain them.",
+            "mesh.contacts:report", (
+        Argument("file", type=Path, metavar="FILE",
+                  help="STL, OBJ, PLY, VTK, VTU or STEP file"),
+        Argument("--unit", default="mm", metavar="UNIT",
+                  help="unit of length in the file: m, cm, mm, um or in (default: %(default)s)"),
+        Argument("--radius", type=float, default=0.002, metavar="M", dest="radius_m",
+                  help="radius of the spheres, m (default: %(default)s)"),
+        Argument("--facet-size", type=float, metavar="M", dest="facet_size_m",
+                  help="edge length of the facets of a STEP file, m; required for STEP only"),
+        Argument("--out", type=Path, metavar="FILE",
+                  help="write the turned facets to FILE as ASCII STL, in the unit of the input")),
+            "dragdeck mesh part.stl --out turned.stl"),
     Command("advise", "find settings for a tolerance",
             "Find the cheapest settings that keep the error of a quantity within a tolerance, and "
             "show the error and cost of each setting. It reads the measured trade-off and the "

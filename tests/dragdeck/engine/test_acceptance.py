@@ -1,5 +1,6 @@
 """What tells a whole output file from one that was cut short."""
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -123,6 +124,39 @@ def test_a_bed_whose_motion_changes_fails(tmp_path: Path, last: float, fails: se
     steady = SteadyCriterion(from_step=10, energy_drift=0.1)
     thermo = THERMO.model_copy(update={"last_step": 70})
     assert failed(tmp_path, INPUTS.model_copy(update={"steady": steady}), thermo=thermo) == fails
+
+
+SPEEDS = "step time_s force_x_n fastest_particle_m_s\n"
+
+
+@pytest.mark.parametrize(
+    ("speeds", "seen"),
+    [
+        ((0.2, 2.4, 0.3), None),
+        ((0.2, 0.3, 2.6), "a particle at 2.6 m/s at step 30"),
+        ((0.2, math.nan, 0.3), "a particle at nan m/s at step 20"),
+        ((), None),
+    ],
+)
+def test_a_thrown_particle_fails(
+    tmp_path: Path, speeds: tuple[float, ...], seen: str | None
+) -> None:
+    """In whichever part and at whichever sample it was fast."""
+    force = output_of_run(
+        "workpiece_force", "print", SPEEDS.split(), 10, 10, 30, pattern="force.{part}.txt"
+    )
+    rows = [f"{10 * number} 0.1 1.5 {speed}\n" for number, speed in enumerate(speeds, 1)]
+    for part, some in enumerate((rows[:2], rows[2:]), 1):
+        (tmp_path / f"force.{part}.txt").write_text(SPEEDS + "".join(some) + "40 0.1")
+        (tmp_path / f"screen.{part}.txt").write_text(GRID + "DRAGDECK END\n")
+    inputs = INPUTS.model_copy(update={"thrown_m_s": 2.5})
+    parts = [RunPart(part=part, checkpoint=None, from_step=0) for part in (1, 2)]
+    checks = check_run(tmp_path, inputs, {"workpiece_force": force}, 0, parts, ranks=1)
+    (check,) = (check for check in checks if check.code == "none_thrown")
+    assert check.passed is (seen is None)
+    assert seen is None or check.seen == seen
+    old = check_run(tmp_path, INPUTS, {"workpiece_force": force}, 0, parts, ranks=1)
+    assert "none_thrown" not in {check.code for check in old}  # a run that did not sample it
 
 
 SETTLED = SettlingCriterion(energy_ratio=1e-6, highest_m=0.05)

@@ -79,8 +79,9 @@ def test_cylinder_against_the_formulas(facet_size_m: float):
     assert workpiece.area_faces[~on_side].sum() == pytest.approx(2 * section, rel=1e-12)
     assert workpiece.bounds[:, 2].tolist() == [0.0, length]
     assert surfaces.place(workpiece).vertices == pytest.approx(workpiece.vertices, abs=1e-15)
-    assert surfaces.outer_radius(workpiece) == pytest.approx(corner)
-    assert shapes.cylinder_radius(radius, length, facet_size_m) == surfaces.outer_radius(workpiece)
+    outermost = np.hypot(*workpiece.vertices[:, :2].T).max()
+    assert outermost == pytest.approx(corner)
+    assert shapes.cylinder_radius(radius, length, facet_size_m) == outermost
     assert checks.findings(workpiece, surroundings=SCENE) == []
 
 
@@ -337,6 +338,18 @@ def test_wrong_unit_is_named(factor: float, remedy: str):
     with pytest.raises(InputError) as caught:
         checks.check(wrong, surroundings=SCENE)
     assert remedy in str(caught.value.remedy)
+
+
+def test_only_what_is_in_the_bed_must_be_narrower_than_the_bowl():
+    bar = shapes.cylinder(0.005, 0.08, 0.005)
+    high = bar.vertices[:, 2:] > 0.05
+    flared = surfaces.surface(bar.vertices * np.where(high, [12, 12, 1], 1), bar.faces)
+    for depth, told in (
+        (0.02, []),
+        (0.07, ["the size of the workpiece is not plausible in this bowl"]),
+    ):
+        scene = checks.Surroundings(SCENE.bowl_radius_m, SCENE.particle_radius_m, depth)
+        assert problems(flared, surroundings=scene) == told
 
 
 # --- files ------------------------------------------------------------------------

@@ -283,6 +283,11 @@ def full_stiffness_number(study: Study) -> float:
     return stiffness_number(particle_material(study), tip_pressure(study))
 
 
+def box_half_width(study: Study) -> float:
+    """Half of the simulation box's width, from the axis of the bowl, m."""
+    return study.bowl.radius_m + 2 * study.media.typical_radius_m
+
+
 def skin(study: Study) -> float:
     """Neighbour skin, m: the fidelity's own, or a tenth of the mean radius."""
     chosen = study.chosen_fidelity().skin_m

@@ -195,6 +195,7 @@ _RADIUS = Column("radius_m", "radius")
 _BODY = Column("body_id", "id_multisphere", whole=True)
 _STEP = Column("step", "step", whole=True)
 _TIME = Column("time_s", "step*dt")
+_FASTEST = Column("fastest_particle_m_s", "c_fastest_particle")
 
 WORKPIECE_FORCE = "workpiece_force"
 """Output of the force on a workpiece, and the first part of its name for further ones."""
@@ -211,7 +212,7 @@ def thermo(period: int, last: int | None, entry: int = 0) -> Output:
         Column("n_particles", "atoms", whole=True),
         Column("kinetic_energy_j", "c_kinetic"),
         Column("rotational_energy_j", "c_rotation"),
-        Column("fastest_particle_m_s", "c_fastest_particle"),
+        _FASTEST,
     )
     purpose = "particle count, energies, largest speed, for acceptance checks and thermo.parquet"
     return Output("thermo", "print", columns, period, entry + period, last, purpose=purpose)
@@ -225,13 +226,17 @@ def settled_particles(clumped: bool = False) -> Output:
 
 
 def workpiece_force(period: int, last: int, workpiece: str, entry: int = 0) -> Output:
-    """Force and torque on a workpiece after the entry, and where its reference point is."""
+    """Force and torque on a workpiece after the entry, and where its reference point is.
+
+    With the largest speed of a particle, for the acceptance check that no contact threw one.
+    """
     columns = (
         _STEP,
         _TIME,
         *_vector("force", "n", f"f_{workpiece}"),
         *_vector("torque", "n_m", f"f_{workpiece}", 4),
         *_vector("ref", "m", f"f_{workpiece}", 7),
+        _FASTEST,
     )
     name = workpiece.replace("workpiece", WORKPIECE_FORCE)
     purpose = "force, torque and position of the workpiece, for workpiece_force.parquet (drag)"

@@ -7,12 +7,13 @@ from pathlib import Path
 import numpy as np
 
 from dragdeck.decks import CASE_FILE, PACKING_FILE
-from dragdeck.decks.outputs import OutputOfRun
+from dragdeck.decks.outputs import WORKPIECE_FORCE, OutputOfRun
 from dragdeck.engine import log
 from dragdeck.engine.checkpoints import is_whole
 from dragdeck.engine.completeness import coverage, part_files, some_frames
 from dragdeck.physics.contact_mechanics import Floats, stability_number
 from dragdeck.physics.rigid import Ints, RigidBodies, pose
+from dragdeck.physics.run_limits import SPEED_FACTOR
 from dragdeck.records.case import CaseOfRun
 from dragdeck.records.run import (
     AcceptanceCheck,
@@ -71,6 +72,8 @@ def check_run(
         checks += _thermo(samples, inputs.media.n_spheres)
         if inputs.steady is not None:
             checks.append(_steady(samples, inputs.steady))
+    if inputs.thrown_m_s is not None and WORKPIECE_FORCE in outputs:
+        checks.append(_thrown(folder, outputs[WORKPIECE_FORCE], parts, inputs.thrown_m_s))
     checks += [_complete(folder, name, output, parts) for name, output in outputs.items()]
     checks.append(ranks_check(log.decomposition(screens[-1]), ranks))
     if inputs.scene in ("filling", "process") and "particles" in outputs:
@@ -178,6 +181,29 @@ def _thermo(samples: list[log.Sample], count: int) -> list[AcceptanceCheck]:
         _check("particles_kept", "no particle lost", fewest == count, seen, limit),
         _check("finite_numbers", "finite numbers", finite, f"{len(samples)} thermo rows", "no NaN"),
     ]
+
+
+def _thrown(
+    folder: Path, force: OutputOfRun, parts: Sequence[RunPart], limit_m_s: float
+) -> AcceptanceCheck:
+    """Whether no particle was ever as fast as one that a contact found too late has thrown."""
+    place = force.columns.index("fastest_particle_m_s")
+    files = part_files(folder, {"": force}, parts)
+    rows = [row.split() for file in files for row in _text(file).splitlines()]
+    whole = [row for row in rows if len(row) == len(force.columns) and row[0].isdigit()]
+    speeds = np.array([float(row[place]) for row in whole])
+    passed = bool((speeds <= limit_m_s).all())
+    seen, fastest = "no sample", None
+    if len(speeds):
+        at = int(speeds.argmax())  # NaN, if there is one
+        fastest = float(speeds[at])
+        seen = f"a particle at {fastest:.3g} m/s at step {int(whole[at][0]):,}"
+    limit = (
+        f"{limit_m_s:.3g} m/s, a fall through the simulation box plus {SPEED_FACTOR:g} times the "
+        "largest speed of the scene"
+    )
+    known = fastest if fastest is not None and math.isfinite(fastest) else None
+    return _check("none_thrown", "no particle thrown", passed, seen, limit, number=known)
 
 
 def _complete(

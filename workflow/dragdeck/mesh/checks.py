@@ -21,6 +21,7 @@ from dragdeck.mesh.surface import (
     Integers,
     are_lengths,
     facing_out,
+    points_below,
 )
 
 if TYPE_CHECKING:
@@ -48,10 +49,13 @@ class Surroundings:
     ----------
     bowl_radius_m, particle_radius_m : float
         In metres; the particle's is the mean.
+    depth_m : float
+        Of what is in the bed and must be narrower than the bowl, above the lowest point, m.
     """
 
     bowl_radius_m: float
     particle_radius_m: float
+    depth_m: float = np.inf
 
 
 class Finding(NamedTuple):
@@ -179,10 +183,10 @@ def _implausible_size(mesh: Trimesh, scene: Surroundings) -> list[Finding]:
 
 
 def _plausible(mesh: Trimesh, factor: float, scene: Surroundings) -> bool:
-    width, depth, height = factor * mesh.extents
-    bowl_m = 2.0 * scene.bowl_radius_m
-    longest = max(width, depth, height)
-    narrow = max(width, depth) < bowl_m
+    low, high = mesh.bounds[:, 2]
+    in_bed = points_below(mesh, min(high, low + scene.depth_m / factor))
+    bowl_m, longest = 2.0 * scene.bowl_radius_m, factor * mesh.extents.max()
+    narrow = factor * np.ptp(in_bed[:, :2], axis=0).max() < bowl_m
     return bool(narrow and scene.particle_radius_m <= longest <= 10.0 * bowl_m)
 
 

@@ -154,6 +154,15 @@ def tilted(mesh: Trimesh, angle_deg: float, *, about_tip: bool = False) -> Trime
     return surface(corners - [0.0, 0.0, lowest], mesh.faces)
 
 
+def obtuse_third(nodes: Floats, facets: Integers) -> Integers:
+    """(M, 3) array: the facets, turned cyclically so that an obtuse corner is the third."""
+    corners = nodes[facets]
+    before, after = (np.roll(corners, shift, axis=1) - corners for shift in (1, -1))
+    cosines = (before * after).sum(axis=2)  # times lengths; not einsum, whose rounding varies
+    first = np.where(cosines.min(axis=1) < 0.0, cosines.argmin(axis=1) + 1, 0)
+    return np.take_along_axis(facets, (first[:, None] + np.arange(3)) % 3, axis=1)
+
+
 def points_below(mesh: Trimesh, height_m: float) -> Floats:
     """Corners, (N, 3), of what a mesh has below a height, m."""
     begin, end = mesh.vertices[mesh.edges_unique].transpose(1, 0, 2)
@@ -195,12 +204,3 @@ def place(mesh: Trimesh, axis_m: tuple[float, float] | None = None) -> Trimesh:
     low, high = mesh.bounds
     x, y = axis_m or ((low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0)
     return surface(mesh.vertices - np.array([x, y, low[2]]), mesh.faces)
-
-
-def outer_radius(mesh: Trimesh) -> float:
-    """Distance of the outermost node from the z axis, m.
-
-    How near to a wall a workpiece's reference point may come, whichever way the workpiece turns.
-    """
-    used = mesh.vertices[mesh.referenced_vertices]
-    return float(np.hypot(used[:, 0], used[:, 1]).max())

@@ -5,7 +5,7 @@ import math
 from dragdeck.cases.case import Case, of_each_workpiece
 from dragdeck.cases.ranks import cores_here
 from dragdeck.scenes.filling import MOST_OVERLAP, expected_bed, floor_overlap, rank_split
-from dragdeck.scenes.workpiece import clearances, closest, describe, fastest_surface
+from dragdeck.scenes.workpiece import clearances, closest, describe, fastest_surface, in_diameters
 from dragdeck.study.contact_law import compared_labels
 
 _RATIOS = {
@@ -44,8 +44,7 @@ def dimensionless(case: Case) -> list[tuple[str, str]]:
 
 
 def _gap(case: Case, gap_m: float) -> str:
-    diameters = gap_m / (2 * case.study.media.typical_radius_m)
-    return f"{diameters:.3g} particle diameters, {1e3 * gap_m:.3g} mm"
+    return f"{in_diameters(case, gap_m):.3g} particle diameters, {1e3 * gap_m:.3g} mm"
 
 
 def _between(case: Case) -> list[tuple[str, str]]:

@@ -36,6 +36,16 @@ class RunLimits:
     why: str
 
 
+def thrown_speed(gravity_m_s2: float, height_m: float, speed_m_s: float) -> float:
+    """Speed above which a contact that was found too late has thrown a particle, m/s.
+
+    A fall through a box of this height plus `SPEED_FACTOR` times the largest speed of what moves
+    in it: particles that are squeezed out between others were seen at 2 to 3 times, once at 6
+    times the speed of a slow workpiece.
+    """
+    return math.sqrt(2 * gravity_m_s2 * height_m) + SPEED_FACTOR * speed_m_s
+
+
 def run_limits(
     particles: int, mass_kg: float, gravity_m_s2: float, height_m: float, speed_m_s: float
 ) -> RunLimits:

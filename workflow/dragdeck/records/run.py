@@ -101,6 +101,8 @@ class CaseFile(Document):
         Criterion for a steadily moving bed; absent if the bowl is at rest.
     limits : RunLimits or None
         Limits of energy and speed; beyond them the run is stopped. Absent if it is not watched.
+    thrown_m_s : float or None
+        Speed of a particle that was thrown, m/s; absent if the speeds are not sampled.
     """
 
     remedy = "write it with: dragdeck step render"
@@ -123,6 +125,7 @@ class CaseFile(Document):
     settled: SettlingCriterion | None = omitted(None)
     steady: SteadyCriterion | None = omitted(None)
     limits: RunLimits | None = omitted(None)
+    thrown_m_s: PositiveFloat | None = omitted(None)
 
     @model_validator(mode="after")
     def _joined(self) -> Self:
@@ -144,6 +147,7 @@ CheckCode = Literal[
     "particles_kept",
     "finite_numbers",
     "within_limits",
+    "none_thrown",
     "output_complete",
     "packing_whole",
     "packing_in_bowl",
@@ -162,6 +166,8 @@ REMEDIES: Mapping[CheckCode, str] = {
     "finite_numbers": _SMALLER_STEP,
     "stable_timestep": _SMALLER_STEP,
     "within_limits": _SMALLER_STEP,
+    "none_thrown": "a contact was found too late: look at the workpiece where the force peaks, try "
+    "dragdeck mesh FILE on its mesh, or choose a smaller timestep_fraction",
     "output_complete": "start the run again with: dragdeck run --again",
     "ranks": "use the mpirun that belongs to this LIGGGHTS (DRAGDECK_LAUNCHER)",
 }

@@ -19,6 +19,7 @@ from dragdeck.cases.bed import (
     bed_timestep,
     bed_volume,
     body_sizes,
+    box_half_width,
     buoyancy_density,
     expected_surface,
     farthest_point,
@@ -263,7 +264,7 @@ def _check_cells(case: Case) -> None:
     """
     study = case.study
     largest = max(float(one.radii_m[-1] * one.clump.radii.max()) for one in bed_classes(study))
-    box = 4 * _half_width(study) ** 2 * (box_top(study) + study.media.typical_radius_m)
+    box = 4 * box_half_width(study) ** 2 * (box_top(study) + study.media.typical_radius_m)
     cells = box / (largest + skin(study) / 2) ** 3
     if cells * _CELL_BYTES > _MOST_CELL_BYTES:
         raise InputError(
@@ -305,7 +306,7 @@ def rank_split(case: Case) -> Split:
         particles=study.sphere_count,
         radius_m=study.bowl.radius_m,
         height_m=expected_surface(study),
-        half_width_m=_half_width(study),
+        half_width_m=box_half_width(study),
         bottom_m=-study.media.typical_radius_m,
         top_m=box_top(study),
         reach_m=(4 if study.media.clumped else 2) * farthest_point(study) + skin(study),
@@ -456,13 +457,8 @@ def _arrival_speed(study: Study, top_m: float) -> float:
     return fall_speed(max(top_m - expected_surface(study), 0.0), study.gravity_m_s2)
 
 
-def _half_width(study: Study) -> float:
-    """Half of the box's width, m."""
-    return study.bowl.radius_m + 2 * study.media.typical_radius_m
-
-
 def _particles_data(study: Study, top_m: float, types: int) -> str:
-    side = _half_width(study)
+    side = box_half_width(study)
     box = ((-side, side), (-side, side), (-study.media.typical_radius_m, top_m))
     if study.media.clumped:
         return data_file("the empty box", types, box, [])

@@ -24,7 +24,7 @@ from dragdeck.physics.contact_mechanics import ENGINE_NEIGHBOURS
 from dragdeck.physics.domain_split import rank_warnings
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import round_to
-from dragdeck.physics.run_limits import RunLimits
+from dragdeck.physics.run_limits import RunLimits, thrown_speed
 from dragdeck.records.case import AssumptionOfRun, ProcessCase, StatisticsOfRun, WorkpieceOfRun
 from dragdeck.records.run import Phase, SteadyCriterion
 from dragdeck.scenes.drop_test import DROP_TEST
@@ -64,10 +64,10 @@ from dragdeck.scenes.workpiece import (
     fastest_motion,
     process_cautions,
     reference_height,
+    simulated_mesh,
     workpiece_buoyancy,
     workpiece_facets,
     workpiece_length,
-    workpiece_mesh,
     workpiece_radius,
     workpiece_reach,
 )
@@ -148,11 +148,20 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
     )
     number = max(case.number, 1) - 1
     own = {WORKPIECE_MESH: partial(_stl, each[number])}
-    limits = bed_limits(study, top, max(map(_fastest, each, courses)))
+    fastest = max(map(_fastest, each, courses))
+    limits = bed_limits(study, top, fastest)
     models = {body.mesh: partial(_stl, one) for one, body in zip(each, moved, strict=True)}
     return Scene(
         deck=deck,
-        case=_process_case(each, number, bed.surface_m, courses[number], limits, steps),
+        case=_process_case(
+            each,
+            number,
+            bed.surface_m,
+            courses[number],
+            limits,
+            steps,
+            thrown_speed(study.gravity_m_s2, top, fastest),
+        ),
         steps=steps.end - steps.entry,
         facets=sum(counts),
         files=own if number else {**models, **_bowl_files(study, top)},
@@ -183,7 +192,7 @@ def _mesh_files(each: Sequence[Case]) -> Mapping[Shape, str]:
 
 
 def _stl(case: Case) -> str:
-    return stl_text(workpiece_mesh(case))
+    return stl_text(simulated_mesh(case))
 
 
 def _source(case: Case) -> str:
@@ -236,6 +245,7 @@ def _process_case(
     way: Course,
     limits: RunLimits,
     steps: Covered,
+    thrown_m_s: float,
 ) -> ProcessCase:
     case, drag = each[number], way.drag
     study, motion = case.study, case.study.motion
@@ -284,6 +294,7 @@ def _process_case(
         if motion.bowl_rad_s
         else None,
         limits=limits,
+        thrown_m_s=thrown_m_s,
     )
 
 

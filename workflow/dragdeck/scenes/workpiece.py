@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from dragdeck.cases.bed import (
     JUST_BEYOND,
     bed_timestep,
+    box_half_width,
     farthest_point,
     full_stiffness_number,
     impact_time,
@@ -32,11 +33,11 @@ from dragdeck.cases.bed import (
 from dragdeck.cases.case import Case, mesh_file, of_each_workpiece
 from dragdeck.errors import Caution, InputError, together
 from dragdeck.mesh.checks import Finding, Surroundings, check
+from dragdeck.mesh.contacts import gap_fraction
 from dragdeck.mesh.files import read
 from dragdeck.mesh.shapes import cylinder, cylinder_facets, cylinder_radius
 from dragdeck.mesh.surface import (
     facing_out,
-    outer_radius,
     place,
     points_below,
     surface,
@@ -75,6 +76,9 @@ FACET_STEP_S = 3e-7
 _MOST_TIMES, _ALWAYS_FACETS = 5, 5000
 """Facets are too many if they take this many times as long as the particles, and never below that
 number."""
+
+_MOST_GAPS = 0.01
+"""Part of a workpiece's surface on which LIGGGHTS may overlook contacts without a word."""
 
 _LOOKS = 100
 """How often it is looked how a workpiece leans on its path."""
@@ -141,12 +145,24 @@ def _postures(case: Case) -> Iterator[NDArray[np.float64]]:
 
 def workpiece_warnings(case: Case) -> list[Caution]:
     """What is doubtful in the mesh of the user's, what was repaired, and what makes it slow."""
-    shape, slow = case.study.workpiece.shape, list(_too_fine(case))
-    if isinstance(shape, CylinderShape):
-        return slow
-    _, found = _of_case(case, shape)
-    said = (f"{shape.file}: {one.problem}: {one.value} ({one.remedy})" for one in found)
-    return [*(Caution("mesh", text) for text in said), *slow]
+    shape, said = case.study.workpiece.shape, []
+    if isinstance(shape, MeshShape):
+        mesh, found = _of_case(case, shape)
+        said = [f"{shape.file}: {one.problem}: {one.value} ({one.remedy})" for one in found]
+        said += _gaps(mesh, shape, case.study.media.typical_radius_m)
+    return [*(Caution("mesh", text) for text in said), *_too_fine(case)]
+
+
+def _gaps(mesh: "Trimesh", shape: MeshShape, radius_m: float) -> Iterator[str]:
+    """A remark where many contacts are overlooked between nearly coplanar facets."""
+    fraction = gap_fraction(mesh, radius_m)
+    if fraction > _MOST_GAPS:
+        where = "" if shape.facet_size_m is None else ": a larger workpiece.shape.facet_size_m"
+        yield (
+            f"{shape.file}: LIGGGHTS overlooks contacts on {100 * fraction:.2g} % of the surface, "
+            "at convex edges between facets less than 0.26 degrees apart (mesh curved faces with "
+            f"larger facets{where})"
+        )
 
 
 def _too_fine(case: Case) -> Iterator[Caution]:
@@ -172,8 +188,37 @@ def _too_fine(case: Case) -> Iterator[Caution]:
 
 
 def _of_case(case: Case, shape: MeshShape) -> "tuple[Trimesh, list[Finding]]":
-    surroundings = Surroundings(case.study.bowl.radius_m, case.study.media.typical_radius_m)
+    study = case.study
+    sizes = study.bowl.radius_m, study.media.typical_radius_m, deepest(study.motion)
+    surroundings = Surroundings(*sizes)
     return _from_file(mesh_file(case, shape), shape, surroundings)
+
+
+def simulated_mesh(case: Case) -> "Trimesh":
+    """The workpiece without what would leave the simulation box above the bed.
+
+    LIGGGHTS ends a run if the centre of a facet leaves the box; of a wide part above the bed,
+    such as a holder plate, no particle is there.
+
+    Raises
+    ------
+    InputError
+        A facet reaches from the bed out of the box.
+    """
+    mesh, motion = workpiece_mesh(case), case.study.motion
+    if motion.path.leans or motion.turns_about_inclined_axis:
+        return mesh
+    half_width_m = box_half_width(case.study)
+    outside = np.hypot(*mesh.triangles_center[:, :2].T) + farthest_reach(motion) > half_width_m
+    if (outside & (mesh.triangles[:, :, 2].min(axis=1) < deepest(motion))).any():
+        raise InputError(
+            "a facet of the workpiece reaches from the bed out of the simulation box",
+            file=case.file,
+            field="workpiece.shape",
+            limit=f"a centre within {half_width_m:.4g} m from the axis of the bowl",
+            remedy="mesh the part with smaller facets, or cut it off above the bed",
+        )
+    return surface(mesh.vertices, mesh.faces[~outside]) if outside.any() else mesh
 
 
 def workpiece_length(case: Case) -> float:
@@ -194,11 +239,16 @@ def _generated_length(case: Case) -> float:
 
 
 def workpiece_radius(case: Case) -> float:
-    """Radius of the cylinder around the workpiece and its own axis, m."""
-    shape = case.study.workpiece.shape
+    """Radius of the cylinder around the workpiece's own axis and what is in the bed, m.
+
+    A workpiece that leans counts as a whole.
+    """
+    shape, motion = case.study.workpiece.shape, case.study.motion
     if isinstance(shape, CylinderShape):
         return cylinder_radius(shape.radius_m, _generated_length(case), shape.facet_size_m)
-    return outer_radius(_of_case(case, shape)[0])
+    mesh, _ = _of_case(case, shape)
+    below = points_below(mesh, mesh.bounds[1, 2] if motion.leans else deepest(motion))
+    return float(np.hypot(*below[:, :2].T).max())
 
 
 def workpiece_reach(case: Case) -> float:
@@ -305,6 +355,11 @@ def clearances(case: Case, surface_m: float) -> Clearances:
     return Clearances(_wall_gap(case), tip, tip + vertical_range(motion)[0] - dip(case))
 
 
+def in_diameters(case: Case, gap_m: float) -> float:
+    """A gap in diameters of the sphere around a mean particle of the first class."""
+    return gap_m / (2 * typical_reach(case.study))
+
+
 def _wall_gap(case: Case) -> float:
     """Narrowest gap between the workpiece and the wall, m; no bed is needed for it."""
     return case.study.bowl.radius_m - farthest_surface(case)
@@ -384,7 +439,14 @@ def process_cautions(case: Case) -> Iterator[Caution]:
     """What a user should know of the workpiece and its motion before a process runs."""
     study = case.study
     yield from workpiece_warnings(case)
-    gap = _wall_gap(case) / (2 * typical_reach(study))
+    left_out = workpiece_facets(case) - len(simulated_mesh(case).faces)
+    if left_out:
+        yield Caution(
+            "mesh",
+            f"{left_out:,} facets above the bed would leave the simulation box, "
+            f"{box_half_width(study):.3g} m from the axis of the bowl: the run leaves them out",
+        )
+    gap = in_diameters(case, _wall_gap(case))
     if gap < _JAMMING_GAP:
         yield Caution(
             "gap",
