@@ -8,8 +8,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from pydantic import JsonValue
-
 from dragdeck.cases.ranks import auto_ranks, cores_here, ranks_within
 from dragdeck.records.advised import AdvisedSettings
 from dragdeck.study.base import Json
@@ -164,11 +162,6 @@ def mesh_file(case: Case, shape: MeshShape) -> Path:
         No such file in any of these places.
     """
     return mesh_beside(case.file, shape.file)
-
-
-def materials_content(study: Study, *names: str) -> dict[str, JsonValue]:
-    """Materials as plain data, by name."""
-    return {name: study.materials[name].plain() for name in sorted(set(names))}
 
 
 def digest(content: Json) -> str:

@@ -4,14 +4,14 @@ import math
 from dataclasses import dataclass
 
 from dragdeck.cases.bed import impact_time, particle_material
-from dragdeck.cases.case import Case, materials_content
+from dragdeck.cases.case import Case
 from dragdeck.decks import outputs
 from dragdeck.decks.deck import Body, Deck, LeftOut, Scene, data_file
 from dragdeck.physics.contact_mechanics import fall_speed, rayleigh_time
 from dragdeck.physics.rounding import timestep
 from dragdeck.records.case import DropTestCase
 from dragdeck.scenes.scene import SceneType, case_of_study, material_table
-from dragdeck.study.base import Json
+from dragdeck.study.base import Json, without
 from dragdeck.study.model import Study
 
 _MARGIN = 0.5
@@ -97,6 +97,7 @@ def drop_scene(case: Case, fidelity: DropFidelity | None = None) -> Scene[DropTe
             dt,
             rayleigh,
             settings={"youngs_modulus_scale": scale, "skin_m": deck.skin_m, "ranks": 1},
+            bodies=(),
             restitution=study.pair(study.media.main_material, study.workpiece.material).restitution,
         ),
         steps=round(_duration(study) / dt),
@@ -147,17 +148,26 @@ def _particle_data(study: Study, types: int) -> str:
     return data_file("one particle above a plate", types, box, [particle])
 
 
+_NOT_READ = (
+    *("bowl", "compound", "fidelity", "filling", "motion", "outputs", "seed"),
+    *("workpiece.shape", "workpieces"),
+)
+_NOT_READ_OF_MEDIA = (
+    *("classes", "count", "distribution", "fill_height_m", "fraction", "fractions_of"),
+    *("mass_kg", "radius_std_m", "shape"),
+)
+"""Fields that a drop test does not depend on: it has the first class's mean particle."""
+
+
 def _content(case: Case) -> Json:
     """What a drop test depends on."""
     study = case.study
     particle, plate = study.media.main_material, study.workpiece.material
     return {
-        "materials": materials_content(study, particle, plate),
-        "pair": study.pair(particle, plate).plain(),
-        "radius_m": study.media.typical_radius_m,
-        "gravity_m_s2": study.gravity_m_s2,
-        "contact": study.contact.plain(),
-        "drop_test": study.drop_test.plain(),
+        **without(study.of_runs(), *_NOT_READ),
+        "materials": {name: study.materials[name].plain() for name in (particle, plate)},
+        "pairs": {f"{particle}-{plate}": study.pair(particle, plate).plain()},
+        "media": without(study.media.main.plain(), *_NOT_READ_OF_MEDIA),
     }
 
 

@@ -31,7 +31,7 @@ from dragdeck.cases.bed import (
     weight_acceleration,
     weight_density,
 )
-from dragdeck.cases.case import Case, materials_content
+from dragdeck.cases.case import Case
 from dragdeck.decks import outputs
 from dragdeck.decks.deck import Body, Deck, LeftOut, Scene, data_file
 from dragdeck.errors import Caution, InputError
@@ -62,7 +62,7 @@ from dragdeck.scenes.scene import (
     material_table,
     media_of_run,
 )
-from dragdeck.study.base import Json
+from dragdeck.study.base import Json, without
 from dragdeck.study.media import MOST_SIZES, Media
 from dragdeck.study.model import Study
 from dragdeck.study.shapes import SOLID_FRACTION_STD
@@ -151,7 +151,7 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
             FillingCase,
             case,
             FILLING.run_id(case),
-            filling_content(case),
+            _content(case),
             dt,
             rayleigh,
             media=media_of_run(study, buoyancy_density(study)),
@@ -477,29 +477,19 @@ def _particles_data(study: Study, top_m: float, types: int) -> str:
     return data_file("particles before they fall", types, box, bodies)
 
 
-def filling_content(case: Case) -> Json:
-    """What a filling depends on: less than a process, so that many share one."""
+_NOT_READ = (
+    *("bowl.facet_size_m", "drop_test", "motion", "outputs", "workpiece", "workpieces"),
+    *("fidelity.filling_youngs_modulus_scale", "fidelity.soft_start", "fidelity.speed_factor"),
+    *("fidelity.timestep_fraction", "fidelity.windows"),
+)
+"""Fields that a filling does not depend on, so that many processes share it."""
+
+
+def _content(case: Case) -> Json:
+    """What a filling depends on."""
     study = case.of_filling.study
-    particles, bowl = study.media.materials, study.bowl.material
-    fidelity, outer = study.chosen_fidelity().plain(), study.bowl.plain()
-    settings = ("youngs_modulus_scale", "filling_timestep_fraction", "skin_m", "ranks")
-    return {
-        "materials": materials_content(study, *particles, bowl),
-        "pairs": [
-            study.pair(one, other).plain()
-            for at, one in enumerate(particles)
-            for other in (*particles[at:], bowl)
-        ],
-        "types": len(study.type_names()),
-        "media": study.media.plain(),
-        "bowl": {name: value for name, value in outer.items() if name != "facet_size_m"},
-        "gravity_m_s2": study.gravity_m_s2,
-        "contact": study.contact.plain(),
-        "filling": study.filling.plain(),
-        **{name: value for name, value in study.plain().items() if name == "compound"},
-        "seed": study.seed,
-        "fidelity": {name: fidelity[name] for name in settings if name in fidelity},
-    }
+    own = without(study.of_runs(study.bowl.material), *_NOT_READ)
+    return {**own, "types": len(study.type_names())}
 
 
 def _impact_speed(case: Case) -> float:
@@ -521,7 +511,7 @@ def partners_in_bed(case: Case) -> list[tuple[str, str, float]]:
 FILLING = SceneType(
     name="filling",
     slug=lambda case: f"{case.study.particle_count}-particles",
-    content=filling_content,
+    content=_content,
     build=lambda case, _: filling_scene(case.of_filling),
     inputs=("particles.data",),
     tables=("packing.json", "thermo.parquet"),

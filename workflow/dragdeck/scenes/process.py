@@ -12,7 +12,7 @@ from dragdeck.cases.bed import (
     farthest_point,
     skin,
 )
-from dragdeck.cases.case import Case, Stretch, materials_content, mesh_file, of_each_workpiece
+from dragdeck.cases.case import Case, Stretch, mesh_file, of_each_workpiece
 from dragdeck.decks import PACKING_FILE, WORKPIECE_MESH, outputs
 from dragdeck.decks.deck import NOT_OF_LIQUID, LeftOut, Scene
 from dragdeck.decks.outputs import Output
@@ -33,7 +33,6 @@ from dragdeck.scenes.filling import (
     bed_limits,
     box_top,
     expected_bed,
-    filling_content,
     partners_in_bed,
     rank_split,
 )
@@ -48,6 +47,8 @@ from dragdeck.scenes.motion import (
 )
 from dragdeck.scenes.scene import (
     SceneType,
+    assumed,
+    bowl_of_run,
     case_of_study,
     liquid,
     liquid_leaves_out,
@@ -71,10 +72,10 @@ from dragdeck.scenes.workpiece import (
     workpiece_radius,
     workpiece_reach,
 )
-from dragdeck.study.base import Json
+from dragdeck.study.base import Json, without
 from dragdeck.study.contact_law import coefficient_words
 from dragdeck.study.drive import Drive
-from dragdeck.study.model import Study
+from dragdeck.study.model import OF_NO_RUN, Study
 from dragdeck.study.workpiece import CylinderShape, MeshShape, Shape
 
 _ENERGY_DRIFT = 0.1
@@ -256,12 +257,13 @@ def _process_case(
         ProcessCase,
         case,
         PROCESS.run_id(case),
-        {name: value for name, value in study.plain().items() if name in _INPUTS},
+        without(study.plain(), *OF_NO_RUN, "fidelities", "fidelity"),
         drag.timestep_s,
         bed_rayleigh_time(study),
         settings=study.chosen_fidelity().model_dump(include={"timestep_fraction", "speed_factor"}),
         media=media_of_run(study, buoyancy_density(study)),
-        assumed=_of_liquid(case, surface_m),
+        bowl=bowl_of_run(study, facets=study.bowl_facet_size_m is not None),
+        assumptions=[*assumed(study), *_of_liquid(case, surface_m)],
         asked=case.advised,
         removal=study.removal,
         unsafe_timestep=study.accepted.unsafe_timestep,
@@ -322,12 +324,6 @@ def _wake_from(each: Sequence[Case], number: int) -> float | None:
     gap = min((other - ahead - 1e-6) % 360 + 1e-6 for other in others)
     found = around * gap / 360
     return round_to(found, 9) if found < path.path_length_m * (1 - 1e-6) else None
-
-
-_INPUTS = (
-    *("materials", "pairs", "media", "bowl", "workpiece", "motion", "contact", "drop_test"),
-    *("filling", "outputs", "gravity_m_s2", "seed", "compound"),
-)
 
 
 def _fastest(case: Case, way: Course) -> float:
@@ -418,27 +414,20 @@ def _stretches(case: Case) -> Json:
     return {**found, "lead": PROCESS.run_id(case.lead)} if case.lead else found
 
 
+_NOT_READ = ("drop_test", "fidelity.windows")
+"""Fields that a process does not depend on, besides where its windows begin."""
+
+
 def _content(case: Case) -> Json:
     """What a process depends on."""
     case = led(case)
     study = case.study
+    own = without(study.of_runs(study.bowl.material, study.workpiece.material), *_NOT_READ)
     shapes = [one.study.workpiece.shape for one in of_each_workpiece(case)]
     files = [mesh_file(case, shape) for shape in shapes if isinstance(shape, MeshShape)]
     checksums = [file_checksum(file) for file in dict.fromkeys(files)]
     mesh = {"mesh": " ".join(checksums)} if checksums else {}
-    return {
-        "filling": dict(filling_content(case)),
-        "materials": materials_content(study, study.workpiece.material),
-        "pair": study.pair(study.media.main_material, study.workpiece.material).plain(),
-        "facet_size_m": study.bowl.facet_size_m,
-        "workpiece": study.workpiece.plain(),
-        "motion": study.motion.plain(),
-        **{name: value for name, value in study.plain().items() if name == "workpieces"},
-        "outputs": study.outputs.plain(),
-        "fidelity": study.chosen_fidelity().model_copy(update={"windows": None}).plain(),
-        **mesh,
-        **_stretches(case),
-    }
+    return {**own, "filling": FILLING.run_id(case), **mesh, **_stretches(case)}
 
 
 PROCESS = SceneType(

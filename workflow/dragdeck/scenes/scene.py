@@ -1,6 +1,6 @@
 """What a scene is to the rest of the project, and what all scenes share."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, TypeVar
@@ -29,7 +29,7 @@ from dragdeck.records.case import (
     MediaOfRun,
 )
 from dragdeck.records.packing import Packing
-from dragdeck.study.base import Json, flat
+from dragdeck.study.base import Json, flat, without
 from dragdeck.study.contact_law import Pair
 from dragdeck.study.model import Study
 
@@ -55,6 +55,14 @@ def read_bed(file: Path) -> Bed:
     """
     packing = Packing.read(file)
     return Bed(packing.bed_height_m, packing.top_m)
+
+
+_NOT_SAID = ("calibration", "fidelities", "licence", "scaling", "search", "sweep")
+_OF_PROCESS = (
+    *("accepted", "assumptions", "compound", "drop_test", "fidelity", "filling", "motion"),
+    *("outputs", "removal", "seed", "workpiece.shape", "workpieces"),
+)
+"""Fields that no file of a run says, and those that only files of a process do."""
 
 
 @dataclass(frozen=True)
@@ -117,17 +125,17 @@ class SceneType:
     def digest(self, case: Case) -> str:
         """Hash of all that the run's files say, remarks included.
 
-        Two cases that share a run have the same digest, and an edit of the study that does not
-        concern the scene does not change it.
+        An edit of the study that does not concern the scene does not change it.
         """
-        include = {"title", "assumptions", "reference"}
-        if case.study.accepted.unsafe_timestep:
-            include.add("accepted")
-        if case.study.removal and self.loading:
-            include.add("removal")
-        remarks = case.study.model_dump(mode="json", include=include)
-        asked = case.advised.model_dump(mode="json") if case.advised and self.needs_bed else None
-        return digest({"study": remarks, "content": dict(self.content(case)), "asked": asked})
+        study, content = case.study, dict(self.content(case))
+        said: dict[str, Any] = {"content": content}
+        if self.needs_bed:
+            asked = case.advised and case.advised.model_dump(mode="json")
+            values = without(study.plain(), *_NOT_SAID)
+            said |= {**values, "asked": asked, "assumptions": [dict(one) for one in assumed(study)]}
+        else:
+            said |= without(study.plain(), *_NOT_SAID, *_OF_PROCESS)
+        return digest(said)
 
 
 def case_of_study(
@@ -139,7 +147,6 @@ def case_of_study(
     rayleigh_time_s: float,
     *,
     settings: Json | None = None,
-    assumed: Iterable[AssumptionOfRun] = (),
     **own: Any,
 ) -> C:
     """The content of ``case.json`` of a run of a study's case.
@@ -156,8 +163,6 @@ def case_of_study(
     timestep_s, rayleigh_time_s : float
     settings : mapping, optional
         What is not the case's modulus, skin and ranks, the given step, and no faster workpiece.
-    assumed : iterable of AssumptionOfRun
-        What the scene assumes beside the study.
     **own
         What this scene's case file has beyond the others', or has otherwise.
     """
@@ -182,15 +187,12 @@ def case_of_study(
         "fidelity": fidelity,
         "inputs": flat(inputs),
         "media": media_of_run(study),
-        "bowl": BowlOfRun(
-            radius_m=study.bowl.radius_m,
-            walls="primitive" if study.bowl_facet_size_m is None else "mesh",
-        ),
+        "bowl": bowl_of_run(study),
         "contact_moduli": _contact_moduli(study, main, fidelity.youngs_modulus_scale),
         "attractive": _attractive(study, main, fidelity.youngs_modulus_scale),
         "classes": _classes(study, fidelity.youngs_modulus_scale),
         "bodies": body_sizes(study),
-        "assumptions": [*_assumptions(study), *assumed],
+        "assumptions": [],
         "reference": study.reference,
         "versions": {"dragdeck": __version__},
     }
@@ -207,6 +209,11 @@ def media_of_run(study: Study, buoyancy_kg_m3: float = 0.0) -> MediaOfRun:
         density_kg_m3=bed_density(study),
         buoyancy_kg_m3=buoyancy_kg_m3,
     )
+
+
+def bowl_of_run(study: Study, *, facets: bool = False) -> BowlOfRun:
+    """The bowl, whose walls are exact or have facets."""
+    return BowlOfRun(radius_m=study.bowl.radius_m, walls="mesh" if facets else "primitive")
 
 
 def liquid(study: Study) -> Liquid | None:
@@ -294,7 +301,8 @@ _OF_A_KIND = ("motion.path.", "workpiece.shape.")
 """Blocks of several kinds: an assumption about a field of another kind says nothing of a run."""
 
 
-def _assumptions(study: Study) -> list[AssumptionOfRun]:
+def assumed(study: Study) -> list[AssumptionOfRun]:
+    """What a study assumes, with the values."""
     values = flat(study.plain())
     found = [
         AssumptionOfRun(field=entry.field, value=values.get(entry.field), why=entry.why)

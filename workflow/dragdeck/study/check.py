@@ -14,25 +14,21 @@ from pydantic_core import ErrorDetails
 
 from dragdeck.errors import Caution, InputError, RecordError, choices, near, together
 from dragdeck.study.base import Json, Model, flat
-from dragdeck.study.model import BUILT_IN_FIDELITIES, AnyPath, Fidelity, Scaling, Study, Tolerance
+from dragdeck.study.model import (
+    BUILT_IN_FIDELITIES,
+    OF_NO_RUN,
+    AnyPath,
+    Fidelity,
+    Scaling,
+    Study,
+    Tolerance,
+)
 from dragdeck.study.plausible import implausible, plausible_range
 from dragdeck.study.recorded import Places, mesh_errors, recorded_file, with_recording
 from dragdeck.study.removal import disagreements
 from dragdeck.study.search import Search
 from dragdeck.study.workpiece import CylinderShape, Shape
 from dragdeck.study.yaml import located, shown
-
-_NO_SWEEP = (
-    "accepted",
-    "assumptions",
-    "reference",
-    "removal",
-    "scaling",
-    "search",
-    "sweep",
-    "title",
-)
-"""Blocks that no run depends on: cases that differ in them would be the same."""
 
 _LEAST_LEVELS = 3
 """Levels that a power law is fitted to: two would fit any."""
@@ -266,7 +262,7 @@ def _sweep(study: Study) -> _Found:
             yield "sweep", f"{field!r} is not a field", "a dotted name, such as motion.speed_m_s"
         if not values:
             yield f"sweep.{field}", "no values", "one value or more"
-        if field.split(".")[0] in _NO_SWEEP:
+        if field.split(".")[0] in OF_NO_RUN:
             yield f"sweep.{field}", "no run depends on it", "a field that the runs depend on"
     count, most = math.prod(map(len, study.sweep.values())), study.accepted.cases
     if count > most:
@@ -292,7 +288,7 @@ def _search(search: Search, study: Study) -> _Found:
             limit = f"a study with {lacking}, or another quantity"
             yield f"search.{name}.quantity", f"no run has {one.quantity}", limit
     for field in search.vary:
-        if field.split(".")[0] in (*_NO_SWEEP, "fidelity", "fidelities", "seed", "outputs"):
+        if field.split(".")[0] in (*OF_NO_RUN, "fidelity", "fidelities", "seed", "outputs"):
             yield f"search.vary.{field}", "it is no setting of the machine", "another field"
     for name, problem in search.excluded():
         yield f"search.{name}", problem, "limits that one setting can meet together"

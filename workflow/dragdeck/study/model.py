@@ -21,6 +21,7 @@ from dragdeck.study.base import (
     Number,
     Positive,
     Whole,
+    without,
 )
 from dragdeck.study.calibration import Calibration
 from dragdeck.study.contact_law import Contact, Pair
@@ -519,6 +520,13 @@ BUILT_IN_FIDELITIES: Mapping[str, Fidelity] = {
 }
 
 
+OF_NO_RUN = (
+    *("accepted", "assumptions", "calibration", "licence", "reference", "removal"),
+    *("scaling", "search", "sweep", "title"),
+)
+"""Blocks that no input script depends on. A block that is missing here only makes runs anew."""
+
+
 class Study(Model):
     """A whole study file."""
 
@@ -595,6 +603,27 @@ class Study(Model):
     def absent(self) -> set[str]:
         """The carousel, too, where it has one workpiece as the study gives it."""
         return super().absent() | (set() if self._stations else {"workpieces"})
+
+    def of_runs(self, *materials: str) -> dict[str, Any]:
+        """Plain values of all blocks that a run may depend on, with the settings that hold.
+
+        Of materials and pairs, those that meet: particles, and what is made of `materials`.
+        """
+        particles = set(self.media.materials)
+        names = {*particles, *materials}
+        met = {name: set(name.split("-")) for name in self.pairs}
+        return {
+            **without(self.plain(), *OF_NO_RUN, "fidelities"),
+            "materials": {
+                name: one.plain() for name, one in self.materials.items() if name in names
+            },
+            "pairs": {
+                "-".join(sorted(both)): self.pairs[name].plain()
+                for name, both in met.items()
+                if both <= names and both & particles
+            },
+            "fidelity": self.chosen_fidelity().plain(),
+        }
 
     def type_names(self) -> list[str]:
         """Materials in the order of the engine's types: particles, bowl, workpiece, each once."""

@@ -1,0 +1,357 @@
+"""Every field of rich studies, changed a little: what changes an input script renames its run."""
+
+import copy
+import re
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from made_scenes import BED
+from made_study import put
+from paths import ROOT
+
+from dragdeck.cases.case import Case
+from dragdeck.decks.deck import AnyScene
+from dragdeck.decks.render import deck_text
+from dragdeck.decks.templates import environment
+from dragdeck.errors import InputError
+from dragdeck.project import Project
+from dragdeck.scenes.lead import with_leads
+from dragdeck.scenes.process import PROCESS, SCENES
+from dragdeck.scenes.scene import SceneType
+from dragdeck.study.check import validate
+from dragdeck.study.model import OF_NO_RUN, Study
+
+SCHEMA = Study.model_json_schema()
+
+MATERIALS = {
+    "plastic": {"youngs_modulus_pa": 3e10, "poissons_ratio": 0.35, "density_kg_m3": 1900},
+    "liner": {"youngs_modulus_pa": 1e10, "poissons_ratio": 0.45, "density_kg_m3": 1200},
+}
+PAIR = {"restitution": 0.6, "friction": 0.3, "rolling_friction": 0.1, "cohesion_j_m3": 1000.0}
+PAIRS = {
+    f"{particle}-{other}": {**PAIR, "friction": 0.2 + 0.01 * number}
+    for number, (particle, other) in enumerate(
+        (particle, other)
+        for particle in ("ceramic", "plastic")
+        for other in ("ceramic", "plastic", "liner", "steel")
+        if (particle, other) != ("plastic", "ceramic")
+    )
+}
+DAMPED = {name: {**pair, "rolling_damping": 0.2} for name, pair in PAIRS.items()}
+SIEVE = [[0.005, 0.0], [0.006, 0.4], [0.007, 1.0]]
+OF_REMOVAL = {"law": "archard", "coefficient_m2_n": 1e-15, "target_depth_m": 1e-6}
+REST = {"kind": "rest", "radius_m": 0.01, "bowl_rpm": 20, "start_deg": 5, "revolutions": 0.2}
+EIGHT = {
+    "kind": "figure_eight", "radius_m": 0.004, "middle_m": [0.001, 0.0], "direction_deg": 10,
+    "loops": 0.5,
+}  # fmt: skip
+LINE = {"kind": "line", "start_m": [-0.008, 0.001], "direction_deg": 5, "length_m": 0.012}
+WAYPOINTS = {
+    "kind": "waypoints", "fraction": 0.9,
+    "points": [[0, -0.008, 0, 0, 0, 0, 0], [0.4, 0.004, 0.002, 0.001, 20, 3, 2]],
+}  # fmt: skip
+SOFT = {
+    "youngs_modulus_scale": 0.01, "timestep_fraction": 0.4, "filling_timestep_fraction": 0.2,
+    "skin_m": 4e-4, "ranks": 1,
+}  # fmt: skip
+
+
+def grains(material: str, fraction: float, **more: Any) -> dict[str, Any]:
+    sizes = {} if "sieve" in more else {"radius_mean_m": 3.1e-3, "radius_std_m": 1e-4}
+    return {"material": material, "fraction": fraction, **sizes, **more}
+
+
+RICH: dict[str, dict[str, Any]] = {
+    "bodies": {  # two materials of clumps of different shapes; three workpieces, of two kinds
+        "media": {"count": 60, "fractions_of": "number", "classes": {
+            "rods": grains("ceramic", 0.5, shape={
+                "kind": "cylinder", "aspect": 1.3, "cut_deg": 20, "spheres": 2}),
+            "cones": grains("plastic", 0.5, distribution="uniform", shape={
+                "kind": "cone", "aspect": 1.2, "spheres": 2})}},
+        "workpiece.shape": {
+            "kind": "mesh", "file": "hex_bar.stl", "unit": "mm", "axis": "-z",
+            "offset_m": [0.0, 0.0005]},
+        "workpieces": [{"angle_deg": 0}, {"angle_deg": 120, "shape": {
+            "kind": "cylinder", "radius_m": 0.003, "facet_size_m": 0.002}}, {"angle_deg": 240}],
+        "bowl.radius_m": 0.05, "bowl.facet_size_m": 0.008,
+        "motion.path": {"kind": "circle", "radius_m": 0.02, "revolutions": 0.1, "start_deg": 3},
+        "motion.tilt_deg": 4.0, "motion.spin": {"rpm": 60, "ramp_s": 0.02},
+        "motion.counted_from_revolution": 1, "motion.ramp_s": 0.05,
+        "motion.plunge_at_m": [0.02, 0.001],
+        "fidelity": SOFT,
+        "removal": OF_REMOVAL,
+        "outputs.first_touch_fraction": 0.1, "accepted": {"unsafe_timestep": "any", "cases": 9},
+        "licence": "MIT", "contact.limit_force": False,
+    },
+    "sieve": {  # two materials of spheres in a compound, one by a sieve analysis; windows
+        "media": {"mass_kg": 0.05, "fractions_of": "volume", "classes": {
+            "sieved": grains("plastic", 0.3, sieve=SIEVE),
+            "coarse": grains("ceramic", 0.7, distribution="log_normal")}},
+        "compound": {"density_kg_m3": 1000, "level_m": 0.08},
+        "motion.path": {"kind": "circle", "radius_m": 0.01, "revolutions": 4, "direction": "cw"},
+        "motion.oscillation": {"amplitude_m": 0.001, "frequency_hz": 2, "ramp_s": 0.1},
+        "contact": {"rolling_model": "epsd"}, "pairs": DAMPED,
+        "fidelity": {**SOFT, "filling_youngs_modulus_scale": 0.1, "windows": {"tolerance": 0.1}},
+        "assumptions": [{"field": "media.mass_kg", "why": "any"}],
+        "reference": {"source": "somebody", "experiment": {"drag_mean_n": -1.0}},
+    },
+    "one class": {
+        "media": {"material": "ceramic", "fill_height_m": 0.02, "sieve": SIEVE},
+        "motion.path": REST, "motion.speed_m_s": None,
+        "motion.spin": {"schedule": [{"until_s": 0.1, "rpm": 30}, {"until_s": 9, "rpm": 50}]},
+        "fidelities": {"quick": {**SOFT, "speed_factor": 2.0}}, "fidelity": "quick",
+        "workpieces": {"count": 2},
+        "calibration": {"angles": {
+            "friction": [0.1, 0.5], "rolling_friction": [0.01, 0.1],
+            "repose": {"angle_deg": 25, "angle_std_deg": 1, "cylinder_radius_m": 0.02,
+                       "count": 400}}},
+    },
+    "figure eight": {
+        "media": {"count": 60, "classes": {
+            "eggs": grains("ceramic", 0.5, shape={
+                "kind": "ellipsoid", "axes": [1.0, 1.2, 1.4], "spheres": 2}),
+            "pyramids": grains("plastic", 0.5, shape={"kind": "tetrahedron", "spheres": 4})}},
+        "motion.path": EIGHT, "motion.orientation": "fixed",
+    },
+    "waypoints": {
+        "media": {"count": 60, "classes": {
+            "prisms": grains("ceramic", 0.5, shape={
+                "kind": "triangular_prism", "aspect": 1.1, "spheres": 2}),
+            "stones": grains("plastic", 0.5, shape={"kind": "mesh", "spheres": 2, "points": [
+                [0, 0, 0], [1, 0, 0], [0, 1.2, 0], [0, 0, 1.1], [0.8, 0.8, 0.8]]})}},
+        "motion.path": WAYPOINTS, "motion.speed_m_s": None,
+    },
+    "line": {
+        "media": {"material": "ceramic", "count": 60, "radius_mean_m": 3e-3},
+        "workpiece.shape": {
+            "kind": "mesh", "file": "shaft.step", "unit": "mm", "facet_size_m": 0.003,
+            "edge_facet_size_m": 0.002},
+        "motion.path": LINE,
+        "fidelity": {**SOFT, "soft_start": {"youngs_modulus_scale": 1e-3}},
+    },
+}  # fmt: skip
+
+TOLD_APART_BY = ("kind", "file", "each", "schedule")
+"""Fields that are not changed alone: a kind of block has other fields."""
+
+UNCHANGED = {
+    "motion": {"drop_test", "filling"},
+    "outputs": {"drop_test", "filling"},
+    "workpieces": {"drop_test", "filling"},
+    "workpiece.shape": {"drop_test", "filling"},
+    "drop_test": {"filling", "process", "lead", "window"},
+    "media.count": {"drop_test"},
+    "seed": {"drop_test"},
+    "compound": {"drop_test"},
+    "fidelity": {"drop_test"},
+    "fidelity.timestep_fraction": {"drop_test", "filling"},
+    "fidelity.windows.tolerance": {"drop_test", "filling", "process", "window"},
+    **{block: {"drop_test", "filling", "process", "lead", "window"} for block in OF_NO_RUN},
+}
+"""Scenes whose runs are found again when a field, or a field of a block, is changed."""
+
+
+def leaves(value: Any, name: str = "") -> Iterator[tuple[str, Any]]:
+    """Dotted name and value of each field of plain data, entries of lists by their numbers."""
+    entries: dict[str, Any] = {}
+    if isinstance(value, Mapping):
+        entries = {str(key): inner for key, inner in value.items()}
+    elif isinstance(value, list):
+        entries = {str(number): inner for number, inner in enumerate(value)}
+    elif value is not None:
+        yield name, value
+    for key, inner in entries.items():
+        yield from leaves(inner, f"{name}.{key}".lstrip("."))
+
+
+def with_value(data: Any, name: str, value: Any) -> Any:
+    """A copy of plain data with the field of a dotted name replaced."""
+    found = copy.deepcopy(data)
+    *above, last = name.split(".")
+    block = found
+    for key in above:
+        block = block[int(key) if isinstance(block, list) else key]
+    block[int(last) if isinstance(block, list) else last] = value
+    if last == "fraction":  # those of all classes sum to 1
+        (other,) = found["media"]["classes"].keys() - {above[-1]}
+        found["media"]["classes"][other][last] = 1 - value
+    return found
+
+
+def words_of(schema: Any) -> Iterator[list[str]]:
+    """Every list of words among which some field has one."""
+    if isinstance(schema, Mapping):
+        if "enum" in schema:
+            yield schema["enum"]
+        for part in schema.values():
+            yield from words_of(part)
+    elif isinstance(schema, list):
+        for part in schema:
+            yield from words_of(part)
+
+
+WORDS = [*words_of(SCHEMA), ["archard", "archard+finnie"], ["liner", "steel", "ceramic", "plastic"]]
+
+
+def others(value: Any) -> Iterator[Any]:
+    """Values near to that of a field."""
+    if isinstance(value, bool):
+        yield not value
+    elif isinstance(value, int):
+        yield from (value + 1, value - 1, 2 * value)
+    elif isinstance(value, float):
+        yield from (1.02 * value, 0.98 * value) if value else (0.01, 0.0001)
+    else:
+        for words in WORDS:
+            yield from (word for word in words if value in words and word != value)
+        yield f"{value} and more"
+
+
+def loaded(file: Path, data: Any) -> dict[str, tuple[SceneType, Case]]:
+    """The runs of a study of one case, by what they are: its lead and its first window, too."""
+    case = Case(file, {}, validate(data, file))
+    found = {name: (kind, case) for name, kind in SCENES.items()}
+    for one in with_leads([case]):
+        if one is not case:
+            found.setdefault("window" if one.rank_of_window else "lead", (PROCESS, one))
+    return found
+
+
+def script(scene: AnyScene) -> str:
+    """The commands of an input script, but for the names of folders."""
+    text = deck_text(scene, environment(ROOT / "templates"))
+    lines = (line for line in text.splitlines() if line and not line.startswith("#"))
+    return "\n".join(line for line in lines if not line.startswith("variable from"))
+
+
+def differs(one: AnyScene, other: AnyScene) -> bool:
+    """Whether a script or a file beside it differs."""
+    unnamed = {"title": "", "run": "", "source": ""}
+    decks = [replace(scene.deck, **unnamed) for scene in (one, other)]
+    if decks[0] != decks[1] and script(one) != script(other):
+        return True
+    return one.texts() != other.texts()
+
+
+def said(scene: AnyScene) -> Any:
+    """What ``case.json`` says, but for the name of the fidelity, by which no run is told apart."""
+    fidelity = scene.case.fidelity.model_copy(update={"name": ""})
+    return scene.case.model_copy(update={"fidelity": fidelity}).as_text()
+
+
+@pytest.fixture
+def written(project: Project, small: dict[str, Any]) -> tuple[Path, dict[str, Any]]:
+    """Folder for rich studies, and what they have in common."""
+    small["materials"] |= MATERIALS
+    small["pairs"] = PAIRS
+    small["bowl"]["material"] = "liner"
+    return project.studies / "rich/study.yaml", small
+
+
+@pytest.mark.parametrize("name", RICH)
+def test_a_run_has_another_name_if_its_script_differs(
+    written: tuple[Path, dict[str, Any]], name: str
+) -> None:
+    file, data = written
+    for field in ("media", "contact"):
+        data.pop(field, None)
+    put(data, copy.deepcopy(RICH[name]))
+    file.parent.mkdir()
+    file.write_text(yaml.safe_dump(data))
+    plain = validate(data, file).model_dump(mode="json")
+    before = loaded(file, plain)
+    names = {run: kind.run_id(case) for run, (kind, case) in before.items()}
+    digests = {run: kind.digest(case) for run, (kind, case) in before.items()}
+    scenes = {run: kind.build(case, BED) for run, (kind, case) in before.items()}
+    changes: dict[str, set[str]] = {}
+    for field, value in leaves(plain):
+        if field.rpartition(".")[2] in TOLD_APART_BY:
+            continue
+        for other in others(value):
+            try:
+                after = loaded(file, with_value(plain, field, other))
+                assert set(after) == set(before), field
+                renamed = {run for run, (kind, case) in after.items()
+                           if kind.run_id(case) != names[run]}  # fmt: skip
+                built = {run: kind.build(case, BED) for run, (kind, case) in after.items()
+                         if run not in renamed}  # fmt: skip
+            except InputError:
+                continue
+            for run, scene in built.items():
+                assert not differs(scenes[run], scene), f"{field} changes the script of {run}"
+                kind, case = after[run]
+                if kind.digest(case) == digests[run]:
+                    assert said(scenes[run]) == said(scene), f"{field} changes case.json of {run}"
+            changes[field] = renamed
+            break
+        else:  # beside the others of the study, a field may have to be at its default
+            assert not value, f"{field}: no other value than {value!r} is accepted"
+    print(f"\n{name}")
+    for field, renamed in changes.items():
+        print(f"  {field}: {', '.join(sorted(renamed)) or 'none'}")
+        for block, kept in UNCHANGED.items():
+            if f"{field}.".startswith(f"{block}."):
+                assert not renamed & kept, f"{field} renames {renamed}"
+
+
+def fields_of(schema: Any, name: str = "", kind: str = "") -> Iterator[tuple[str, str]]:
+    """Pattern of the dotted name of each field, with the kind of the block that it is in."""
+    if "$ref" in schema:
+        schema = SCHEMA["$defs"][schema["$ref"].rpartition("/")[2]]
+    for option in (*schema.get("anyOf", ()), *schema.get("oneOf", ())):
+        yield from fields_of(option, name, kind)
+    if schema.get("type") not in (None, "object", "array", "null"):
+        yield name, kind
+    own = schema.get("properties", {})
+    kind = own.get("kind", {}).get("const", kind)
+    entries = {**own, r"[^.]+": schema.get("additionalProperties"), r"\d+": schema.get("items")}
+    entries |= {str(number): item for number, item in enumerate(schema.get("prefixItems", ()))}
+    for key, part in entries.items():
+        if isinstance(part, Mapping):
+            yield from fields_of(part, rf"{name}\.{key}" if name else key, kind)
+
+
+SAME_FIELDS = {
+    r"media\.": r"media\.(classes\.[^.]+\.)?",
+    r"workpieces\.each\.\d+\.": r"(workpieces\.each\.\d+|workpiece)\.",
+}
+"""Patterns of blocks, and of those that may stand for them."""
+
+NOT_OF_A_CASE = {
+    r"fidelity\.tolerance", r"fidelity\.quantity", r"fidelity\.quantity\.\d+",
+    r"motion\.path\.file",
+}  # fmt: skip
+"""Fields that others take the place of before there is a case."""
+
+
+def test_the_rich_studies_have_every_field(written: tuple[Path, dict[str, Any]]) -> None:
+    """A new field must stand in one of them, unless its default does already."""
+    file, small = written
+    there = defaultdict(set)
+    file.parent.mkdir()
+    file.write_text("")
+    for changes in RICH.values():
+        data = {key: value for key, value in small.items() if key not in ("media", "contact")}
+        put(data := copy.deepcopy(data), copy.deepcopy(changes))
+        plain = validate(data, file).model_dump(mode="json")
+        values = dict(leaves(plain))
+        for field in values:
+            block = field.rpartition(".")[0]
+            kinds = [values.get(f"{'.'.join(block.split('.')[:depth])}.kind", "")
+                     for depth in range(len(block.split(".")), 0, -1)]  # fmt: skip
+            there[next(filter(None, kinds), "")].add(field)
+    missing = set()
+    for name, kind in fields_of(SCHEMA):
+        if name.split("\\.")[0] in (*OF_NO_RUN, "fidelities") or name in NOT_OF_A_CASE:
+            continue
+        for block, same in SAME_FIELDS.items():
+            if name.startswith(block) and "classes" not in name:
+                name = same + name.removeprefix(block)
+        if not any(re.fullmatch(name, field) for field in there[kind]):
+            missing.add(f"{name} {kind}")
+    assert not missing
