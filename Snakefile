@@ -44,18 +44,21 @@ rule drop_test:
 # The settled packings.
 rule filling:
     input:
+        WORK.needed_advice,
         WORK.every_table("filling"),
 
 
 # The process runs with their tables.
 rule process:
     input:
+        WORK.needed_advice,
         WORK.every_table("process"),
 
 
 # What a search reads of the settings so far: ./run search calls this round by round.
 rule searched:
     input:
+        WORK.needed_advice,
         WORK.every("process", "run.json", "tables/figures.json", "tables/loading.json"),
         WORK.every("process", "tables/extrapolated.json"),
         WORK.every("filling", "run.json", "tables/figures.json"),

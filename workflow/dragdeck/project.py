@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from dragdeck.advice.advise import resolve
-from dragdeck.cases.case import Case, mesh_file, of_each_workpiece
+from dragdeck.cases.case import Case, digest, mesh_file, of_each_workpiece
 from dragdeck.errors import InputError, choices
 from dragdeck.outlook.timestep import check_timestep
 from dragdeck.records.tradeoff import TradeoffRecord
@@ -120,6 +120,16 @@ class Project:
     def report(self, study: str) -> Path:
         """The page that a study's results end in."""
         return self.results(study) / "report" / "report.html"
+
+    def state(self, cases: Iterable[Case]) -> str:
+        """Hash of all that a report on cases shows of their study."""
+        every = list(cases)
+        return digest({name: [of.digest(case) for case in every] for name, of in SCENES.items()})
+
+    def report_is_current(self, study: str, cases: Iterable[Case]) -> bool:
+        """Whether the report is complete, and on the study as it stands."""
+        mark = self.report(study).with_name("complete")
+        return mark.is_file() and mark.read_text(encoding="utf-8").strip() == self.state(cases)
 
     def run_folders(
         self, cases: Iterable[Case], scene: SceneType, *, of_plan: bool = False

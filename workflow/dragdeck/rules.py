@@ -5,19 +5,24 @@ they pass as wildcards is anything with the attributes of `Wildcards`.
 """
 
 import json
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache, partial
 from pathlib import Path
 from shlex import quote
 from typing import Any, NoReturn, Protocol, TypeVar
+from uuid import uuid4
 
 from jsonschema import Draft202012Validator
 from snakemake_interface_common.exceptions import WorkflowError
 
 from dragdeck.campaigns.restitution_drops import record_file
-from dragdeck.cases.case import Case
+from dragdeck.cases.case import Case, digest
+from dragdeck.decks import RUN_FILE
 from dragdeck.decks.templates import environment, template_files
-from dragdeck.errors import DragdeckError, InputError, choices
+from dragdeck.engine.process import find_engine
+from dragdeck.errors import DragdeckError, EngineError, InputError, choices
+from dragdeck.files import file_checksum, write_text
 from dragdeck.outlook.runs import StudyRun, expected_runs
 from dragdeck.physics.contact_mechanics import fall_time
 from dragdeck.project import (
@@ -32,6 +37,7 @@ from dragdeck.project import (
     study_files,
     study_templates,
 )
+from dragdeck.records.run import RunRecord
 from dragdeck.scenes.lead import FIRST_WINDOWS, led, windows_of, with_leads
 from dragdeck.scenes.process import SCENES
 from dragdeck.study.base import Json
@@ -145,6 +151,38 @@ def add_records(rules: Iterable[Any]) -> None:
         rule.set_log(f"{folder}/logs/{name}.log")
         rule.benchmark = f"{folder}/benchmarks/{name}.tsv"
         rule.conda_env = "../envs/python.yaml"
+        rule.set_params(content=_content_of(list(rule.input), bool(rule.wildcard_names)))
+
+
+def _content_of(inputs: Sequence[Any], of_runs: bool) -> Callable[[Any], str]:
+    """Checksum of the project's own files among a rule's inputs: a restored file may be older."""
+
+    def content(wildcards: Any) -> str:
+        given = [one(wildcards) if callable(one) else one for one in inputs
+                 if not (of_runs and callable(one))]  # fmt: skip
+        names = [name for one in given for name in ([one] if isinstance(one, str) else one)]
+        own = (Path(name) for name in names if not name.startswith(("results/", _HOMES)))
+        return " ".join(file_checksum(file)[:12] for file in own if file.is_file())
+
+    return content
+
+
+_HOMES = ".snakemake/dragdeck"
+
+
+def home_of(study: str) -> str:
+    """A file that is newer than results that were copied here, or whose records are gone.
+
+    Without its records in ``.snakemake``, Snakemake takes any file for up to date. A mark among the
+    results says where they were made: elsewhere, all is checked that results are made from.
+    """
+    home, mark = Path(_HOMES, study), Path("results", study, ".made")
+    made = home.read_text() if home.is_file() else ""
+    if not made or (mark.read_text() if mark.is_file() else "") != made:
+        made = uuid4().hex
+        write_text(home, made)
+        write_text(mark, made)
+    return str(home)
 
 
 class Workflow:
@@ -263,9 +301,10 @@ class Workflow:
         there = self.if_measured("record", "") or not self.if_measured("angles", "")
         return self.relative(or_stop(record_file, self.cases[0])) if there else []
 
-    def calibration_inputs(self, scene: str = "drop_test") -> list[str]:
-        """What the runs of a calibration are made from: the study and the scene's templates."""
-        return [self.relative(self.cases[0].file), *self.templates_of(scene)]
+    @property
+    def whole_study(self) -> str:
+        """Hash of all that the study says, with what it takes from others, but for its sweep."""
+        return digest(self.cases[0].study.plain())
 
     def signal_file(self) -> list[str]:
         """The measured force signal of the study, if it names one."""
@@ -306,11 +345,29 @@ class Workflow:
 
     def _origin(self, place: str, run: str) -> tuple[str, Case]:
         """How to name the cases among which a run is, and its case: a study's before a plan's."""
-        return next((option, runs[run]) for option, runs in self._origins(place) if run in runs)
+        for option, runs in self._origins(place):
+            if run in runs:
+                return option, runs[run]
+        problem, remedy = "the study as it stands has no such run", "ask for a target of the study"
+        _stop(InputError(problem, file=self.cases[0].file, value=f"{place}/{run}", remedy=remedy))
 
     def case_of(self, place: str, run: str) -> Case:
         """A case that a run belongs to."""
         return self._origin(place, run)[1]
+
+    def other_engines(self) -> Iterator[str]:
+        """What to say of runs that another version of LIGGGHTS made than would now be called."""
+        files = (self.project.root / file for name in SCENES for file in self.every(name, RUN_FILE))
+        made = Counter(RunRecord.read(file).engine_version for file in files if file.is_file())
+        try:
+            here = find_engine().version if made else ""
+        except EngineError:
+            return
+        for version in sorted({*made} - {here}):
+            yield (
+                f"LIGGGHTS {version} made {made[version]} run(s), which LIGGGHTS {here} would not "
+                "make anew; remove their folders if it should"
+            )
 
     def planned_runs(self, jobs: Iterable[Any]) -> list[StudyRun]:
         """The engine runs of Snakemake's jobs: what is expected of each, and how far it is."""
@@ -365,15 +422,14 @@ class Workflow:
 
         return names if PLACES[place].needs_bed else []
 
-    def needed_advice(self, place: str) -> list[str]:
-        """The advice of a study in which a case asks for a tolerance; nothing for other runs."""
-        asked = any(case.asked for case in self.cases)
-        concerned = place != POINTS and not PLACES[place].single_particle
-        return [self.advice] if asked and concerned else []
+    @property
+    def needed_advice(self) -> list[str]:
+        """The advice of a study in which a case asks for a tolerance; nothing for another one."""
+        return [self.advice] if any(case.asked for case in self.cases) else []
 
     def advice_option(self, _: object = None) -> str:
         """How to name the advice on the command line, if there is or will be one."""
-        known = self.needed_advice("process") or (self.project.root / self.advice).is_file()
+        known = self.needed_advice or (self.project.root / self.advice).is_file()
         return f"--advice {self.advice}" if known else ""
 
     def fall_time_s(self, _: object = None) -> float:

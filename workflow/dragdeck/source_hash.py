@@ -1,8 +1,8 @@
 """A hash of the code behind a module, so that Snakemake notices an edit.
 
 Snakemake tracks files and parameters, not imported modules. A rule that gives
-this hash as a parameter runs again when any module that its command imports
-was edited, and only then.
+this hash as a parameter runs again when any module that its command imports, or a
+record that one of them names, was edited, and only then.
 """
 
 import ast
@@ -17,7 +17,9 @@ _PACKAGES = ("dragdeck", "dragchain", "evidence")
 
 
 def source_hash(*modules: str) -> str:
-    """Hash of the given modules, all they import from this project, and the tables beside them.
+    """Hash of the given modules, all they import from this project, and the data they read.
+
+    These are the tables beside them, and the files that they name of the package's ``data/``.
 
     Parameters
     ----------
@@ -29,12 +31,14 @@ def source_hash(*modules: str) -> str:
     str
         12 hex digits.
     """
-    total, files = hashlib.sha256(), source_files(*modules)
+    total, data, files = hashlib.sha256(), set[Path](), source_files(*modules)
     for name, file in sorted(files.items()):
-        total.update(name.encode() + file.read_bytes())
-    folders = {file.parent for file in files.values()}
-    for table in sorted(table for folder in folders for table in folder.glob("*.csv")):
-        total.update(table.read_bytes())
+        code = file.read_bytes()
+        total.update(name.encode() + code)
+        data |= {*file.parent.glob("*.csv")}
+        data |= {known for known in _records(name) if known.name.encode() in code}
+    for read in sorted(data):
+        total.update(read.read_bytes())
     return total.hexdigest()[:12]
 
 
@@ -62,6 +66,13 @@ def _file(name: str) -> Path | None:
     place = Path(top.origin).parent.joinpath(*inner)
     files = (place / "__init__.py", place.with_suffix(".py"))
     return next((file for file in files if file.is_file()), None)
+
+
+@cache
+def _records(module: str) -> tuple[Path, ...]:
+    """The files in the folder ``data/`` of a module's package."""
+    top = _file(module.partition(".")[0])
+    return tuple(top.parent.glob("data/*.*")) if top else ()
 
 
 @cache

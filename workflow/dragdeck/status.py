@@ -3,9 +3,11 @@
 import os
 import shutil
 import subprocess
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from dragdeck.cases.case import Case
 from dragdeck.cases.ranks import cores_here
 from dragdeck.engine.status import RunState
 from dragdeck.errors import InputError
@@ -16,7 +18,7 @@ from dragdeck.outlook.runs import (
     done_fraction,
     expected_runs,
 )
-from dragdeck.project import find_project
+from dragdeck.project import Project, find_project
 from dragdeck.scenes.process import SCENES
 
 _SHOWN = 8
@@ -45,10 +47,17 @@ def status(study: str, fidelity: str | None, plan: str | None, verbose: bool) ->
     print(f"{study}: runs {100 * done_fraction(runs):.0f} % done: {said}{cost}")
     if not plan:
         file = project.report(study)
-        print(
-            "report:",
-            file if file.is_file() else f"none yet; make it with: ./run all --config study={study}",
-        )
+        known = file if file.is_file() else "none yet"
+        print("report:", f"{known}{_not_current(project, study, every)}")
+
+
+def _not_current(project: Project, study: str, cases: Sequence[Case]) -> str:
+    """What to say of a report that is not on the study as it stands; nothing of one that is."""
+    if project.report_is_current(study, cases):
+        return ""
+    there = project.report(study).is_file()
+    old = " is of other settings, or not of all runs" if there else ""
+    return f"{old}; make it with: ./run all --config study={study}"
 
 
 def _show_state(state: RunState, runs: Sequence[StudyRun], verbose: bool) -> None:
@@ -73,7 +82,7 @@ def open_report(study: str) -> None:
         There is no such study, or no report yet.
     """
     project = find_project(Path.cwd())
-    project.cases(study)
+    cases = project.cases(study)
     file = project.report(study)
     if not file.is_file():
         raise InputError(
@@ -82,6 +91,8 @@ def open_report(study: str) -> None:
             remedy=f"make it with: ./run all --config study={study}",
         )
     print(file)
+    if old := _not_current(project, study, cases):
+        print(f"warning: the report{old}", file=sys.stderr)
     viewer = shutil.which("xdg-open")
     if viewer and (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         subprocess.Popen([viewer, str(file)], stderr=subprocess.DEVNULL, start_new_session=True)

@@ -1,10 +1,13 @@
 # What the runs of a study that asks for a tolerance will take, before they begin.
 
 
+# No run waits for it, so that a new forecast makes no run anew: it goes before all others.
 rule advise:
+    input:
+        HOME,
     output:
         WORK.advice,
-    priority: 1
+    priority: 2
     localrule: True
     params:
         study=STUDY,

@@ -18,7 +18,8 @@ rule read_drop_record:
 
 rule sweep_drops:
     input:
-        WORK.calibration_inputs(),
+        HOME,
+        WORK.templates_of("drop_test"),
         WORK.of_study("calibration", "record.json"),
     output:
         WORK.of_study("calibration", "sweep/drops.json"),
@@ -26,6 +27,7 @@ rule sweep_drops:
         prints=1,
     params:
         study=STUDY,
+        whole=WORK.whole_study,
         fidelity=WORK.fidelity_option,
         source=source_hash("dragdeck.campaigns.restitution_drops"),
     shell:
@@ -52,7 +54,8 @@ rule fit_restitution:
 
 rule confirm_restitution:
     input:
-        WORK.calibration_inputs(),
+        HOME,
+        WORK.templates_of("drop_test"),
         fit=WORK.of_study("calibration", "result.json"),
     output:
         WORK.of_study("calibration", "confirm/drops.json"),
@@ -60,6 +63,7 @@ rule confirm_restitution:
         prints=1,
     params:
         study=STUDY,
+        whole=WORK.whole_study,
         fidelity=WORK.fidelity_option,
         source=source_hash("dragdeck.campaigns.restitution_drops"),
     shell:
@@ -69,7 +73,8 @@ rule confirm_restitution:
 
 rule simulate_angles:
     input:
-        WORK.calibration_inputs("angles"),
+        HOME,
+        WORK.templates_of("angles"),
     output:
         WORK.of_study("calibration", "angles/runs.json"),
     threads: workflow.cores
@@ -77,6 +82,7 @@ rule simulate_angles:
         prints=1,
     params:
         study=STUDY,
+        whole=WORK.whole_study,
         fidelity=WORK.fidelity_option,
         source=source_hash("dragdeck.campaigns.angle_runs"),
     shell:

@@ -26,6 +26,7 @@ from dragdeck.rules import (
     or_stop,
     checked_settings,
     deck_files,
+    home_of,
     tables_of,
 )
 from dragdeck.scenes.process import SCENES
@@ -76,8 +77,10 @@ def shown(file, caption, category, figure="report", run="all"):
 PROJECT = Project(Path(workflow.basedir))
 WORK = Workflow(PROJECT, STUDY, FIDELITY, PLAN, VALIDATION, judged)
 CASES = WORK.cases
+HOME = home_of(STUDY)
 
-for WARNING in dict.fromkeys(text for case in CASES for text in map(str, warnings(case.study))):
+MESSAGES = [text for case in CASES for text in map(str, warnings(case.study))]
+for WARNING in dict.fromkeys([*MESSAGES, *WORK.other_engines()]):
     logger.warning(f"warning: {STUDY}: {WARNING}")
 
 

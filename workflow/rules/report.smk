@@ -4,6 +4,8 @@
 
 # What is simulated, drawn from the first case of the study.
 rule draw_set_up:
+    input:
+        HOME,
     output:
         f"results/{STUDY}/set_up.png",
     localrule: True
@@ -23,7 +25,8 @@ rule write_report:
         WORK.every("process", "tables/loading.json"),
         WORK.every("process", "network.html"),
         WORK.every("process", "tables/extrapolated.json"),
-        advice=ancient(WORK.needed_advice("process")),
+        advice=WORK.needed_advice,
+        home=HOME,
         signal=WORK.signal_file(),
         set_up=rules.draw_set_up.output,
         templates=WORK.page_templates("report/report.html.j2"),
@@ -31,16 +34,18 @@ rule write_report:
         csv=WORK.of_study("report", "summary.csv"),
         parquet=WORK.of_study("report", "summary.parquet"),
         xlsx=WORK.of_study("report", "summary.xlsx"),
-        complete=touch(WORK.of_study("report", "complete")),
+        complete=WORK.of_study("report", "complete"),
         page=shown(WORK.of_study("report", "report.html"), "report", "Report"),
     params:
         runs=lambda wildcards: WORK.every_folder("process"),
         advice=WORK.advice_option,
         signal=WORK.signal_option,
+        state=PROJECT.state(CASES),
         source=source_hash("dragchain.report.study_report"),
     shell:
         "dragchain report --out $(dirname {output.csv}) {params.runs} {params.advice}"
         " {params.signal} --preview {input.set_up} > {log} 2>&1"
+        " && echo {params.state} > {output.complete}"
 
 
 # What will be run: as text, and as data for `--logger dragdeck`.

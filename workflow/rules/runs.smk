@@ -9,6 +9,7 @@ for PLACE, SCENE in PLACES.items():
             f"render_{PLACE}"
         input:
             WORK.templates_of(SCENE.name),
+            home=HOME,
             packing=WORK.of_its_bed(PLACE, "tables/packing.json"),
             lead=WORK.of_its_lead(PLACE),
         output:
@@ -32,7 +33,6 @@ for PLACE, SCENE in PLACES.items():
             f"run_{PLACE}"
         input:
             deck_files(PLACE, SCENE.inputs),
-            advice=ancient(WORK.needed_advice(PLACE)),
             filling=WORK.of_its_bed(PLACE, "run.json"),
         output:
             of_run(PLACE, RECORD[PLACE]),
@@ -58,6 +58,7 @@ for PLACE in ("process", WINDOWS):
             f"share_{PLACE}"
         input:
             WORK.templates_of("process"),
+            home=HOME,
             run=of_whole_run(PLACE, RECORD[PLACE]),
             packing=WORK.of_its_bed(PLACE, "tables/packing.json"),
         output:
