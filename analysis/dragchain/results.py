@@ -1,6 +1,7 @@
 """The results of a study as Python objects: `load`."""
 
-from collections.abc import Iterable, Iterator, Mapping
+import warnings
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import groupby
@@ -18,9 +19,12 @@ from dragchain.run.basis import Basis, notes
 from dragchain.run.case import upstream_folders
 from dragchain.tables.by_step import intact, read_table
 from dragchain.tables.columns import descriptions, unit_of
-from dragdeck.errors import RejectedRunError
+from dragdeck.errors import InputError, RejectedRunError
+from dragdeck.project import by_folder, find_project
 from dragdeck.records.case import load_case
 from dragdeck.records.run import read_accepted
+from dragdeck.scenes.lead import with_leads
+from dragdeck.scenes.process import PROCESS
 
 _ON_WORKPIECE = (
     *("workpiece_force", "workpiece_contacts", "sphere_contacts", "facets", "contact_events"),
@@ -343,6 +347,11 @@ def load(study: Path | str) -> Study:
         If there are no such results.
     RejectedRunError
         If the study has no finished process run.
+
+    Warns
+    -----
+    UserWarning
+        If some runs are not of the study as its file is now.
     """
     homes = [home / "results" for home in (Path.cwd(), *Path.cwd().parents)]
     for folder in (*(home / study for home in homes), Path(study)):
@@ -364,7 +373,21 @@ def _finished(folder: Path) -> Study:
     runs = sorted(_runs(folder, "run.json"), key=lambda run: (run.name, run.case.run))
     if not runs:
         raise RejectedRunError(f"{folder}: no process run is finished")
+    if others := _of_other_settings(folder.resolve(), [run.case.run for run in runs]):
+        text = f"runs of other settings than those of the study now: {', '.join(others)}"
+        warnings.warn(f"{folder}: {text}", stacklevel=3)
     return Study(folder, Runs(runs))
+
+
+def _of_other_settings(folder: Path, runs: Sequence[str]) -> list[str]:
+    """Those of the runs of a study that it does not have as it stands; none without its file."""
+    try:
+        project = find_project(folder)
+        cases = project.cases(folder.name) if project.results(folder.name) == folder else []
+    except InputError:
+        return []
+    present = by_folder(with_leads(cases), PROCESS)
+    return [run for run in runs if present and run not in present]
 
 
 def _runs(folder: Path, having: str) -> Iterator[FinishedRun]:

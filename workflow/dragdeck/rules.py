@@ -7,6 +7,7 @@ they pass as wildcards is anything with the attributes of `Wildcards`.
 import json
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from functools import cache, partial
 from pathlib import Path
 from shlex import quote
@@ -170,18 +171,20 @@ def _content_of(inputs: Sequence[Any], of_runs: bool) -> Callable[[Any], str]:
 _HOMES = ".snakemake/dragdeck"
 
 
-def home_of(study: str) -> str:
+def home_of(study: str, *, idle: bool) -> str:
     """A file that is newer than results that were copied here, or whose records are gone.
 
     Without its records in ``.snakemake``, Snakemake takes any file for up to date. A mark among the
-    results says where they were made: elsewhere, all is checked that results are made from.
+    results says where they were made: elsewhere, all that they are made from is checked. An `idle`
+    call makes no folder for it.
     """
     home, mark = Path(_HOMES, study), Path("results", study, ".made")
     made = home.read_text() if home.is_file() else ""
     if not made or (mark.read_text() if mark.is_file() else "") != made:
         made = uuid4().hex
         write_text(home, made)
-        write_text(mark, made)
+        if mark.parent.is_dir() or not idle:
+            write_text(mark, made)
     return str(home)
 
 
@@ -358,7 +361,10 @@ class Workflow:
     def other_engines(self) -> Iterator[str]:
         """What to say of runs that another version of LIGGGHTS made than would now be called."""
         files = (self.project.root / file for name in SCENES for file in self.every(name, RUN_FILE))
-        made = Counter(RunRecord.read(file).engine_version for file in files if file.is_file())
+        made = Counter[str]()
+        for file in files:
+            with suppress(DragdeckError):
+                made[RunRecord.read(file).engine_version] += 1
         try:
             here = find_engine().version if made else ""
         except EngineError:

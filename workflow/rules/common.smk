@@ -77,7 +77,7 @@ def shown(file, caption, category, figure="report", run="all"):
 PROJECT = Project(Path(workflow.basedir))
 WORK = Workflow(PROJECT, STUDY, FIDELITY, PLAN, VALIDATION, judged)
 CASES = WORK.cases
-HOME = home_of(STUDY)
+HOME = home_of(STUDY, idle=not locking_call())
 
 MESSAGES = [text for case in CASES for text in map(str, warnings(case.study))]
 for WARNING in dict.fromkeys([*MESSAGES, *WORK.other_engines()]):

@@ -68,7 +68,7 @@ onsuccess:
 
 
 onerror:
-    # Not after Ctrl-C. The mark that the report is whole goes, so that the next call makes it anew.
+    # Not after Ctrl-C. An earlier report goes, of which nothing is to be shown.
     wanted = any(job.rule.name == "write_report" for job in workflow.dag.needrun_jobs())
     if wanted and not INTERRUPTED:
         runs = " ".join(folder for name in SCENES for folder in WORK.every_folder(name))
@@ -77,7 +77,7 @@ onerror:
         preview = f"--preview {picture}" if Path(picture).is_file() else ""
         measured = WORK.signal_option()
         shell(
-            "rm -f results/{STUDY}/report/complete;"
+            "rm -f results/{STUDY}/report/{{complete,report.html,summary.*}};"
             " dragchain report --out results/{STUDY}/report {runs} {advice} {preview} {measured} || true"
         )
         tell_numbers()

@@ -48,6 +48,9 @@ _STEPS = ("render", "share", "run", "tabulate", "find_chains", "map_loading", "d
 _LOG_BYTES = 20_000
 _SAID = re.compile(r"^(?:dragdeck|dragchain): (.*)", re.MULTILINE | re.DOTALL)
 
+_OF_CASES = ("network*.html", "*-removal.*", "signal.*")
+"""Files beside the report that an earlier one may have written of cases there are no longer."""
+
 _READ_SCREEN = "read the end of its last screen.*.txt"
 
 
@@ -228,6 +231,9 @@ def write_study_report(
         signals = _signals(cases, signal)
         picture = file_uri(preview) if preview else None
         page = _render(sections, cases, table, missing, picture, removed, signals)
+        earlier = {file.resolve() for name in _OF_CASES for file in out_dir.glob(name)}
+        for file in earlier - {section.network for section in sections}:
+            file.unlink()
         for section, name in zip(sections, _network_pages(sections), strict=True):
             if section.network is not None:
                 write_bytes(out_dir / name, section.network.read_bytes())

@@ -79,7 +79,7 @@ RICH: dict[str, dict[str, Any]] = {
         "workpieces": [{"angle_deg": 0}, {"angle_deg": 120, "shape": {
             "kind": "cylinder", "radius_m": 0.003, "facet_size_m": 0.002}}, {"angle_deg": 240}],
         "bowl.radius_m": 0.05, "bowl.facet_size_m": 0.008,
-        "motion.path": {"kind": "circle", "radius_m": 0.02, "revolutions": 0.1, "start_deg": 3},
+        "motion.path": {"kind": "circle", "radius_m": 0.02, "revolutions": 1.5, "start_deg": 3},
         "motion.tilt_deg": 4.0, "motion.spin": {"rpm": 60, "ramp_s": 0.02},
         "motion.counted_from_revolution": 1, "motion.ramp_s": 0.05,
         "motion.plunge_at_m": [0.02, 0.001],
@@ -138,6 +138,10 @@ RICH: dict[str, dict[str, Any]] = {
 
 TOLD_APART_BY = ("kind", "file", "each", "schedule")
 """Fields that are not changed alone: a kind of block has other fields."""
+
+BOUND = (f"sieve.{len(SIEVE) - 1}.1", "contact.rolling_model", "fidelity.speed_factor")
+"""Fields that others bind: the last sieve passes all, rolling_damping requires epsd, windows
+forbid a faster workpiece. Another study has the last two."""
 
 UNCHANGED = {
     "motion": {"drop_test", "filling"},
@@ -269,6 +273,7 @@ def test_a_run_has_another_name_if_its_script_differs(
     digests = {run: kind.digest(case) for run, (kind, case) in before.items()}
     scenes = {run: kind.build(case, BED) for run, (kind, case) in before.items()}
     changes: dict[str, set[str]] = {}
+    stuck: dict[str, Any] = {}
     for field, value in leaves(plain):
         if field.rpartition(".")[2] in TOLD_APART_BY:
             continue
@@ -290,7 +295,9 @@ def test_a_run_has_another_name_if_its_script_differs(
             changes[field] = renamed
             break
         else:  # beside the others of the study, a field may have to be at its default
-            assert not value, f"{field}: no other value than {value!r} is accepted"
+            if value and not field.endswith(BOUND):
+                stuck[field] = value
+    assert not stuck, "no other values are accepted"
     print(f"\n{name}")
     for field, renamed in changes.items():
         print(f"  {field}: {', '.join(sorted(renamed)) or 'none'}")
