@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from made_study import Made
 
 from dragdeck.cases.case import Case
 from dragdeck.cli import main
@@ -72,13 +73,21 @@ def test_the_points_of_a_plan_have_a_status(case: Case, project: Project, capsys
     assert "runs 0 % done: 10 waiting" in capsys.readouterr().out
 
 
-def test_open_says_where_the_report_is(case: Case, project: Project, capsys: Said) -> None:
+def test_open_and_status_say_where_the_report_is_and_whether_it_is_current(
+    case: Case, made: Made, project: Project, capsys: Said
+) -> None:
     assert main(["open", "small"]) == 1
     assert "./run all --config study=small" in capsys.readouterr().err
     file = project.report("small")
     file.parent.mkdir(parents=True)
     file.touch()
+    (file.parent / "complete").write_text(f"{project.state([case])}\n")
     assert main(["open", "small"]) == 0
-    assert capsys.readouterr().out == f"{file}\n"
+    assert capsys.readouterr() == (f"{file}\n", "")
     assert main(["status", "small"]) == 0
     assert capsys.readouterr().out.endswith(f"report: {file}\n")
+    made({"title": "another"})
+    assert main(["open", "small"]) == 0
+    assert "the report is of other settings" in capsys.readouterr().err
+    assert main(["status", "small"]) == 0
+    assert "is of other settings, or not of all runs" in capsys.readouterr().out

@@ -36,7 +36,7 @@ def source_hash(*modules: str) -> str:
         code = file.read_bytes()
         total.update(name.encode() + code)
         data |= {*file.parent.glob("*.csv")}
-        data |= {known for known in _records(name) if known.name.encode() in code}
+        data |= {known for known in _records(name) if f'{known.name}"'.encode() in code}
     for read in sorted(data):
         total.update(read.read_bytes())
     return total.hexdigest()[:12]
