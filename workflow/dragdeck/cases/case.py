@@ -12,8 +12,8 @@ from dragdeck.cases.ranks import auto_ranks, cores_here, ranks_within
 from dragdeck.records.advised import AdvisedSettings
 from dragdeck.study.base import Json
 from dragdeck.study.model import Study, Tolerance
-from dragdeck.study.recorded import mesh_beside
 from dragdeck.study.workpiece import MeshShape
+from dragdeck.study.yaml import mesh_beside
 
 SAID_BY_NAME = ("youngs_modulus_scale", "timestep_fraction", "speed_factor")
 """The settings that the name of a fidelity without a name says."""

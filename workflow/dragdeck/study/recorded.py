@@ -18,7 +18,7 @@ from dragdeck.study.media import MOST_SIEVES, Sieve
 from dragdeck.study.paths.waypoints import MOST_POINTS, Waypoint
 from dragdeck.study.table import read_table
 from dragdeck.study.workpiece import MeshShape
-from dragdeck.study.yaml import located, study_folders
+from dragdeck.study.yaml import located, mesh_beside, study_folders
 
 _Place = tuple[Path | str, int | None, str | None]
 Places = Mapping[str | None, _Place]
@@ -91,31 +91,6 @@ def _sieved(sieve: Any, field: str, study: Path, places: dict[str | None, _Place
     if not isinstance(sieve, str):
         return sieve
     return _read(recorded_file(sieve, study, field), Sieve, MOST_SIEVES, field, places)
-
-
-def mesh_beside(study: Path, name: str) -> Path:
-    """The file of a mesh: beside the study, in its meshes/, or in the project's meshes/.
-
-    A study that extends another finds its meshes, too.
-
-    Raises
-    ------
-    InputError
-        No such file in any of these places.
-    """
-    places = [place for one in study_folders(study) for place in (one, one / "meshes")]
-    places.append(study.parent.parent.parent / "meshes")
-    for place in places:
-        if (place / name).is_file():
-            return place / name
-    raise InputError(
-        "no such mesh file",
-        file=study,
-        field="workpiece.shape.file",
-        value=name,
-        limit="a file in " + ", ".join(str(place) for place in places),
-        remedy="put the mesh there, or correct the name",
-    )
 
 
 def mesh_errors(data: Json, study: Path) -> Iterator[InputError]:

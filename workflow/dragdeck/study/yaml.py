@@ -168,6 +168,31 @@ def _folders(file: Path, _changed: int) -> tuple[Path, ...]:
     return tuple(place.parent for place, _ in lineage(file))
 
 
+def mesh_beside(study: Path, name: str) -> Path:
+    """The file of a mesh: beside the study, in its meshes/, or in the project's meshes/.
+
+    A study that extends another finds its meshes, too.
+
+    Raises
+    ------
+    InputError
+        No such file in any of these places.
+    """
+    places = [place for one in study_folders(study) for place in (one, one / "meshes")]
+    places.append(study.parent.parent.parent / "meshes")
+    for place in places:
+        if (place / name).is_file():
+            return place / name
+    raise InputError(
+        "no such mesh file",
+        file=study,
+        field="workpiece.shape.file",
+        value=name,
+        limit="a file in " + ", ".join(str(place) for place in places),
+        remedy="put the mesh there, or correct the name",
+    )
+
+
 _WHOLE = ("fidelity", "sweep")
 """Blocks that a study takes or replaces as a whole."""
 
