@@ -1,4 +1,4 @@
-"""Fuzzed dumps and meshes: the right values, or an error that names the file."""
+"""Fuzzed dumps, tables and meshes: the right values, or an error that names the file."""
 
 from pathlib import Path
 

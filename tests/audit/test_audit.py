@@ -9,7 +9,15 @@ import pandas as pd
 import pytest
 import yaml
 from paths import DATA
-from plain_run import PlainRun, bottlenecks, coordination, loads, mean_contacts, rim_excess
+from plain_run import (
+    PlainRun,
+    bottlenecks,
+    coordination,
+    first_touches,
+    loads,
+    mean_contacts,
+    rim_excess,
+)
 from snakemake_calls import copy_of_project, succeed
 
 pytestmark = [pytest.mark.audit, pytest.mark.engine]
@@ -24,6 +32,7 @@ RODS = {"count": 150, "radius_std_m": 0, "shape": {"kind": "cylinder", "aspect":
 def made(project: Path, **media: object) -> Path:
     """The process run of the small study with a law of removal, and these media."""
     study = yaml.safe_load((DATA / "small_study.yaml").read_text())
+    study["outputs"] = {"first_touch_fraction": 0.3}
     study |= {"removal": REMOVAL, "media": study["media"] | media}
     succeed(copy_of_project(project, study), "all", "--config", "study=small")
     (run,) = (project / "results/small/process").iterdir()
@@ -163,3 +172,19 @@ def test_the_excess_along_the_rim(folder: Path, plain: PlainRun) -> None:
         edges["excess_w"]["value"], rim_excess(plain, widths), strict=True
     ):
         assert found == pytest.approx(excess, abs=0.1 * within)
+
+
+def test_first_touches(folder: Path, plain: PlainRun) -> None:
+    wanted, time_s = first_touches(plain)
+    found = table(folder, "touch_events").sort_values(["frame", "particle_id"])
+    assert len(wanted) > 20
+    for name in wanted:
+        same(found[name], wanted[name], name)
+    case = plain.case
+    modulus = case["contact_moduli"]["workpiece"]["modulus_pa"]
+    modulus /= case["fidelity"]["youngs_modulus_scale"]
+    force, radius = wanted["peak_normal_force_n"], wanted["radius_m"]
+    same(found["peak_pressure_pa"], np.cbrt(6 * force * modulus**2 / np.pi**3 / radius**2), "Hertz")
+    touches = json.loads((folder / "tables/wear.json").read_text())["touches"]
+    same([touches["events"], touches["time_s"]], [len(wanted), time_s], "number and time")
+    same(touches["per_s"]["value"], len(wanted) / time_s, "rate")

@@ -117,10 +117,13 @@ class PlainRun:
             found.append(row)
         return found
 
-    def on_workpiece(self) -> Iterator[tuple[int, list[OnWorkpiece]]]:
-        """The contacts with force of each sample: cut, merged over edges, and shared out."""
+    def on_workpiece(self, name: str = "workpiece") -> Iterator[tuple[int, list[OnWorkpiece]]]:
+        """The contacts with force of each sample: cut, merged over edges, and shared out.
+
+        Of the outputs of this name: ``workpiece``, or ``touch`` at every step.
+        """
         mu = self.friction("workpiece")
-        for step, particles, contacts in self.pairs("workpiece_particles", "workpiece_contacts"):
+        for step, particles, contacts in self.pairs(f"{name}_particles", f"{name}_contacts"):
             touching: dict[float, list[Row]] = defaultdict(list)
             for contact in contacts:
                 touching[contact["particle_id"]].append(contact)
@@ -345,3 +348,41 @@ def rim_excess(run: PlainRun, widths: list[float]) -> list[tuple[float, float]]:
         (means[n], means[n] - (means[n + 1] - means[n]) * areas[n] / (areas[n + 1] - areas[n]))
         for n in range(len(widths) - 1)
     ]
+
+
+def first_touches(run: PlainRun) -> tuple[pd.DataFrame, float]:
+    """The contacts of particles that begin after the first step, in order; the time of all, s.
+
+    A particle that does not touch at one step ends its contact. What counts at the first touch is
+    the contact with the largest normal force; the peak is that of all forces of a step together.
+    """
+    samples = [contacts for step, contacts in run.on_workpiece("touch") if run.counted(step)]
+    radius = {
+        row["particle_id"]: row["radius_m"] for _, rows in run.frames("particles") for row in rows
+    }
+    ended: list[dict[str, float]] = []
+    current: dict[int, dict[str, float]] = {}
+    for number, contacts in enumerate(samples):
+        touching: dict[int, list[OnWorkpiece]] = defaultdict(list)
+        for one in contacts:
+            touching[one.particle].append(one)
+        ended += [event for particle, event in current.items() if particle not in touching]
+        current = {particle: one for particle, one in current.items() if particle in touching}
+        for particle, of_particle in touching.items():
+            forces = [one.force @ one.normal for one in of_particle]
+            if particle not in current:
+                slip, speed = run.slip(of_particle[int(np.argmax(forces))])
+                current[particle] = {
+                    "frame": number,
+                    "particle_id": particle,
+                    "radius_m": radius[particle],
+                    "touch_normal_m_s": speed,
+                    "touch_tangential_m_s": float(np.linalg.norm(slip)),
+                    "peak_normal_force_n": -math.inf,
+                    "duration_s": 0.0,
+                }
+            event = current[particle]
+            event["duration_s"] += run.dt
+            event["peak_normal_force_n"] = max(event["peak_normal_force_n"], sum(forces))
+    found = pd.DataFrame([*ended, *current.values()]).sort_values(["frame", "particle_id"])
+    return found[found["frame"] > 0], len(samples) * run.dt

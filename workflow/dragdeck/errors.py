@@ -182,7 +182,6 @@ CautionCode = Literal[
     "overlap",
     "ranks",
     "size_ratio",
-    "skin",
     "stable_timestep",
     "steps_per_contact",
     "trials",

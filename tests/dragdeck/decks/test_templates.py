@@ -73,6 +73,8 @@ REFUSED = [
     (PROCESS, '{% extends "process.in.j2" %}', '(?s)extends or calls itself.*extend "base/'),
     (PROCESS, f"{_EXTENDS}\n{{% block exta %}}{{% endblock %}}\n",
      "(?s)line 3: .*no template that it extends has a block 'exta'.*did you mean 'extra'"),
+    *((PROCESS, in_block(f"neigh_modify {words}"), f"(?s)rebuild neighbour lists too late.*{words}")
+      for words in ("every 5", "delay 10 check no", "exclude type 1 1 once yes")),
     (PROCESS, in_block("shell date"), "(?s)start another program.*'shell date'"),
     (PROCESS, f"{_EXTENDS}fix damping all viscous 1e-4\n",
      "(?s)line 2: .*text outside of the blocks.*put it into a block"),

@@ -187,13 +187,3 @@ def test_particles_too_soft_for_their_bed_get_a_warning_with_a_way_out(
     assert f"at least {small['fidelity']['youngs_modulus_scale']:g}" in caution.text
     case = made()
     assert "overlap" not in [one.code for one in filling_scene(case).warnings]
-
-
-def test_particles_that_outrun_their_neighbour_lists_get_a_warning_with_a_way_out(
-    small: dict[str, Any], made: Made
-) -> None:
-    case = made({"fidelity": {"youngs_modulus_scale": 1e-4, "filling_timestep_fraction": 0.8}})
-    (caution,) = [one for one in filling_scene(case).warnings if one.code == "skin"]
-    small["fidelity"] |= caution.settings
-    case = made()
-    assert "skin" not in [one.code for one in filling_scene(case).warnings]

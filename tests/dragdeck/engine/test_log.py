@@ -2,16 +2,12 @@
 
 import pytest
 
-from dragdeck.engine.log import dangerous_builds, engine_errors, last_step, loops, settling
+from dragdeck.engine.log import engine_errors, last_step, loops, settling
 
 
 def test_errors_are_read_once_each() -> None:
     text = "Step\nERROR: Lost atoms (thermo.cpp:1)\nERROR: Lost atoms (thermo.cpp:1)\nbye\n"
     assert engine_errors(text) == ["ERROR: Lost atoms (thermo.cpp:1)"]
-
-
-def test_late_neighbour_lists_of_all_commands_count() -> None:
-    assert dangerous_builds("Dangerous builds = 3\nDangerous builds = 0\n") == 3
 
 
 @pytest.mark.parametrize(

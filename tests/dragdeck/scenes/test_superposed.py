@@ -1,6 +1,7 @@
 """Motions that are superposed on the path: study fields, speeds, checks, input scripts."""
 
 import math
+import re
 from typing import Any
 
 import numpy as np
@@ -144,6 +145,21 @@ def test_motions_that_cannot_be(
     assert field in text
     assert "limit:" in text
     assert "remedy:" in text
+
+
+def test_the_limit_of_a_drag_is_the_skin_and_the_remedy_names_one_that_does(
+    small: dict[str, Any], made: Made
+) -> None:
+    small["fidelities"]["quick"]["speed_factor"] = 100
+    case = made({"motion.plunge_speed_m_s": 0.1})
+    has, step = skin(case.study), bed_timestep(case.study, "timestep_fraction")
+    limit = has / step / 100
+    process_scene(made({"motion.plunge_speed_m_s": 0.999 * limit}), BED)
+    with pytest.raises(InputError, match="neighbour skin per step") as caught:
+        process_scene(made({"motion.plunge_speed_m_s": 1.5 * limit}), BED)
+    (wide,) = re.findall(r"fidelity.skin_m of at least (\S+)", caught.value.remedy)
+    small["fidelities"]["quick"]["skin_m"] = float(wide)
+    process_scene(made({"motion.plunge_speed_m_s": 1.5 * limit}), BED)
 
 
 def test_the_limit_of_a_spin_is_the_skin(moved: Made) -> None:

@@ -59,7 +59,6 @@ def failed(*checks: AcceptanceCheck, **changes: Any) -> Seen:
         (failed(check("within_limits", reason="particles")), LOST),
         (failed(check("within_limits", reason="energy")), ENERGY),
         (failed(check("at_rest")), ENERGY),
-        (failed(check("neighbour_builds")), INACCURATE),
     ],
 )
 def test_classes(point: Seen, kind: str) -> None:

@@ -140,7 +140,7 @@ def test_a_run_counts_if_it_ended(tmp_path: Path) -> None:
     (run,) = read_points([listed(tmp_path)])
     assert run.record is None and not run.measurable
     assert ended(run, "complete").measurable
-    assert ended(run, "failed", "neighbour_builds").measurable
-    assert not ended(run, "failed", "neighbour_builds", "at_rest").measurable
+    assert ended(run, "failed", "stable_timestep").measurable
+    assert not ended(run, "failed", "stable_timestep", "at_rest").measurable
     with pytest.raises(TableError, match="interrupted"):
         _ = ended(run, "stopped").record

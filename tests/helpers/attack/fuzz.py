@@ -1,4 +1,4 @@
-"""Fuzzed dumps and meshes: the right values, or an error that names the file."""
+"""Fuzzed dumps, tables and meshes: the right values, or an error that names the file."""
 
 import struct
 import tempfile
@@ -19,12 +19,13 @@ from dragdeck.dumps.reader import read_dump, read_prints
 from dragdeck.errors import DragdeckError
 from dragdeck.mesh.checks import findings
 from dragdeck.mesh.files import read
+from dragdeck.study.table import read_table
 
 _TOKENS = [
     *(b"nan", b"-1", b"1e999", b"-0", b"9" * 40, b"0x10", b"1_000", b"1.5", b"--1", b"+", b"e5"),
     *(b"1e", b".", b"infinity", b"\xd9\xa1", b"\x00", b"\n", b" ", b"\r\n", b"ITEM: TIMESTEP\n"),
     *(b"\xff" * 8, b"\x00" * 8, b"\x7f" + b"\xff" * 7, b"1/9/9", b"f 1 2 99", b"vertex"),
-    *(b"solid", b"endsolid", b"18446744073709551616", b"2147483648"),
+    *(b",", b";", b"1,5", b"#", b"solid", b"endsolid", b"18446744073709551616", b"2147483648"),
 ]
 
 Frames = list[WholeFrame]
@@ -158,6 +159,35 @@ def _try_print_file(folder: Path, content: bytes) -> None:
     assert all(before < after for before, after in pairwise(steps))
 
 
+def _tables(mark: str, decimal: str) -> list[bytes]:
+    rows = [mark.join(f"{one:.4f}".replace(".", decimal) for one in (1e-3 * n, 2.5 - n))
+            for n in range(8)]  # fmt: skip
+    text = "\n".join([mark.join(("time_s", "force_n")), "# a remark", *rows, ""])
+    return [text.encode(), text.replace("\n", "\r\n").encode("utf-8-sig")]
+
+
+def _try_table(folder: Path, content: bytes) -> None:
+    file, names = folder / "a.csv", ["time_s", "force_n"]
+    file.write_bytes(content)
+    try:
+        table = read_table(file)
+        known = sorted(name for name in table.names if name in names) == sorted(names)
+        found = table.numbers(names) if known else []
+    except DragdeckError as error:
+        assert "a.csv" in str(error), "the message does not name the file"
+        return
+    if not known or b'"' in content:  # its callers ask for the names; quotes are left to csv
+        return
+    text = content.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
+    lines = [line for line in text.split("\n") if line.strip() and line.lstrip()[0] != "#"]
+    mark = next((mark for mark in ";\t" if mark in lines[0]), ",")
+    head, *rows = [[cell.strip() for cell in line.split(mark)] for line in lines]
+    assert all(len(row) == len(head) for row in rows), "an uneven row was taken"
+    for name, values in zip(names, found, strict=True):
+        wanted = [float(row[head.index(name)].replace(",", ".")) for row in rows]
+        assert values.tolist() == wanted, name
+
+
 def _meshes(kind: str) -> list[bytes]:
     box = trimesh.creation.cylinder(radius=4.0, height=30.0, sections=6)
     found = box.export(file_type={"ascii.stl": "stl_ascii", "stl": "stl"}.get(kind, kind))
@@ -185,6 +215,8 @@ FUZZES: dict[str, tuple[Callable[[], list[bytes]], Callable[[Path, bytes], None]
     "dump: text": (_text_dumps, _try_text_dump),
     "dump: binary": (_binary_dumps, _try_binary_dump),
     "dump: print file": (_printed, _try_print_file),
+    "table: commas": (partial(_tables, ",", "."), _try_table),
+    "table: semicolons, decimal commas": (partial(_tables, ";", ","), _try_table),
     "mesh: STL of text": (partial(_meshes, "ascii.stl"), partial(_try_mesh, "stl")),
     "mesh: binary STL": (partial(_meshes, "stl"), partial(_try_mesh, "stl")),
     "mesh: OBJ": (partial(_meshes, "obj"), partial(_try_mesh, "obj")),

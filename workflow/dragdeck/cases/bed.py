@@ -1,12 +1,11 @@
 """The media of a study as numbers: radii, Rayleigh time, time steps, neighbour skin."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
-from dragdeck.errors import Caution, InputError
+from dragdeck.errors import InputError
 from dragdeck.mesh.clump import SPHERE, Clump, fit_clump
 from dragdeck.physics.contact_mechanics import (
     ENGINE_SOFTEST_PA,
@@ -234,37 +233,6 @@ def impact_time(study: Study, scale: float, speed_m_s: float) -> float:
     particle, plate = particle_material(study), study.materials[study.workpiece.material]
     radius, modulus = study.media.typical_radius_m, effective_modulus(particle, plate, scale)
     return hertz_contact_time(particle_mass(particle, radius), radius, modulus, speed_m_s)
-
-
-def outrun(study: Study, field: str, who: str, speed_m_s: float) -> Iterator[Caution]:
-    """A warning where particles outrun the neighbour lists, which fails a run.
-
-    Parameters
-    ----------
-    study : Study
-    field : str
-        Of the fidelity: that of the scene's time step.
-    who : str
-        What moves, with its verb.
-    speed_m_s : float
-        How fast it moves at most.
-    """
-    needed, has = 2 * speed_m_s * bed_timestep(study, field), skin(study)
-    if needed <= has * JUST_BEYOND:
-        return
-    least = rounded(needed, up=True)
-    widest = max(has, widest_skin(study))
-    settings = {"skin_m": min(least, widest)}
-    if least > widest:
-        fraction = getattr(study.chosen_fidelity(), field)
-        settings[field] = rounded(fraction * widest / needed, up=False)
-    yield Caution(
-        "skin",
-        f"{who} at up to {speed_m_s:.2g} m/s, more than half the neighbour skin ({has:.2g} m) per "
-        f"step: dangerous neighbour-list builds may fail the run; use a fidelity.skin_m of "
-        f"at least {least:g}, or a smaller fidelity.{field}",
-        settings,
-    )
 
 
 def particle_material(study: Study) -> Material:

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 _PROGRAMS = ("include", "partition", "python", "shell")
 """Commands that start programs or scripts, or carry other commands."""
@@ -80,6 +81,20 @@ def endless(deck: str) -> Iterator[tuple[str, str]]:
         start = labels.get(command.words[2], at) if command.words[2:] else 0
         if start < at and not any(_ends_loop(each) for each in every[start:at]):
             yield command.text, "run for ever: no `next` and no `if` ends this loop"
+
+
+def late_lists(deck: str) -> Iterator[tuple[str, str]]:
+    """Commands of a deck after which neighbour lists are not rebuilt as soon as they need it.
+
+    With ``delay 0`` no contact of a moving particle is seen too late, however thin the skin
+    (docs/development/liggghts.md).
+    """
+    allowed = {"delay": "0", "every": "1", "check": "yes", "once": "no"}
+    for command in commands(deck):
+        if command.words[0] == "neigh_modify":
+            for name, value in pairwise(command.words):
+                if allowed.get(name, value) != value:
+                    yield command.text, "rebuild neighbour lists too late, and miss contacts"
 
 
 def _is_label(command: EngineCommand) -> bool:

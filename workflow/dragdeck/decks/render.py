@@ -14,6 +14,7 @@ from dragdeck.decks.engine_commands import (
     commands,
     contact_laws,
     endless,
+    late_lists,
     law_commands,
     leaving_folder,
 )
@@ -31,8 +32,8 @@ def deck_text(scene: AnyScene, templates: jinja2.Environment) -> str:
     ------
     InputError
         A template cannot be used: names template, line and what is missing. Or the deck would
-        start a program, reach files outside of the run's folder, run for ever, or not write
-        what ``columns.json`` says.
+        start a program, reach files outside of the run's folder, run for ever, rebuild its
+        neighbour lists too late, or not write what ``columns.json`` says.
     """
     names = ", ".join(_used(scene, templates))
     text = _rendered(scene, templates, names)
@@ -44,7 +45,8 @@ def deck_text(scene: AnyScene, templates: jinja2.Environment) -> str:
             limit=f"printable characters, and the last command of base.in.j2: print {END}",
             remedy="extend the project's template, and override blocks of it",
         )
-    for command, why in (*leaving_folder(text, scene.deck.source), *endless(text)):
+    source = scene.deck.source
+    for command, why in (*leaving_folder(text, source), *endless(text), *late_lists(text)):
         raise InputError(
             f"the input script would {why}",
             file=file,

@@ -56,11 +56,7 @@ def check_run(
         That were asked for.
     """
     screens = [_text(folder / f"screen.{part.part}.txt") for part in parts]
-    checks = [
-        _ended(screens[-1], exit_status),
-        _no_errors(screens[-1]),
-        _neighbour_builds("".join(screens)),
-    ]
+    checks = [_ended(screens[-1], exit_status), _no_errors(screens[-1])]
     checks += [_packing(folder / mark, inputs.media.n_spheres, ranks) for mark in inputs.marks]
     if inputs.settled is not None:
         checks.append(_at_rest(screens[-1]))
@@ -120,11 +116,6 @@ def _no_errors(screen: str) -> AcceptanceCheck:
     seen = "; ".join(errors) or "none"
     reason: CheckReason = "lost_particles" if "Lost atoms" in seen else "other"
     return _check("no_engine_error", "no LIGGGHTS error", not errors, seen, "none", reason)
-
-
-def _neighbour_builds(screens: str) -> AcceptanceCheck:
-    dangerous, name = log.dangerous_builds(screens), "no dangerous neighbour builds"
-    return _check("neighbour_builds", name, dangerous == 0, str(dangerous), "0")
 
 
 def _at_rest(screen: str) -> AcceptanceCheck:

@@ -20,11 +20,6 @@ def reached_end(screen: str) -> bool:
     return re.search(f"^{END}$", screen, flags=re.MULTILINE) is not None
 
 
-def dangerous_builds(screen: str) -> int:
-    """How often a neighbour list may have been built too late."""
-    return sum(int(count) for count in re.findall(r"Dangerous builds = (\d+)", screen))
-
-
 def settling(screen: str) -> tuple[bool, str]:
     """Whether a bed came to rest, and the words in which the input script says so."""
     line = re.search(r"^DRAGDECK ((NOT )?SETTLED: .*)$", screen, flags=re.MULTILINE)

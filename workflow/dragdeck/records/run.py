@@ -140,7 +140,7 @@ State = Literal["running", "stopped", "failed", "complete"]
 CheckCode = Literal[
     "ended",
     "no_engine_error",
-    "neighbour_builds",
+    "neighbour_builds",  # of runs of version 0.2
     "at_rest",
     "steady_bed",
     "stable_timestep",
@@ -158,7 +158,6 @@ CheckReason = Literal["lost_particles", "other", "particles", "finite_numbers", 
 
 _SMALLER_STEP = "choose a smaller timestep_fraction or a larger youngs_modulus_scale"
 REMEDIES: Mapping[CheckCode, str] = {
-    "neighbour_builds": "choose a larger fidelity.skin_m",
     "at_rest": "choose a larger filling.max_time_s or filling.energy_ratio",
     "packing_in_bowl": "use fewer particles, or a wider or higher bowl",
     "steady_bed": "choose a longer motion.transient_m, or more motion.path.revolutions",

@@ -24,7 +24,6 @@ from dragdeck.cases.bed import (
     expected_surface,
     farthest_point,
     media_classes,
-    outrun,
     particle_material,
     skin,
     smallest_radius,
@@ -332,9 +331,6 @@ def filling_cautions(case: Case) -> Iterator[Caution]:
     yield from _cohesion_caution(study)
     yield from _class_cautions(study)
     yield from _size_cautions(study)
-    start = _start(study)
-    speed = math.hypot(start.fastest_m_s, _arrival_speed(study, start.top_m))
-    yield from outrun(study, "filling_timestep_fraction", "particles fall", speed)
 
 
 def _overlap_caution(study: Study) -> Iterator[Caution]:
