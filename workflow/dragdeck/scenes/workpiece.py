@@ -305,12 +305,17 @@ def _workpiece(shape: CylinderShape, length_m: float) -> "Trimesh":
 def _from_file(
     file: Path, shape: MeshShape, surroundings: Surroundings
 ) -> "tuple[Trimesh, list[Finding]]":
-    sizes = shape.facet_size_m, shape.edge_facet_size_m
-    mesh = upright(read(file, shape.unit, *sizes), shape.axis)
+    mesh = _read(file, shape)
     found = check(mesh, file=file, field="workpiece.shape", surroundings=surroundings)
     turned = facing_out(mesh)
     assert turned is not None, "the check refuses a surface with one side"
     return place(turned, shape.offset_m), found
+
+
+@lru_cache(maxsize=8)
+def _read(file: Path, shape: MeshShape) -> "Trimesh":
+    sizes = shape.facet_size_m, shape.edge_facet_size_m
+    return upright(read(file, shape.unit, *sizes), shape.axis)
 
 
 # --- whether it fits -----------------------------------------------------------------------------
