@@ -19,8 +19,8 @@ from dragchain.statistics.estimate import CONFIDENCE, Estimate
 LARGEST_ERROR = 0.4
 """With a larger relative error of a patch there, a percentile is not available."""
 
-_PRIORS, _DRAWS, _STEPS, _SPACING, _MOST = 40, 5, 40, 0.5, 250
-"""Fitted priors, maps drawn of each, and steps of its fit (EM algorithm).
+_PRIORS, _DRAWS, _STEPS, _SPACING, _MOST = 40, 5, 6, 0.5, 250
+"""Fitted priors, maps drawn of each, and steps of its fit: few, so that it stays smooth (EM).
 
 Distance of the values of a prior in errors of a patch, and the largest number of values.
 """
