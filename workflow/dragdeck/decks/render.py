@@ -31,8 +31,8 @@ def deck_text(scene: AnyScene, templates: jinja2.Environment) -> str:
     ------
     InputError
         A template cannot be used: names template, line and what is missing. Or the deck would
-        start a program, reach files outside of the run's folder, run for ever, or not write
-        what ``columns.json`` says.
+        start a program, reach files outside of the run's folder, run for ever, not write what
+        ``columns.json`` says, or has a contact law in an order that LIGGGHTS refuses.
     """
     names = ", ".join(_used(scene, templates))
     text = _rendered(scene, templates, names)
@@ -51,6 +51,15 @@ def deck_text(scene: AnyScene, templates: jinja2.Environment) -> str:
             value=ascii(command),
             remedy="remove the command from the template; see docs/reference/templates.md",
         )
+    for law in contact_laws(text):
+        if not contact_law.in_order(law):
+            raise InputError(
+                "LIGGGHTS refuses the order of keywords in this contact law",
+                file=file,
+                value=" ".join(law),
+                limit=f"the order model {' '.join(contact_law.KEYWORDS)}",
+                remedy="write the block contact_model in this order",
+            )
     if overriding(scene, templates) and scene.override is None:
         _check_outputs(scene, text, _rendered(scene, without(templates)), file)
     return text
