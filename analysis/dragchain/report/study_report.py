@@ -129,9 +129,9 @@ def _of_record(record: RunRecord) -> tuple[str, str] | None:
             f"interrupted, or still running; last known step {record.last_step:,}",
             "run the study again: it goes on from the last checkpoint",
         )
-    if not record.failed_checks:
+    if not (told := causes(record.checks)):
         return None
-    first, *others = record.failed_checks
+    first, *others = told
     more = f"; and {len(others)} more" if others else ""
     seen = f"failed check: {first.name}: {first.seen} (limit: {first.limit}){more}"
     return seen, first.remedy or _READ_SCREEN

@@ -17,6 +17,7 @@ from made_study import Made
 from run_files import rewrite
 
 from dragdeck.engine.checkpoints import checkpoint_files, checkpoint_step
+from dragdeck.engine.process import find_engine
 from dragdeck.engine.reports import silent
 from dragdeck.engine.run_folder import fingerprint, run
 from dragdeck.engine.watch import EngineEnded, Watcher, cut_screen
@@ -204,6 +205,46 @@ def test_the_engines_error_reaches_the_user_and_is_not_retried(filling: Path) ->
     rewrite(deck, good)
     run(filling, silent)
     assert (filling / "run.json").is_file()
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        ("fix part all mesh/surface file ${gone} type 1", "Cannot open mesh file gone.stl"),
+        ("fix out all print 1 x file no/such.txt", "Cannot open fix print file"),
+        ("read_restart damaged.restart", "Invalid flag in header section of restart file"),
+    ],
+)
+def test_what_a_single_rank_says_before_it_aborts_reaches_the_user(
+    command: str, said: str, ranks: int, made: Made, project: Project
+) -> None:
+    """LIGGGHTS prints such an error without a flush, and calls ``MPI_Abort``."""
+    filling = small_filling(made, project, ranks=ranks)
+    deck = filling / "in.liggghts"
+    text = deck.read_text()
+    before = "if" if command.startswith("read") else "# --- Time step"
+    (filling / "damaged.restart").write_bytes(b"\xc8" + bytes(4096))
+    hidden = f"variable gone string gone.stl\n{command}\n{before}"  # not seen before the start
+    rewrite(deck, text.replace(f"\n{before}", f"\n{hidden}", 1))
+    with pytest.raises((EngineError, RejectedRunError)) as caught:
+        run(filling, silent)
+    assert re.search(rf"ERROR.*: {said}", str(caught.value)), caught.value
+    assert not re.search("timestep_fraction|mpirun|energy_ratio", str(caught.value))
+
+
+def test_whoever_lacks_stdbuf_is_told_why_an_error_is_lost(
+    filling: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "bin").mkdir()
+    (tmp_path / "bin/liggghts").symlink_to(Path(find_engine().path).resolve())
+    (tmp_path / "bin/rsh").symlink_to("/bin/true")  # Open MPI looks for one
+    monkeypatch.setenv("PATH", str(tmp_path / "bin"))
+    deck = filling / "in.liggghts"
+    broken = "variable gone string gone.stl\nfix part all mesh/surface file ${gone} type 1\n"
+    rewrite(deck, deck.read_text().replace("# --- Time step", f"{broken}# --- Time step", 1))
+    with pytest.raises(EngineError, match="without a message.*stdbuf of GNU coreutils"):
+        run(filling, silent)
 
 
 def test_a_bed_that_does_not_come_to_rest_is_rejected_and_not_resumed(filling: Path) -> None:

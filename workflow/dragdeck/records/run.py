@@ -165,7 +165,7 @@ REMEDIES: Mapping[CheckCode, str] = {
     "output_complete": "start the run again with: dragdeck run --again",
     "ranks": "use the mpirun that belongs to this LIGGGHTS (DRAGDECK_LAUNCHER)",
 }
-"""What to do where a check did not pass; of others, the end of the screen output says it."""
+"""What to do where a check did not pass; of others, its words or the screen output say it."""
 
 
 class ParticlesPerRank(Part):
@@ -224,6 +224,13 @@ class AcceptanceCheck(Part):
     limit: str
     number: float | None = None
     remedy: str | None = None
+
+
+def causes(checks: Sequence[AcceptanceCheck]) -> Sequence[AcceptanceCheck]:
+    """The checks that did not pass; where LIGGGHTS stopped with an error, that one alone."""
+    failed = [check for check in checks if not check.passed]
+    stopped = [one for one in failed if one.code == "no_engine_error" and one.reason == "other"]
+    return stopped or failed
 
 
 class RunPart(Part):
