@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 _PROGRAMS = ("include", "partition", "python", "shell")
 """Commands that start programs or scripts, or carry other commands."""
@@ -68,6 +69,31 @@ def leaving_folder(deck: str, source: str) -> Iterator[tuple[str, str]]:
             for word in words[1:]:
                 if word != source and _OUTSIDE.match(word):
                     yield command.text, f"access a file outside the run's folder: {word}"
+
+
+def files_read(deck: str) -> set[str]:
+    """Names of the files that a deck reads, its source included, as far as it names them itself.
+
+    A file that another of its commands names too, such as one that it writes, is not among them.
+    """
+    read, others = set(), set()
+    for command in commands(deck):
+        names = _names_read(command.words)
+        read.update(names)
+        others.update([] if names else command.words)
+    return {name for name in read - others if "$" not in name}
+
+
+def _names_read(words: list[str]) -> list[str]:
+    """The files that a command reads."""
+    kind = " ".join([words[0], *words[2:4]])
+    if words[0] in ("read_data", "read_dump", "read_restart"):
+        return words[1:2]
+    if kind.startswith(("variable file ", "variable atomfile ")) or words[1:3] == ["from", "index"]:
+        return words[3:4]
+    if re.match("fix .* (mesh|particletemplate)/", kind):
+        return [value for word, value in pairwise(words) if word == "file"]
+    return []
 
 
 def endless(deck: str) -> Iterator[tuple[str, str]]:

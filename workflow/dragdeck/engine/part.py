@@ -1,5 +1,6 @@
 """A part of a run: LIGGGHTS from its start or a checkpoint to an end, good or bad."""
 
+import re
 import time
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -32,6 +33,9 @@ from dragdeck.records.run import (
 )
 
 STATE_FILE = "state.json"
+_UNWRITTEN = re.compile("Cannot open (?!mesh|data|clump|file variable)")
+"""What LIGGGHTS says of a file that it cannot write; of some that it reads it says the same."""
+
 _WRITTEN: set[CheckCode] = {"output_complete", "packing_whole"}
 """Checks that a full disk alone can fail."""
 
@@ -187,7 +191,7 @@ class PartOfRun:
         if asked:
             return "stopped on request"
         full = free_bytes(self.folder) < SPARE_BYTES
-        if full or any("Cannot open" in error for error in errors):
+        if full or any(_UNWRITTEN.search(error) for error in errors):
             said = "; ".join(errors) or "no message of LIGGGHTS"
             left = space_left(self.folder, self.columns.outputs, self.inputs.media.n_spheres)
             return f"the disk is full, or a file cannot be written ({said}); {left}"
