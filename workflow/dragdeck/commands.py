@@ -311,7 +311,7 @@ def _judged(case: Case) -> tuple[list[str], list[InputError]]:
 def new(study: str, base: str) -> None:
     """Make the folder of a study that extends another."""
     file = new_study(find_project(Path.cwd()).studies, study, base)
-    say(f"{file}: edit it, then run: dragdeck check {study}")
+    say(f"{file}: edit it, then run: ./run dragdeck check {study}")
 
 
 def cases(study: str, fidelity: str | None, plan: str | None) -> None:
@@ -408,7 +408,7 @@ def render(
             file=f"studies/{study}",
             value=run,
             limit=f"one of: {', '.join(runs)}",
-            remedy="list them with: dragdeck cases",
+            remedy="list them with: ./run dragdeck cases",
         )
     case = runs[run]
     templates = environment(project.templates, study_templates(case))
@@ -449,7 +449,7 @@ def _bed(kind: SceneType, packing: Path | None) -> Bed | None:
         raise InputError(
             f"the scene {kind.name} requires the settled packing",
             field="--packing",
-            remedy="give the packing.json that dragchain tables made of the filling",
+            remedy="give the packing.json that ./run dragchain tables made of the filling",
         )
     return read_bed(packing)
 

@@ -220,7 +220,7 @@ def main_numbers(report_dir: Path) -> str:
     """
     file = report_dir / "summary.parquet"
     if not file.is_file():
-        raise TableError(f"{file}: there is no such file; run `dragchain report` first")
+        raise TableError(f"{file}: there is no such file; run `./run dragchain report` first")
     lines = pd.read_parquet(file, columns=["headline"])["headline"].drop_duplicates().tolist()
     more = f"  and {len(lines) - _SHOWN} more: {report_dir / 'summary.csv'}"
     shown = [f"  {line}" for line in lines[:_SHOWN]]

@@ -115,7 +115,7 @@ class Extrapolated(Document):
         Of a run with windows.
     """
 
-    remedy = "make it with: dragchain step extrapolate"
+    remedy = "make it with: ./run dragchain step extrapolate"
 
     quantities: tuple[ExtrapolatedQuantity, ...]
     tolerance: Reached | None = None

@@ -29,8 +29,8 @@ _OF_THE_WORKFLOW = ("logs", "benchmarks")
 _AS_RUN = "as_run"
 _PATIENCE_S = 1800.0
 _ANEW = (
-    "write it again with: dragdeck step render, or run the scene that creates it; to change an "
-    "input script, override a block of its template"
+    "write it again with: ./run dragdeck step render, or run the scene that creates it; to change "
+    "an input script, override a block of its template"
 )
 
 

@@ -103,7 +103,7 @@ class CaseFile(Document):
         Limits of energy and speed; beyond them the run is stopped. Absent if it is not watched.
     """
 
-    remedy = "write it with: dragdeck step render"
+    remedy = "write it with: ./run dragdeck step render"
 
     study: str
     title: str
@@ -162,7 +162,7 @@ REMEDIES: Mapping[CheckCode, str] = {
     "finite_numbers": _SMALLER_STEP,
     "stable_timestep": _SMALLER_STEP,
     "within_limits": _SMALLER_STEP,
-    "output_complete": "start the run again with: dragdeck run --again",
+    "output_complete": "start the run again with: ./run dragdeck run --again RUN_DIR",
     "ranks": "use the mpirun that belongs to this LIGGGHTS (DRAGDECK_LAUNCHER)",
 }
 """What to do where a check did not pass; of others, its words or the screen output say it."""
