@@ -12,6 +12,7 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 from made_scenes import own_template, rendered
+from made_study import Made
 from scipy.optimize import brentq
 
 from dragchain.run.run_parts import iter_frames
@@ -27,7 +28,7 @@ from dragdeck.errors import InputError
 from dragdeck.physics.contact_mechanics import effective_modulus, pull_off_force
 from dragdeck.physics.coulomb import FrictionLimit
 from dragdeck.project import Project
-from dragdeck.scenes.filling import filling_scene
+from dragdeck.scenes.filling import bond_numbers, filling_scene
 from dragdeck.scenes.process import SCENES, process_scene
 from dragdeck.scenes.scene import material_table
 from dragdeck.study import contact_law
@@ -318,6 +319,39 @@ def test_a_softened_pair_keeps_its_largest_tension(name: str) -> None:
             for scale in (1.0, 1e-3)
         ]
         assert tensions[0] == pytest.approx(tensions[1]) != 0.0
+
+
+def said_of_cohesion(case: Case) -> list[str]:
+    return [str(one) for one in filling_scene(case).warnings if one.code == "cohesion"]
+
+
+@pytest.mark.parametrize(
+    ("pair", "bodies"),
+    [
+        ("ceramic-ceramic", ["big-big"]),
+        ("ceramic-steel", ["big-small", "big-bowl", "big-workpiece"]),
+        ("steel-steel", ["small-small", "small-bowl", "small-workpiece"]),
+    ],
+)
+def test_a_strong_tension_of_any_pair_is_told(
+    pair: str, bodies: list[str], made: Made, small: Small
+) -> None:
+    """The first class is not the only one that sticks; a tension is proportional to the cube."""
+    small["media"] = {"count": 300, "classes": {
+        "big": {"material": "ceramic", "radius_mean_m": 0.003, "fraction": 0.5},
+        "small": {"material": "steel", "radius_mean_m": 0.002, "fraction": 0.5},
+    }}  # fmt: skip
+    small["pairs"]["steel-steel"] = dict(small["pairs"]["ceramic-steel"])
+    field, value = f"pairs.{pair}.cohesion_j_m3", 1e5
+    numbers = bond_numbers(made({field: value}).study)
+    assert [name for name, number in numbers.items() if number > 0] == bodies
+    enough = value * max(numbers.values()) ** (-1 / 3)
+    assert said_of_cohesion(made({field: 0.999 * enough})) == []
+    (said,) = said_of_cohesion(made({field: 1.001 * enough}))
+    strongest = max(numbers, key=numbers.__getitem__)
+    assert f"is 1 ({strongest}) times the weight" in said
+    (said,) = said_of_cohesion(made({field: 100 * enough}))
+    assert all(f"({name})" in said for name in bodies)
 
 
 @pytest.mark.engine
