@@ -41,6 +41,7 @@ def _summary_row(study: StudyRuns, headline: str) -> Row:
         "run": case.run,
         "headline": headline,
         "settings": " ".join(values.notes),
+        "changed_scripts": "; ".join(case.changed_scripts),
         **{input_column(name): _cell(value) for name, value in case.inputs.items()},
         **{f"fidelity_{name}": value for name, value in vars(case.fidelity).items()},
         "timestep_s": case.timestep_s,

@@ -19,7 +19,7 @@ from dragchain.run.run_parts import iter_frames
 from dragdeck.cases.case import Case
 from dragdeck.decks import DECK_FILE
 from dragdeck.decks.outputs import load_outputs
-from dragdeck.decks.render import deck_text, of_its_law, write_run
+from dragdeck.decks.render import deck_text, of_its_templates, write_run
 from dragdeck.decks.templates import environment
 from dragdeck.engine.log import engine_errors
 from dragdeck.engine.process import command, execute, find_engine
@@ -99,7 +99,7 @@ def test_cohesion_of_the_study_is_no_unknown_force(
     case = with_coefficient(small, write_study, "cohesion_j_m3", USED)
     for scene in (filling_scene(case), process_scene(case)):
         templates = environment(project.templates)
-        law = of_its_law(deck_text(scene, templates), scene, templates)
+        law = of_its_templates(deck_text(scene, templates), scene, templates)
         assert law["added_forces"] == ()
 
 

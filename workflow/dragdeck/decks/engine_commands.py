@@ -128,13 +128,16 @@ def contact_laws(deck: str) -> Iterator[list[str]]:
 
 
 def law_commands(deck: str) -> list[str]:
-    """The commands of a deck that set the contact law, and the constants and coefficients in it."""
-    return [
-        command.text
-        for command in commands(deck)
-        if command.words[0] in ("pair_style", "pair_coeff")
-        or (command.words[0] == "fix" and command.words[3:4] == ["property/global"])
-    ]
+    """What sets the contact law in a deck: its commands, those of walls without their shapes."""
+    found = []
+    for command in commands(deck):
+        kind = command.words[3:4]
+        if command.words[0] in ("pair_style", "pair_coeff") or kind == ["property/global"]:
+            found.append(" ".join(command.words))
+        elif command.words[0] == "fix" and kind and kind[0].startswith("wall/gran"):
+            text = " ".join(command.words[3:])
+            found.append(re.sub(r"(primitive type|mesh n_meshes) .*?(?=store_force |$)", "", text))
+    return list(dict.fromkeys(found))
 
 
 def _inner(words: list[str]) -> Iterator[str]:

@@ -90,7 +90,9 @@ class CaseFile(Document):
         Models of the script's contact law that add a normal force, such as cohesion; Coulomb's
         limit of friction does not follow from the contact force then.
     changed_law : tuple of str
-        Commands on contact law, constants and coefficients that come from a template of the study.
+        Commands on contact law, constants and coefficients that come from a template.
+    changed_scripts : tuple of str
+        Templates that change commands of the script, with their blocks; absent if there are none.
     entry_step : int
         Step of the drag at which it continues its lead; absent if it has none.
     marks : tuple of str
@@ -118,6 +120,7 @@ class CaseFile(Document):
     files: Mapping[str, str] = {}
     added_forces: tuple[str, ...] = ()
     changed_law: tuple[str, ...] = ()
+    changed_scripts: tuple[str, ...] = omitted(())
     entry_step: int = omitted(0)
     marks: tuple[str, ...] = omitted(())
     settled: SettlingCriterion | None = omitted(None)
@@ -131,6 +134,11 @@ class CaseFile(Document):
                 f"phases: {after.name} does not start where {before.name} ends"
             )
         return self
+
+
+def changed_in_words(scripts: Sequence[str]) -> str:
+    """What templates change in input scripts, in one line; empty where nothing."""
+    return f"input scripts changed by templates: {'; '.join(scripts)}" if scripts else ""
 
 
 State = Literal["running", "stopped", "failed", "complete"]

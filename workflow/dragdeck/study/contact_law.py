@@ -225,6 +225,16 @@ def added_forces(law: Sequence[str]) -> list[str]:
     return found
 
 
+def modelled(law: Iterable[str]) -> set[str]:
+    """Words for the optional coefficients that the words of a contact law model."""
+    named = dict(pairwise(law))
+    return {
+        row.words
+        for row in coefficients().values()
+        if row.model and named.get(row.model.split()[0], "off") != "off"
+    }
+
+
 def coefficient_words(pairs: Iterable[Pair]) -> tuple[list[str], list[str]]:
     """Words for the optional coefficients that a scene models, and for those it leaves out."""
     there = present(pairs)
