@@ -231,8 +231,11 @@ class LogHandler(LogHandlerBase):
         runs = self._together(active)
         done = done_fraction(runs) if runs else self._done / max(1, self._all)
         overall.add_row(ProgressBar(1.0, done, width=_BAR), Text(self._overall(active)))
-        wrapped = {"overflow": "fold", "no_wrap": False}  # else cut, as the console does not wrap
-        slow = [Text(f"{run.name}: {run.slow}", **wrapped) for run in active if run.slow]
+        slow = [  # wrapped, which the console itself does not do
+            Text(f"{run.name}: {run.slow}", overflow="fold", no_wrap=False)
+            for run in active
+            if run.slow
+        ]
         return Group(lines, *slow, overall) if active else Group(overall)
 
     def _together(self, active: list[StudyRun]) -> list[StudyRun]:
