@@ -2,11 +2,19 @@
 
 import io
 import logging
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from paths import ROOT
+from preloaded import plain_environment
 from rich.console import Console
 from snakemake.logging import DefaultFormatter
 from snakemake_interface_logger_plugins.common import LogEvent
@@ -149,6 +157,68 @@ def test_a_run_far_slower_than_estimated_is_told_on_a_terminal(
         shown.handler._jobs = {1: _Job("run_process", Path.cwd() / RUN, prints=False)}
         shown.handler._console.print(shown.handler._screen())
     assert shown.text.count("12345678: 10 times slower than estimated: other") == 1
+
+
+def test_a_remedy_is_not_cut_off_on_a_narrow_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    status = RunStatus("running", step=40, last=1000, steps_per_s=1.0)
+    monkeypatch.setattr("dragdeck.outlook.runs.run_status", lambda folder: status)
+    shown = Shown(terminal=True)
+    shown.handler._console = Console(
+        file=shown.stream, force_terminal=True, width=50, soft_wrap=True
+    )
+    plan = [StudyRun("process", Path.cwd() / RUN, None, 2, Cost(1000, 100.0, "assumed"), 1e6)]
+    shown.log("", shown=True, plan=plan, cores=2)
+    shown.start(1, "run_process", f"{RUN}/run.json", engine=1)
+    assert shown.handler._live is not None
+    shown.handler._live.refresh()
+    words = " ".join(re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", " ", shown.text).split())
+    shown.handler.close()
+    assert "MPI ranks wait for each other: use fewer fidelity.ranks" in words
+
+
+SNAKEFILE = """
+rule run_process:
+    output: "results/s/process/a-12345678/run.json"
+    log: "results/s/process/a-12345678/logs/run.log"
+    resources: engine=1
+    shell: "sh command > {log} 2>&1"
+"""
+TOLD = """dragdeck: results/a: run rejected
+  check:  no LIGGGHTS error: on purpose
+  remedy: none"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("interrupted", [False, True])
+def test_of_a_failed_job_its_own_message_is_shown(tmp_path: Path, interrupted: bool) -> None:
+    """The real Snakemake; what it says of the job itself stays in its log."""
+    (tmp_path / "Snakefile").write_text(SNAKEFILE)
+    ends = "trap 'said; exit 1' INT; touch begun; sleep 600 & wait" if interrupted else "said"
+    command = f"echo process a: part 1\nsaid() {{ cat told; }}\n{ends}\nexit 1\n"
+    (tmp_path / "command").write_text(command)
+    (tmp_path / "told").write_text(f"{TOLD}\n")
+    words = [sys.executable, "-m", "snakemake", "--cores", "1", "--logger", "dragdeck"]
+    seen = plain_environment() | {"PYTHONPATH": str(ROOT / "workflow")}
+    with subprocess.Popen(
+        [*words, "--show-failed-logs", "run_process"], cwd=tmp_path, env=seen, text=True,
+        stderr=subprocess.PIPE, start_new_session=True,
+    ) as process:  # fmt: skip
+        if interrupted:
+            while not (tmp_path / "begun").exists() and process.poll() is None:
+                time.sleep(0.05)
+            os.killpg(process.pid, signal.SIGINT)
+        _, said = process.communicate()
+    assert process.returncode != 0
+    *shown, log = said.splitlines()
+    job = "results/s/process/a-12345678/logs/run.log"
+    assert shown == [
+        "process a-12345678: started",
+        shown[1],
+        *TOLD.splitlines(),
+        f"  log of the job: {job}",
+    ]
+    kept = Path(log.removeprefix("Complete log(s): ")).read_text()
+    assert "CalledProcessError" in kept and "Error in rule run_process" in kept
 
 
 def test_a_record_that_cannot_be_shown_does_not_end_the_display(

@@ -23,7 +23,7 @@ WINDOWS_RECORD = Argument(
     help="windows.json, what windows of other scenes say; required",
 )  # fmt: skip
 MEASURES = Argument("measures", type=Path, nargs="+", metavar="MEASURES",
-                     help="measures.json of each run, made by dragchain step measure")  # fmt: skip
+                     help="measures.json of each run: ./run dragchain step measure")  # fmt: skip
 
 
 COMMANDS = (
@@ -31,7 +31,7 @@ COMMANDS = (
             "Make the tables of a run. It reads the raw output, case.json and columns.json in "
             "RUN_DIR and writes Parquet tables and documents to RUN_DIR/tables.",
             "tables.write:write_tables", (RUN_DIR,),
-            "dragchain tables results/uhlmann2015/process/RUN"),
+            "./run dragchain tables results/uhlmann2015/process/RUN"),
     Command("chains", "find contact networks and force chains",
             "Find contact network, clusters and force chains in each frame of a process run. It "
             "reads the tables of the run and writes network.parquet, clusters.parquet and "
@@ -76,7 +76,7 @@ COMMANDS = (
                   help="export every N-th frame only (default: %(default)s)"),
         Argument("--replace", action="store_true",
                   help="overwrite an earlier export (default: refuse to)")),
-            "dragchain export results/uhlmann2015/process/RUN --to paraview --every 10"),
+            "./run dragchain export results/uhlmann2015/process/RUN --to paraview --every 10"),
     Command("project", "project load and removal on a mesh of your own",
             "Project the load on the workpiece, and the removal if the study has a law, onto a "
             "mesh of your own; sums are conserved. It reads the tables of the runs and writes "
@@ -92,7 +92,7 @@ COMMANDS = (
                   help="unit of length in that file (default: %(default)s)"),
         Argument("--smoothing-length", type=float, required=True, metavar="M",
                   help="radius of the cone over which a contact is spread, m; required")),
-            "dragchain project --out results/removal/projection --mesh part.stl --unit mm "
+            "./run dragchain project --out results/removal/projection --mesh part.stl --unit mm "
             "--smoothing-length 0.002 results/removal/process/RUN"),
     Command("report", "write the report on a study",
             "Write the report on the process runs of a study. It reads their tables and figures "
@@ -100,9 +100,9 @@ COMMANDS = (
             "report.study_report:write_study_report", (
         OUT_DIR, RUN_DIRS,
         Argument("--advice", type=Path, metavar="FILE",
-                  help="advice.json of dragdeck advise, to compare forecast and actual costs"),
+                  help="advice.json of ./run dragdeck advise, to compare costs with it"),
         Argument("--preview", type=Path, metavar="FILE",
-                  help="picture of the set-up: set_up.png of dragdeck preview"),
+                  help="picture of the set-up: set_up.png of ./run dragdeck preview"),
         Argument("--signal", type=Path, metavar="FILE",
                   help="measured force signal: reference.signal.file of the study"))),
     Command("compare", "compare cases of one study or of several",
@@ -115,7 +115,7 @@ COMMANDS = (
         Argument("folders", type=Path, nargs="+", metavar="FOLDER",
                   help="results/STUDY with a report, or folders of process runs; differences are "
                   "from the first case")),
-            "dragchain compare results/drag-spin --out results/compare/drag-spin"),
+            "./run dragchain compare results/drag-spin --out results/compare/drag-spin"),
 )  # fmt: skip
 """What a user calls."""
 
@@ -156,7 +156,7 @@ STEPS = (
             "windows.extrapolate:extrapolate_run", (
                 RUN_DIR, WINDOWS_RECORD,
                 Argument("--round", type=Path, metavar="FILE", dest="round_file",
-                          help="last round of windows of the run, from dragchain step windows"))),
+                          help="last round of windows of the run: ./run dragchain step windows"))),
     Command("windows", "what windows say of a run at the physical Young's modulus",
             "Estimate the quantities of a run with reduced moduli at the physical Young's modulus "
             "from its windows, and how many more windows the tolerance requires. It reads the "
@@ -226,7 +226,7 @@ STEPS = (
             "for the study.",
             "calibration.friction:write_friction", (
                 Argument("runs_file", type=Path, metavar="RUNS",
-                          help="runs.json, made by dragdeck step angles"), OUT_DIR)),
+                          help="runs.json, made by ./run dragdeck step angles"), OUT_DIR)),
     Command("calibration-report", "write the report on a calibration",
             "Write the report on a calibration. It reads the results in DIR, and writes "
             "report.html and figures to DIR.",

@@ -418,7 +418,7 @@ def _envelope(largest: pd.Series) -> tuple[float, ...]:
 def summarise_map(
     points: pd.DataFrame, found: pd.DataFrame, runs: Sequence[PointRun]
 ) -> StabilityFile:
-    """What ``dragdeck check`` uses: safe steps, errors of impacts, and where they come from.
+    """What ``./run dragdeck check`` uses: safe steps, errors of impacts, and where they come from.
 
     Parameters
     ----------
@@ -430,7 +430,7 @@ def summarise_map(
     cases = [run.case for run in runs if run.record and run.case]
     started = max((record.started for record in records), default=datetime.now(UTC).isoformat())
     return StabilityFile(
-        commands=("snakemake stability",),
+        commands=("./run stability",),
         engine_versions=tuple(sorted({record.engine_version for record in records})),
         dragdeck_versions=tuple(sorted({case.versions["dragdeck"] for case in cases})),
         measured=started[:10],

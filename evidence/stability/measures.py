@@ -90,7 +90,7 @@ class PointRun:
         record = RunRecord.read(file)
         if record.state in ("running", "stopped"):
             raise TableError(
-                f"{self.folder}: this run was interrupted; `snakemake stability` goes on with it"
+                f"{self.folder}: this run was interrupted; `./run stability` goes on with it"
             )
         return record
 

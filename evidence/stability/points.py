@@ -128,7 +128,7 @@ class Point(Part):
 class PointsFile(Document):
     """``points/<regime>.json``: the points of a regime, once they were run."""
 
-    remedy = "run `snakemake stability`"
+    remedy = "run `./run stability`"
 
     points: Sequence[Point]
 

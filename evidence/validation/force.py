@@ -323,7 +323,7 @@ class LoadingOverPackings(Part):
 
 
 def load_of_packings(packings: Sequence[MeasuredRun]) -> LoadingOverPackings:
-    """Average what `dragchain loading` found in every packing.
+    """Average what `./run dragchain loading` found in every packing.
 
     Raises
     ------

@@ -93,7 +93,7 @@ class CollideCase(CaseFile):
         Of a bouncing particle and of an incline alone.
     """
 
-    remedy = "run `snakemake verify`"
+    remedy = "run `./run verify`"
 
     study: str = "verification"
     scene: Literal["collide"] = "collide"

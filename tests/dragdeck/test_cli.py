@@ -1,6 +1,7 @@
 """The command: what it prints, what it exits with, what it leaves alone."""
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -212,5 +213,40 @@ def test_a_contact_law_that_adds_a_force_is_recorded(
     assert main(["step", "render", "small", "filling", FILLING.run_id(case)]) == 0
     recorded = json.loads((project.run_folder(case, FILLING) / "case.json").read_text())
     assert recorded["added_forces"] == ["cohesion sjkr2"]
-    (changed,) = recorded["changed_law"]
-    assert changed == "pair_style gran model hertz tangential history cohesion sjkr2 limitForce on"
+    law = "hertz tangential history cohesion sjkr2"
+    assert recorded["changed_law"] == [
+        f"pair_style gran model {law} limitForce on",
+        f"wall/gran model {law} store_force yes limitForce on",
+    ]
+
+
+ROLLING = """{% extends "base/base.in.j2" %}
+{% block contact_model %}{{ super() }} rolling_friction epsd2{% endblock %}
+{% block properties %}{{ super() }}
+fix rolling all property/global coefficientRollingFriction peratomtypepair 2 0.1 0.1 0.1 0.1
+{% endblock %}"""
+NAMED = "input scripts changed by templates: base.in.j2 (contact_model, properties)"
+
+
+@pytest.mark.engine
+def test_a_contact_law_of_a_template_is_told_and_has_no_tolerance(
+    case: Case, project: Project, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def said(*arguments: str) -> str:
+        assert main([*arguments, "small"]) == 0
+        return " ".join(capsys.readouterr().out.split())
+
+    assert NAMED not in said("check")
+    left = re.search("leaves out(.*)$", said("explain", "--verbose"))
+    assert left and "rolling friction" in left[1]
+    own_template(case, ROLLING, "base.in.j2")
+    assert f"note: {case.name}: {NAMED}" in said("check")
+    shown = said("explain")
+    assert "rolling friction" in shown and not re.search("leaves out[^:]*rolling friction", shown)
+    edited(case, fidelity={"tolerance": 0.1})
+    (asked,) = project.cases("small")
+    for command in (["check"], ["step", "render", "small", "filling", FILLING.run_id(asked)]):
+        assert main([*command, *(["small"] if command == ["check"] else [])]) == 1
+        refused = capsys.readouterr().err
+        assert "fidelity.tolerance: the errors of settings are not known" in refused
+        assert "rolling_friction epsd2" in refused and "full, instead of a tolerance" in refused

@@ -1,6 +1,7 @@
 """Runs of a study as a report finds them: documents, findings and pictures."""
 
 import base64
+import json
 import math
 from pathlib import Path
 from typing import Any
@@ -136,3 +137,9 @@ def write_quantities(run: Path, corrected: float | None = None, **reached: Any) 
 
 def page_of(out: Path) -> Page:
     return Page((out / "report.html").read_text(encoding="utf-8"))
+
+
+def change_scripts(run_dir: Path, *changed: str) -> None:
+    """Let a run have scripts that templates changed."""
+    file = run_dir / "case.json"
+    file.write_text(json.dumps(json.loads(file.read_text()) | {"changed_scripts": changed}))

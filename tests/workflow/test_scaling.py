@@ -31,7 +31,7 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_drag_grows_with_the_depth(project: Path) -> None:
     succeed(project, *SCALING)
     found = json.loads((project / "results/small/scaling/scaling.json").read_text())
-    assert found["commands"] == ["snakemake scaling --config study=small"]
+    assert found["commands"] == ["./run scaling --config study=small"]
     assert [level["x"] for level in found["levels"]] == [0.008, 0.012, 0.016, 0.020]
     assert 0.5 < found["fit"]["exponent"]["value"] < 3.5
     assert found["engine"] and found["expected"]["source"] == "nobody"

@@ -60,7 +60,7 @@ def test_a_point_that_fails_is_a_finding(traded: Path) -> None:
 def test_the_record_says_what_made_it(traded: Path) -> None:
     folder = traded / "results/small/tradeoff/plan"
     tradeoff = json.loads((folder / "tradeoff.json").read_text())
-    assert tradeoff["commands"] == ["snakemake tradeoff --config study=small plan=plan.yaml"]
+    assert tradeoff["commands"] == ["./run tradeoff --config study=small plan=plan.yaml"]
     assert tradeoff["runs"] == 8 and tradeoff["reference"]["youngs_modulus_scale"] == 1e-3
     assert tradeoff["scene"]["workpiece_to_particle"] == pytest.approx(0.008 / 0.00654, rel=0.01)
     assert len(tradeoff["drop_test"]) == 2

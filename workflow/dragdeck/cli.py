@@ -29,7 +29,7 @@ COMMANDS = (
         STUDY, FIDELITY,
         Argument("--verbose", action="store_true",
                   help="also print time step, packing and clearances expected for each run")),
-            "dragdeck check uhlmann2015 --fidelity draft"),
+            "./run dragdeck check uhlmann2015 --fidelity draft"),
     Command("explain", "explain what the input scripts model",
             "Explain what the input scripts of a study model, what they leave out, and what both "
             "cost. It writes nothing.",
@@ -39,7 +39,7 @@ COMMANDS = (
                   help="print every run, with reasons, costs and expectations"),
         Argument("scene", nargs="?", metavar="SCENE",
                   help=f"explain one scene only: {SCENE} (default: all three)")),
-            "dragdeck explain uhlmann2015 process"),
+            "./run dragdeck explain uhlmann2015 process"),
     Command("status", "show the progress of a study",
             "Show which runs of a study are complete, running, interrupted, failed or waiting, and "
             "how long the remaining ones will take. It writes nothing and can be called at any "
@@ -48,7 +48,7 @@ COMMANDS = (
         STUDY, FIDELITY, PLAN,
         Argument("--verbose", action="store_true",
                   help="list every run (default: all failed, at most eight of each other state)")),
-            "dragdeck status uhlmann2015"),
+            "./run dragdeck status uhlmann2015"),
     Command("open", "open the report of a study",
             "Print the path of results/STUDY/report/report.html and open it if there is a display.",
             "status:open_report", (STUDY,)),
@@ -59,8 +59,8 @@ COMMANDS = (
             "commands:preview", (
         STUDY, FIDELITY,
         Argument("--case", metavar="NAME",
-                  help="case to draw, as dragdeck cases lists it (default: the first)")),
-            "dragdeck preview planetary"),
+                  help="case to draw, as ./run dragdeck cases lists it (default: the first)")),
+            "./run dragdeck preview planetary"),
     Command("new", "create a study",
             "Create studies/STUDY/study.yaml, which takes the fields that it does not set from "
             "another study.",
@@ -68,7 +68,7 @@ COMMANDS = (
         Argument("study", metavar="STUDY", help="name of the new study, without spaces"),
         Argument("--from", default="uhlmann2015", metavar="STUDY", dest="base",
                   help="study to extend (default: %(default)s)")),
-            "dragdeck new my-part --from uhlmann2015"),
+            "./run dragdeck new my-part --from uhlmann2015"),
     Command("cases", "list the cases of a study",
             "List the cases of a study with the run ids of their drop test, filling and process. "
             "It writes nothing.",
@@ -78,7 +78,7 @@ COMMANDS = (
             "the media, and what they cost, by number of spheres; * marks the number in the "
             "study. It writes nothing.",
             "commands:shapes", (STUDY, FIDELITY),
-            "dragdeck shapes cylinders"),
+            "./run dragdeck shapes cylinders"),
     Command("mesh", "count contacts that LIGGGHTS overlooks on a mesh",
             "Show at how many positions at its convex edges LIGGGHTS overlooks the contact of a "
             "sphere with a mesh: as the file is, and with the corners of its facets turned, as "
@@ -94,7 +94,7 @@ COMMANDS = (
                   help="edge length of the facets of a STEP file, m; required for STEP only"),
         Argument("--out", type=Path, metavar="FILE",
                   help="write the turned facets to FILE as ASCII STL, in the unit of the input")),
-            "dragdeck mesh part.stl --out turned.stl"),
+            "./run dragdeck mesh part.stl --out turned.stl"),
     Command("advise", "find settings for a tolerance",
             "Find the cheapest settings that keep the error of a quantity within a tolerance, and "
             "show the error and cost of each setting. It reads the measured trade-off and the "
@@ -107,7 +107,7 @@ COMMANDS = (
         Argument("--quantity", metavar="NAME",
                   help="quantity to which the tolerance applies, for example drag_mean; "
                   "docs/evidence/tradeoff.md lists all (default: the study's, or drag_mean)")),
-            "dragdeck advise uhlmann2015 --tolerance 0.05 --quantity drag_mean"),
+            "./run dragdeck advise uhlmann2015 --tolerance 0.05 --quantity drag_mean"),
     Command("run", "run or resume one input script",
             "Run the input script of a run folder with LIGGGHTS, or resume it from its last "
             "checkpoint, and apply the acceptance checks. It writes raw output and state.json "
@@ -123,7 +123,7 @@ COMMANDS = (
         Argument("--patience", type=float, default=1800, metavar="S", dest="patience_s",
                   help="terminate LIGGGHTS after this many seconds without output (default: "
                   "%(default)s)")),
-            "dragdeck run results/uhlmann2015/filling/RUN"),
+            "./run dragdeck run results/uhlmann2015/filling/RUN"),
 )  # fmt: skip
 """What a user calls."""
 
@@ -134,7 +134,7 @@ STEPS = (
             "commands:render", (
         STUDY, FIDELITY, PLAN,
         Argument("scene", metavar="SCENE", help=f"scene of the run: {SCENE}"),
-        Argument("run", metavar="RUN", help="run id, as dragdeck cases lists it"),
+        Argument("run", metavar="RUN", help="run id, as ./run dragdeck cases lists it"),
         Argument("--packing", type=Path, metavar="FILE",
                   help="packing.json of the settled packing; required for a process"))),
     Command("drops", "run the drop tests of a calibration",

@@ -89,18 +89,18 @@ class Program:
 
     def parser(self) -> argparse.ArgumentParser:
         """What understands the arguments."""
-        name = self.call or self.package
+        name, called = self.call or self.package, self.call or f"./run {self.package}"
         parser = argparse.ArgumentParser(
             prog=name,
             description=self.about,
-            epilog=f"Each command has its own help: {name} COMMAND --help",
+            epilog=f"Each command has its own help: {called} COMMAND --help",
         )
         parser.add_argument("--version", action="version", version=f"{name} {__version__}")
         commands = parser.add_subparsers(required=True, metavar="COMMAND")
         _add(commands, self.commands)
         if self.steps:
             step = commands.add_parser(
-                "step", help=f"run a step of the workflow: {name} step --help"
+                "step", help=f"run a step of the workflow: {called} step --help"
             )
             _add(step.add_subparsers(required=True, metavar="STEP"), self.steps)
         return parser

@@ -21,11 +21,13 @@ from dragdeck.campaigns.restitution_drops import confirmation, run_drops, sweep
 from dragdeck.cases.bed import clump_of
 from dragdeck.cases.case import Case
 from dragdeck.cases.ranks import check_ranks, cores_here
+from dragdeck.decks.engine_commands import contact_laws
 from dragdeck.decks.render import (
+    changed_scripts,
     deck_text,
     effective,
     idle,
-    of_its_law,
+    of_its_templates,
     overriding,
     write_run,
     write_workpiece,
@@ -62,11 +64,13 @@ from dragdeck.project import (
 )
 from dragdeck.records.advice import AdviceFile
 from dragdeck.records.calibration import FitFile
+from dragdeck.records.run import changed_in_words
 from dragdeck.records.tradeoff import TradeoffRecord, measured_tradeoff, tradeoff_if_measured
 from dragdeck.scenes.lead import with_leads
 from dragdeck.scenes.process import SCENES
 from dragdeck.scenes.scene import SceneType, StudyScene, read_bed
 from dragdeck.study.check import explained, warnings
+from dragdeck.study.contact_law import coefficients, modelled
 from dragdeck.study.yaml import located
 from dragdeck.sweep.cases import new_study
 
@@ -135,18 +139,21 @@ class _Findings:
         case = next(iter(runs.values()))
         try:
             scene = _built(kind, case, None)
-            script = deck_text(scene, self.templates)
-            unknown = _friction_unknown(script, scene, self.templates)
+            found = of_its_templates(deck_text(scene, self.templates), scene, self.templates)
+            _check_tolerance(case, found["changed_law"])
         except InputError as error:
             self.errors.append(error)
             raise
         self.overriding |= overriding(scene, self.templates)
         self.effective |= effective(scene, self.templates)
-        for text in dict.fromkeys([*map(str, scene.warnings), *unknown]):
+        for text in dict.fromkeys([*map(str, scene.warnings), *_friction_unknown(found)]):
             names = self.warnings.setdefault(text, [])
             names += [case.name] if case.name not in names else []
-        if kind.needs_bed and (text := not_corrected(case)):
-            self.reduced.setdefault(text, []).append(case.name)
+        notes = [not_corrected(case) if kind.needs_bed else ""]
+        notes.append(changed_in_words(found["changed_scripts"]))
+        for text in filter(None, notes):
+            names = self.reduced.setdefault(text, [])
+            names += [case.name] if case.name not in names else []
         lines = [f"time step: {scene.deck.timestep_s:.3g} s"]
         lines += [f"{what}: {text}" for what, text in _expectations(case, kind, scene)]
         names = [f"{kind.name} {folder.name}" for folder in runs]
@@ -178,9 +185,30 @@ class _Findings:
             print(f"{_first(names)}\n  {text}")
 
 
-def _friction_unknown(script: str, scene: StudyScene, templates: jinja2.Environment) -> list[str]:
+def _check_tolerance(case: Case, changed_law: Sequence[str]) -> None:
+    """Refuse a tolerance with a contact law of which no error is known.
+
+    Raises
+    ------
+    InputError
+        A template changes the contact law of a case whose settings follow from a tolerance.
+    """
+    if case.asked and changed_law:
+        raise located(
+            InputError(
+                "the errors of settings are not known for the contact law of a template",
+                file=case.file,
+                field="fidelity.tolerance",
+                value="; ".join(changed_law),
+                limit="the contact law of the study: pairs and contact, without a template",
+                remedy="name a fidelity, such as full, instead of a tolerance",
+            )
+        )
+
+
+def _friction_unknown(changes: Mapping[str, Sequence[str]]) -> list[str]:
     """A warning that contacts of a run cannot be analysed, if a template adds a force."""
-    added = of_its_law(script, scene, templates)["added_forces"]
+    added = changes["added_forces"]
     if not added:
         return []
     return [
@@ -218,11 +246,12 @@ def explain(study: str, fidelity: str | None, scene: str | None, verbose: bool) 
     """Show what the input scripts of a study model, leave out and cost."""
     project = find_project(Path.cwd())
     every = project.cases(study, fidelity)
+    templates = environment(project.templates, study_templates(every[0]))
     for kind in [_scene_type(scene)] if scene else SCENES.values():
         speeds = measured_speeds(project.results(study) / kind.name)
         cases = list(by_run(every, kind).values())
         for case in cases if verbose else cases[:1]:
-            one = _built(kind, case, None)
+            one = _as_scripted(_built(kind, case, None), templates)
             cost = expected_cost(kind, one, speeds)
             if not verbose:
                 width = min(100, shutil.get_terminal_size().columns)
@@ -233,6 +262,18 @@ def explain(study: str, fidelity: str | None, scene: str | None, verbose: bool) 
             show([explanation(one, cost, notes, tradeoff_if_measured())])
     if not verbose:
         print("For every run, with reasons, costs and expectations: --verbose")
+
+
+def _as_scripted(scene: StudyScene, templates: jinja2.Environment) -> StudyScene:
+    """A scene with what its input script models, whatever the study says."""
+    text = deck_text(scene, templates)
+    changed = changed_scripts(text, scene, templates)
+    if not changed:
+        return scene
+    there = set().union(*map(modelled, contact_laws(text)))
+    found = scene.modelling(there, {row.words for row in coefficients().values() if row.model})
+    told = {changed_in_words(changed): "docs/howto/input_scripts.md"}
+    return replace(found, models={**told, **found.models})
 
 
 def _expectations(case: Case, kind: SceneType, scene: StudyScene) -> list[tuple[str, str]]:
@@ -311,7 +352,7 @@ def _judged(case: Case) -> tuple[list[str], list[InputError]]:
 def new(study: str, base: str) -> None:
     """Make the folder of a study that extends another."""
     file = new_study(find_project(Path.cwd()).studies, study, base)
-    say(f"{file}: edit it, then run: dragdeck check {study}")
+    say(f"{file}: edit it, then run: ./run dragdeck check {study}")
 
 
 def cases(study: str, fidelity: str | None, plan: str | None) -> None:
@@ -408,14 +449,15 @@ def render(
             file=f"studies/{study}",
             value=run,
             limit=f"one of: {', '.join(runs)}",
-            remedy="list them with: dragdeck cases",
+            remedy="list them with: ./run dragdeck cases",
         )
     case = runs[run]
     templates = environment(project.templates, study_templates(case))
     built = _built(kind, case, _bed(kind, packing))
     _check_overrides(built, every, templates)
-    script = deck_text(built, templates)
-    for warning in (*built.warnings, *_friction_unknown(script, built, templates)):
+    changes = of_its_templates(deck_text(built, templates), built, templates)
+    _check_tolerance(case, changes["changed_law"])
+    for warning in (*built.warnings, *_friction_unknown(changes)):
         say(f"warning: {warning}")
     folder = project.run_folder(case, kind, of_plan=plan is not None)
     if case.number > 1:
@@ -449,7 +491,7 @@ def _bed(kind: SceneType, packing: Path | None) -> Bed | None:
         raise InputError(
             f"the scene {kind.name} requires the settled packing",
             field="--packing",
-            remedy="give the packing.json that dragchain tables made of the filling",
+            remedy="give the packing.json that ./run dragchain tables made of the filling",
         )
     return read_bed(packing)
 

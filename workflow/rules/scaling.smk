@@ -12,7 +12,7 @@ rule write_scaling:
     params:
         runs=WORK.every_folder("process"),
         options=WORK.scaling_options,
-        command=f"snakemake scaling --config study={STUDY}",
+        command=f"./run scaling --config study={STUDY}",
         source=source_hash("dragchain.scaling.fit"),
     shell:
         "dragchain step scaling --out $(dirname {output.figure}) {params.options}"

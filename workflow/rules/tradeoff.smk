@@ -41,7 +41,7 @@ rule write_tradeoff:
         drops=lambda wildcards: WORK.every_drop_point(""),
         costs=lambda wildcards, input: f"--costs {input.costs}" if input.costs else "",
         plan=Path(PLAN).stem,
-        command=f"snakemake tradeoff --config study={STUDY} plan={PLAN}",
+        command=f"./run tradeoff --config study={STUDY} plan={PLAN}",
         largest_step=lambda wildcards: largest_of_case(CASES[0], SCENES["process"]),
         source=source_hash("dragchain.tradeoff.report"),
     shell:

@@ -18,7 +18,7 @@ rule write_validation:
             "statements.parquet",
         ),
     params:
-        command=f"snakemake validate --config study={STUDY} plan={VALIDATION}",
+        command=f"./run validate --config study={STUDY} plan={VALIDATION}",
         runs=lambda wildcards, input: [str(Path(file).parent) for file in input.measures],
         source=source_hash("evidence.validation.report"),
     shell:

@@ -1,14 +1,17 @@
 """What ``./run`` shows of a workflow: a line per run of LIGGGHTS, and one for the whole study.
 
 Snakemake finds logger plugins by the names of top-level packages. Its own messages go to its log
-only; warnings and errors are shown in full.
+only. Of a job that failed, its own last message is shown; other warnings and errors in full.
 """
 
 import atexit
 import logging
+import re
 import threading
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console, Group
 from rich.live import Live
@@ -23,6 +26,19 @@ from dragdeck.engine.reports import printable, shown_time
 from dragdeck.outlook.explain import Cost
 from dragdeck.outlook.runs import StudyRun, by_their_speeds, done_fraction, time_left
 from dragdeck.snakemake_lock import why_locked
+
+_TOLD = (
+    "CalledProcessError in file",
+    "Exiting because a job execution failed.",
+    "At least one job did not complete",
+)
+"""What Snakemake says of a failed job beside the message of the job itself."""
+
+_MESSAGE = re.compile(r"^(?:dragdeck|dragchain|evidence): .*", re.MULTILINE | re.DOTALL)
+"""The message that a command ended with, and all after it."""
+
+_LOG_BYTES, _LAST_LINES = 20_000, 10
+"""How much of a job's log is read, and shown where no command ended with a message."""
 
 _BAR, _SHORTEST_NAME = 20, 12
 """Characters of the bar, and of a run's name that is cut to make room for its numbers."""
@@ -112,8 +128,8 @@ class LogHandler(LogHandlerBase):
             self._started(values["jobid"], _Job.of(record))
         elif event == LogEvent.JOB_FINISHED:
             self._ended(values["job_id"])
-        elif event == LogEvent.JOB_ERROR:
-            self._ended(values["jobid"])
+        elif event == LogEvent.JOB_ERROR and not self._everything:
+            self._end_with_error(values)
         elif event == LogEvent.PROGRESS:
             self._done, self._all = values["done"], values["total"]
         elif "plan" in values:
@@ -129,12 +145,26 @@ class LogHandler(LogHandlerBase):
             self._held = None
         locked = getattr(record, "exception", None) == "LockException"
         said = (why_locked(Path(".snakemake")) if locked else None) or self.format(record)
+        told = event == LogEvent.JOB_ERROR or any(words in said for words in _TOLD)
+        if told and not self._everything:
+            return
         if text := printable(said).strip("\n"):
             if shown or text.startswith("Complete log"):
                 style = "red" if record.levelno >= logging.ERROR else ""
                 self._console.print(Text(text, style))
             elif event is None and self._held is not None:
                 self._held.append(text)
+
+    def _end_with_error(self, values: Mapping[str, Any]) -> None:
+        """Say of a job that failed what its command said last, and where the rest is."""
+        job = self._jobs.get(values["jobid"])
+        self._ended(values["jobid"])
+        logs = [Path(name) for name in values["log"] if Path(name).is_file()]
+        said = [values["rule_msg"] or "", *(map(_last_words, [] if job and job.prints else logs))]
+        name = "" if job and job.folder else f"{values['rule_name']}: failed"
+        more = [f"  log of the job: {log}" for log in logs]
+        for text in filter(None, (name, *said, *more)):
+            self._console.print(Text(printable(text).strip("\n"), "red"))
 
     def _started(self, number: int, job: _Job) -> None:
         self._jobs[number] = job
@@ -201,7 +231,11 @@ class LogHandler(LogHandlerBase):
         runs = self._together(active)
         done = done_fraction(runs) if runs else self._done / max(1, self._all)
         overall.add_row(ProgressBar(1.0, done, width=_BAR), Text(self._overall(active)))
-        slow = [Text(f"{run.name}: {run.slow}") for run in active if run.slow]
+        slow = [  # wrapped, which the console itself does not do
+            Text(f"{run.name}: {run.slow}", overflow="fold", no_wrap=False)
+            for run in active
+            if run.slow
+        ]
         return Group(lines, *slow, overall) if active else Group(overall)
 
     def _together(self, active: list[StudyRun]) -> list[StudyRun]:
@@ -220,6 +254,15 @@ class LogHandler(LogHandlerBase):
         now = f": {', '.join(others)}" if others else ""
         jobs = f"{self._done} of {self._all} jobs done" if self._all else "no job done"
         return "; ".join([*said, f"{jobs}{now}"])
+
+
+def _last_words(log: Path) -> str:
+    """The message that a job ended with, or else the end of its log."""
+    with log.open("rb") as stream:
+        stream.seek(max(0, log.stat().st_size - _LOG_BYTES))
+        text = stream.read().decode("utf-8", "replace").strip()
+    said = _MESSAGE.search(text)
+    return said.group() if said else "\n".join(text.splitlines()[-_LAST_LINES:])
 
 
 def _unplanned(folder: Path) -> StudyRun:

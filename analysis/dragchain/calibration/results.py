@@ -304,7 +304,7 @@ def confirmed(drops: Drops) -> Confirmed:
     """
     runs = drops.select("confirm")
     if len(runs) < 2:
-        raise TableError("the confirming drop tests are missing; run `snakemake calibrate`")
+        raise TableError("the confirming drop tests are missing; run `./run calibrate`")
     rebound = np.array([run.effective for run in runs])
     std = float(rebound.std(ddof=1))
     restitution, mean = runs[0].drop.restitution, float(rebound.mean())

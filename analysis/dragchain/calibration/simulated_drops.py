@@ -126,7 +126,7 @@ def read_drops(file: Path) -> Drops:
 
 def _read_drop(folder: Path, drop: DropOfList) -> DropRun:
     if not (folder / "run.json").is_file():
-        raise TableError(f"{folder}: this drop is not complete; run `snakemake calibrate` again")
+        raise TableError(f"{folder}: this drop is not complete; run `./run calibrate` again")
     case = load_case(folder)
     blocks = iter_prints(folder, load_outputs(folder)["impacts"])
     rows = pd.concat([pd.DataFrame({name: block[name] for name in _SAMPLES}) for block in blocks])

@@ -96,7 +96,7 @@ def chain_membership(frame: NetworkFrame, chains: pd.DataFrame) -> Membership:
         raise TableError(
             f"a chain of step {frame.step} has a particle or a contact that is missing in"
             " particles.parquet or contacts.parquet\n"
-            "  remedy: make the chains again with `dragchain chains`"
+            "  remedy: make the chains again with `./run dragchain chains`"
         ) from None
     return found
 

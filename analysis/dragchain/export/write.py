@@ -24,7 +24,7 @@ _ELSEWHERE = "name another folder with --out, or move this one away"
 class ExportFile(Document):
     """What an export is of, and all the files that it wrote: ``export.json``."""
 
-    remedy = "make it with: dragchain export"
+    remedy = "make it with: ./run dragchain export"
 
     format: str
     study: str

@@ -131,7 +131,7 @@ class Loading(Totals, Document):
         Check of the sums.
     """
 
-    remedy = "make it with: dragchain loading"
+    remedy = "make it with: ./run dragchain loading"
 
     run: str
     confidence: float

@@ -142,7 +142,7 @@ def _workpiece_at(file: Path, steps: Ints) -> pd.DataFrame:
     if workpiece.isna().any(axis=None):
         raise TableError(
             f"{file.parent}: workpiece_force.parquet lacks steps of workpiece_contacts.parquet;"
-            " make both again with `dragchain tables`"
+            " make both again with `./run dragchain tables`"
         )
     return workpiece
 
@@ -164,7 +164,7 @@ def _read_contacts(file: Path, run_dir: Path, case: CaseOfRun) -> Iterator[pd.Da
             raise TableError(
                 f"{file}: slip_x_m_s is missing: the output workpiece_particles of this older "
                 "run contains no velocities; run the case again, then "
-                f"dragchain tables {run_dir}"
+                f"./run dragchain tables {run_dir}"
             )
         if len(loaded):
             yield loaded

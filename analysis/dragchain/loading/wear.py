@@ -90,7 +90,7 @@ class Wear(Document):
         None if the workpiece has no sharp edge below the settled surface.
     """
 
-    remedy = "make it with: dragchain loading"
+    remedy = "make it with: ./run dragchain loading"
 
     run: str
     area_m2: tuple[float, ...]

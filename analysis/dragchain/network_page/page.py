@@ -6,11 +6,12 @@ from pathlib import Path
 from dragchain.network_page.scene import ROUNDING, PageScene, page_scene
 from dragchain.report.page import NETWORK_PAGE, page_environment
 from dragchain.run.basis import changed_settings, effects
+from dragchain.run.case import with_changes
 from dragchain.tables.run_folder import Run
 from dragdeck.errors import RejectedRunError
 from dragdeck.files import write_text
 from dragdeck.records.case import CaseOfRun
-from dragdeck.records.run import read_accepted
+from dragdeck.records.run import changed_in_words, read_accepted
 
 
 def write_page(run_dir: Path) -> str:
@@ -26,7 +27,7 @@ def write_page(run_dir: Path) -> str:
         If the run is too short to have peaks.
     """
     run = Run.open(run_dir)
-    page = page_html(run.case, page_scene(run), _rejection(run_dir))
+    page = page_html(with_changes(run_dir, run.case), page_scene(run), _rejection(run_dir))
     file = run_dir / NETWORK_PAGE
     write_text(file, page)
     return f"{len(page.encode()) / 1e6:.1f} MB: {file}"
@@ -50,6 +51,7 @@ def page_html(case: CaseOfRun, scene: PageScene, rejection: str) -> str:
         rejection=rejection,
         settings=list(changed_settings(case.fidelity)),
         effects=effects(case.fidelity),
+        changed=changed_in_words(case.changed_scripts),
         place_um=1e3 * scene.head["frames"]["step"] / 2,
         rounding=ROUNDING,
         script=_own("network.js"),

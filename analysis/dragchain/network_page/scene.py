@@ -159,7 +159,7 @@ def shown_frames(run: Run, peak_time_s: Floats) -> FrameSeries:
     series = FrameSeries(run, steps[rows], times[rows])
     if not series.has_chains:
         raise TableError(
-            f"{run.folder}: the force chains are missing: run `dragchain chains {run.folder}`"
+            f"{run.folder}: the force chains are missing: run `./run dragchain chains {run.folder}`"
         )
     return series
 

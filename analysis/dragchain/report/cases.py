@@ -6,7 +6,7 @@ Process runs that differ in the packing (seed) alone are one case.
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Generic, TypeVar
@@ -27,7 +27,7 @@ from dragchain.report.values import (
     values_of,
     values_over_packings,
 )
-from dragchain.run.case import changed_inputs, upstream_folders
+from dragchain.run.case import changed_inputs, upstream_folders, with_changes
 from dragchain.run.kinematics import axis_speed, drag_phase, motion_of, needed, path_passed
 from dragchain.statistics.estimate import mean_of
 from dragdeck.errors import DocumentError, RejectedRunError
@@ -254,6 +254,7 @@ def read_study_runs(run_dir: Path) -> StudyRuns:
         If a document of one of them is missing or cannot be used.
     """
     process = read_reported(run_dir, ProcessFindings)
+    process = replace(process, case=with_changes(run_dir, process.case))
     upstream = upstream_folders(run_dir, process.case)
     filling = drop_test = None
     if "filling" in upstream:

@@ -1,6 +1,6 @@
 """What a run was expected to cost and asked to reach, beside what it did.
 
-The expectation is ``advice.json`` of `dragdeck advise`; docs/reference/results.md
+The expectation is ``advice.json`` of `./run dragdeck advise`; docs/reference/results.md
 describes it.
 """
 

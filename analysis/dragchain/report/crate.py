@@ -15,7 +15,7 @@ from dragchain.errors import ExportError
 from dragchain.report.cases import read_study_runs
 from dragdeck.files import file_checksum, write_text
 from dragdeck.records.case import CaseOfRun, load_case
-from dragdeck.records.run import read_accepted
+from dragdeck.records.run import changed_in_words, read_accepted
 
 METADATA = "ro-crate-metadata.json"
 LEFT_OUT = "left_out.csv"
@@ -160,6 +160,8 @@ class _Crate:
             "object": self.add(inputs),
             "result": [*self.add(results), *self._measured(folder, case)],
         }
+        if changed := changed_in_words(case.changed_scripts):
+            about["description"] = changed
         self._mention(f"#{case.scene}-{case.run}", about)
 
     def _measured(self, folder: Path, case: CaseOfRun) -> list[Any]:

@@ -170,7 +170,7 @@ class OfClass(NamedTuple):
 class Findings(Document):
     """What the findings of every scene have."""
 
-    remedy = "make it with: dragchain figures"
+    remedy = "make it with: ./run dragchain figures"
 
     run: str
 

@@ -210,7 +210,7 @@ def removal_of(case: ReportedCase) -> RemovalOfCase | None:
         return None
     folder, factor = case.first.process.folder, 1.0
     if len(wears) < len(case.studies):
-        raise TableError(f"{folder}: no wear.json: make it with: dragchain loading {folder}")
+        raise TableError(f"{folder}: no wear.json: make it with: ./run dragchain loading {folder}")
     action = _over_packings([one.action_w for one in wears])
     if not removal.laws[-1].impact:  # of impacts, windows give nothing
         factor = load.shown.value / load.run.value

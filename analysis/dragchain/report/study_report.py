@@ -34,7 +34,7 @@ from dragdeck.errors import DragdeckError
 from dragdeck.files import write_bytes
 from dragdeck.records.advice import OptionEntry
 from dragdeck.records.case import AssumptionOfRun, load_case
-from dragdeck.records.run import FIGURES, RunRecord, figures_of
+from dragdeck.records.run import FIGURES, RunRecord, causes, figures_of
 
 if TYPE_CHECKING:
     from dragchain.report.measured_signal import SignalComparison
@@ -132,9 +132,9 @@ def _of_record(record: RunRecord) -> tuple[str, str] | None:
             f"interrupted, or still running; last known step {record.last_step:,}",
             "run the study again: it goes on from the last checkpoint",
         )
-    if not record.failed_checks:
+    if not (told := causes(record.checks)):
         return None
-    first, *others = record.failed_checks
+    first, *others = told
     more = f"; and {len(others)} more" if others else ""
     seen = f"failed check: {first.name}: {first.seen} (limit: {first.limit}){more}"
     return seen, first.remedy or _READ_SCREEN
@@ -314,7 +314,7 @@ def _pictures(run: ReportedRun[Findings]) -> Iterator[tuple[str, str]]:
         if (uri := file_uri(file)) is not None:
             yield name, uri
         elif scene != "filling" and name != _FROM_LOADING:
-            raise TableError(f"{file}: there is no such file; run `dragchain figures` first")
+            raise TableError(f"{file}: there is no such file; run `./run dragchain figures` first")
 
 
 def _render(

@@ -41,6 +41,7 @@ def _summary_row(study: StudyRuns, headline: str) -> Row:
         "run": case.run,
         "headline": headline,
         "settings": " ".join(values.notes),
+        "changed_scripts": "; ".join(case.changed_scripts),
         **{input_column(name): _cell(value) for name, value in case.inputs.items()},
         **{f"fidelity_{name}": value for name, value in vars(case.fidelity).items()},
         "timestep_s": case.timestep_s,
@@ -220,7 +221,7 @@ def main_numbers(report_dir: Path) -> str:
     """
     file = report_dir / "summary.parquet"
     if not file.is_file():
-        raise TableError(f"{file}: there is no such file; run `dragchain report` first")
+        raise TableError(f"{file}: there is no such file; run `./run dragchain report` first")
     lines = pd.read_parquet(file, columns=["headline"])["headline"].drop_duplicates().tolist()
     more = f"  and {len(lines) - _SHOWN} more: {report_dir / 'summary.csv'}"
     shown = [f"  {line}" for line in lines[:_SHOWN]]

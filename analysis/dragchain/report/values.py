@@ -16,6 +16,7 @@ from dragchain.run.reference import ReferenceDrag, reference_drags
 from dragchain.statistics.estimate import Estimate, mean_of
 from dragdeck.documents import Document, Part
 from dragdeck.records.case import CaseOfRun
+from dragdeck.records.run import changed_in_words
 
 EXTRAPOLATED = Path("tables") / "extrapolated.json"
 
@@ -115,7 +116,7 @@ class Extrapolated(Document):
         Of a run with windows.
     """
 
-    remedy = "make it with: dragchain step extrapolate"
+    remedy = "make it with: ./run dragchain step extrapolate"
 
     quantities: tuple[ExtrapolatedQuantity, ...]
     tolerance: Reached | None = None
@@ -241,7 +242,8 @@ class Values:
     def headline(self) -> str:
         """The main numbers in one line of plain text."""
         shown = (self.drag, self.of("workpiece_contacts"))
-        return "; ".join(_plain(one) for one in shown if one)
+        numbers = [_plain(one) for one in shown if one]
+        return "; ".join(filter(None, [*numbers, changed_in_words(self.case.changed_scripts)]))
 
 
 def values_of(

@@ -13,6 +13,7 @@ from typing import NamedTuple
 from dragchain.statistics.estimate import Estimate
 from dragdeck.files import table_rows
 from dragdeck.records.case import CaseOfRun, FidelityOfRun
+from dragdeck.records.run import changed_in_words
 from dragdeck.study.base import QUANTITIES_FILE
 
 _TIMES = "\N{MULTIPLICATION SIGN}"
@@ -174,6 +175,8 @@ def effects(fidelity: FidelityOfRun) -> list[str]:
 def _why_not(case: CaseOfRun) -> str:
     if case.fidelity.speed_factor != 1.0:
         return "the effect of a higher speed is not measured"
+    if case.changed_law:
+        return "no effect is measured for the contact law of a template"
     if case.marks:
         return "its windows do not give this quantity"
     return "fidelity: {tolerance: 0.1} would measure values at the physical modulus"
@@ -181,7 +184,9 @@ def _why_not(case: CaseOfRun) -> str:
 
 def notes(case: CaseOfRun) -> list[str]:
     """What each setting of a process run does to its numbers, one sentence each."""
-    return [*_of_modulus_and_speed(case), _of_step(case)]
+    changed = changed_in_words(case.changed_scripts)
+    own = [f"{changed[0].upper()}{changed[1:]}."] if changed else []
+    return [*own, *_of_modulus_and_speed(case), _of_step(case)]
 
 
 def _of_modulus_and_speed(case: CaseOfRun) -> Iterator[str]:

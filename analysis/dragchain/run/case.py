@@ -1,6 +1,7 @@
 """What ``case.json`` says of a run: its inputs by dotted name, and the friction of its contacts."""
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -8,8 +9,9 @@ from pydantic import JsonValue
 
 from dragchain.arrays import Floats
 from dragchain.errors import TableError
+from dragdeck.errors import DragdeckError
 from dragdeck.physics.coulomb import FrictionLimit
-from dragdeck.records.case import CaseOfRun, ClassOfRun
+from dragdeck.records.case import CaseOfRun, ClassOfRun, load_case
 
 
 def changed_inputs(
@@ -66,6 +68,15 @@ def attracts(case: CaseOfRun) -> bool:
     """Whether the contact law attracts particles to the workpiece."""
     parts = [case.attractive, *(one.attractive for one in case.classes)]
     return any("workpiece" in part for part in parts)
+
+
+def with_changes(run_dir: Path, case: CaseOfRun) -> CaseOfRun:
+    """The case of a process run, with what templates change in the scripts of all its runs."""
+    scripts = dict.fromkeys(case.changed_scripts)
+    for folder in upstream_folders(run_dir, case).values():
+        with suppress(DragdeckError):  # whoever needs that run says what is wrong
+            scripts |= dict.fromkeys(load_case(folder).changed_scripts)
+    return case.model_copy(update={"changed_scripts": tuple(scripts)})
 
 
 def upstream_folders(run_dir: Path, case: CaseOfRun) -> dict[str, Path]:

@@ -225,7 +225,7 @@ class ScalingFile(Document):
         Date and time of the first start.
     """
 
-    remedy = "make it with: snakemake scaling"
+    remedy = "make it with: ./run scaling"
 
     study: str
     field: str

@@ -47,7 +47,7 @@ class ClosureRecord(Document):
         statistics use, None without any.
     """
 
-    remedy = "make it with: dragchain tables"
+    remedy = "make it with: ./run dragchain tables"
 
     verdict: Literal["pass", "fail"]
     problem: str | None

@@ -270,7 +270,7 @@ class Corrections(Document):
         What was cut off, over the sum of the tangential forces between particles as written.
     """
 
-    remedy = "make it with: dragchain tables"
+    remedy = "make it with: ./run dragchain tables"
 
     friction: float
     particle_contacts: int

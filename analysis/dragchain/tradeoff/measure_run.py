@@ -328,7 +328,7 @@ def read_outcome(run_dir: Path) -> RunRecord:
     """
     file = run_dir / "outcome.json"
     if not file.is_file():
-        raise TableError(f"{file} is missing: `dragdeck run --outcome` writes it")
+        raise TableError(f"{file} is missing: `./run dragdeck run --outcome` writes it")
     return RunRecord.read(file)
 
 

@@ -154,7 +154,7 @@ class Measures(PathQuantities, Document):
         The quantities of the bed.
     """
 
-    remedy = "make it with: dragchain step measure"
+    remedy = "make it with: ./run dragchain step measure"
 
     study: str
     run: str

@@ -110,7 +110,7 @@ class Round(Extrapolated):
     last : bool
     """
 
-    remedy = "make it with: dragchain step windows"
+    remedy = "make it with: ./run dragchain step windows"
 
     tolerance: Reached
     windows: tuple[WindowOfRun, ...]

@@ -47,4 +47,4 @@ def test_a_missing_sweep_is_told_with_what_makes_it(
     drops = str(tmp_path / "drops.json")
     words = ["step", "calibrate", str(EXAMPLE), "--drops", drops, "--out", "x"]
     assert main(words) == 1
-    assert "snakemake calibrate" in capsys.readouterr().err
+    assert "./run calibrate" in capsys.readouterr().err

@@ -11,7 +11,14 @@ import numpy as np
 import pandas as pd
 import pytest
 from pages import stands_alone
-from report_files import PICTURES, case_json, make_run, process_findings, write_quantities
+from report_files import (
+    PICTURES,
+    case_json,
+    change_scripts,
+    make_run,
+    process_findings,
+    write_quantities,
+)
 
 from dragchain.cli import main
 from dragchain.compare import report
@@ -62,6 +69,14 @@ def test_differences_are_taken_packing_by_packing(tmp_path: Path) -> None:
     assert row["difference"] == pytest.approx(np.mean(own))
     assert row["difference_ci95_high"] - row["difference"] == pytest.approx(half)
     assert row["relative"] == pytest.approx(np.mean(own) / row["first"])
+
+
+def test_a_case_whose_scripts_templates_changed_is_named(tmp_path: Path) -> None:
+    folders = [one for one in study(tmp_path, (11,)) if "fast-0" in one.name]
+    change_scripts(folders[1], "base.in.j2 (contact_model)")
+    write_comparison(tmp_path / "out", folders)
+    page = (tmp_path / "out/comparison.html").read_text(encoding="utf-8")
+    assert "Input scripts changed by templates: base.in.j2 (contact_model). (deep-1_fast-0" in page
 
 
 def test_different_packings_join_their_intervals(tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 from made_run import line
 from network_run_files import PEAK_N, PEAKS_S, accept, write_network_run
 from pages import Page
+from report_files import change_scripts
 from scipy.spatial.transform import Rotation
 
 from dragchain.cli import main
@@ -67,6 +68,16 @@ class Written:
         """A column of one frame."""
         start = sum(self.head["frames"][kind][:frame])
         return self.columns[name][start : start + self.head["frames"][kind][frame]]
+
+
+def test_what_templates_changed_is_told(tmp_path: Path) -> None:
+    folder = write_network_run(tmp_path / "run")
+    write_page(folder)
+    assert 'id="changed"' not in (folder / "network.html").read_text(encoding="utf-8")
+    change_scripts(folder, "base.in.j2 (contact_model)")
+    write_page(folder)
+    line = "Input scripts changed by templates: base.in.j2 (contact_model)."
+    assert line in (folder / "network.html").read_text(encoding="utf-8")
 
 
 @pytest.fixture(scope="module")

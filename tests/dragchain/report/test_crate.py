@@ -7,7 +7,7 @@ from typing import Any
 
 import pandas as pd
 import pytest
-from report_files import DROP, FILLING, case_json, make_run, process_findings
+from report_files import DROP, FILLING, case_json, change_scripts, make_run, process_findings
 
 from dragchain.errors import ExportError
 from dragchain.report import crate
@@ -72,6 +72,14 @@ def test_raw_outputs_and_large_files_are_named_only(
         assert not (OUT / str(file)).exists()
         assert (row["bytes"], row["sha256"]) == sums(Path())[str(file)]
     assert (OUT / RUNS[2] / "tables/force.parquet").exists()
+
+
+def test_what_templates_changed_is_told(project: Path) -> None:
+    change_scripts(RUNS[2], "base.in.j2 (contact_model)")
+    write_crate(OUT, RUNS, REPORT)
+    found = {name: one.get("description") for name, one in listed(OUT).items() if name[0] == "#"}
+    line = "input scripts changed by templates: base.in.j2 (contact_model)"
+    assert found["#process-p-1"] == line and found["#filling-f-1"] is None
 
 
 def test_rocrate_reads_it(project: Path) -> None:

@@ -21,6 +21,7 @@ from report_files import (
     PICTURES,
     PNG,
     case_json,
+    change_scripts,
     make_run,
     page_of,
     process_findings,
@@ -67,6 +68,21 @@ def test_summary_has_the_numbers_of_run_filling_and_drop(process: Path, tmp_path
     }  # fmt: skip
     assert {name: row[name] for name in expected} == expected
     assert pd.isna(row["ahead_behind_ratio"])
+
+
+def test_what_templates_change_in_any_run_is_told_everywhere(process: Path, tmp_path: Path) -> None:
+    write_study_report(tmp_path, [process])
+    assert "changed by templates" not in (tmp_path / "report.html").read_text(encoding="utf-8")
+    change_scripts(process, "base.in.j2 (contact_model)")
+    filling = process.parents[1] / "filling/filling-1"
+    change_scripts(filling, "base.in.j2 (contact_model)", "filling.in.j2 (integration)")
+    write_study_report(tmp_path, [process])
+    line = "changed by templates: base.in.j2 (contact_model); filling.in.j2 (integration)"
+    assert f"Input scripts {line}." in summary_box(tmp_path)
+    row = pd.read_csv(tmp_path / "summary.csv").iloc[0]
+    assert row["changed_scripts"] == line.partition(": ")[2]
+    assert row["headline"].endswith(f"; input scripts {line}") and line in row["settings"]
+    assert line in main_numbers(tmp_path)
 
 
 def test_page_is_whole_and_needs_nothing_else(process: Path, tmp_path: Path) -> None:

@@ -254,7 +254,7 @@ def test_without_a_measured_tradeoff_there_is_a_remedy(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such file") as caught:
         measured_tradeoff(tmp_path / "tradeoff.json")
     assert "name a fidelity instead" in str(caught.value)
-    assert "snakemake tradeoff" in str(caught.value)
+    assert "./run tradeoff" in str(caught.value)
     (tmp_path / "old.json").write_text('{"schema": 1}')
     with pytest.raises(InputError, match="another version"):
         measured_tradeoff(tmp_path / "old.json")

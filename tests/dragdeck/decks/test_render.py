@@ -1,6 +1,7 @@
 """Decks: golden files, determinism, overridden blocks, errors in templates."""
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,10 +12,10 @@ from made_study import Made
 from paths import ROOT
 
 from dragdeck.cases.case import Case
-from dragdeck.decks.render import deck_text, write_run
-from dragdeck.decks.templates import environment
+from dragdeck.decks.render import deck_text, of_its_templates, write_run
+from dragdeck.decks.templates import commands_digest, environment
 from dragdeck.errors import InputError
-from dragdeck.project import Project
+from dragdeck.project import Project, study_templates
 from dragdeck.scenes.process import PROCESS, SCENES, process_scene
 from dragdeck.study.contact_law import Pair
 
@@ -35,6 +36,96 @@ def test_a_deck_is_as_it_was(
     if request.config.getoption("--update"):
         golden.write_text(text)
     assert text == golden.read_text(), "run pytest --update if the change is meant"
+
+
+def test_the_shipped_templates_are_known(request: pytest.FixtureRequest) -> None:
+    """By their hashes, an edit of the project's own templates is seen."""
+    files = sorted((ROOT / "templates").glob("*.j2"))
+    rows = [f"{file.name},{commands_digest(file.read_text())}" for file in files]
+    text = "\n".join(["template,commands", *rows, ""])
+    record = ROOT / "workflow/dragdeck/data/templates.csv"
+    if request.config.getoption("--update"):
+        record.write_text(text)
+    assert text == record.read_text(), "run pytest --update if the change is meant"
+
+
+LAW = "{% block contact_model %}hertz tangential no_history rolling_friction epsd2{% endblock %}"
+LAW_IN_BASE = "base.in.j2", f'{{% extends "base/base.in.j2" %}}{LAW}'
+LID = (
+    "{% block walls %}{{ super() }}\nfix lid all wall/gran model hertz tangential history "
+    "primitive type 2 zplane 0.09 store_force yes limitForce on\n{% endblock %}"
+)
+
+
+@pytest.mark.parametrize(
+    ("files", "changed", "law"),
+    [
+        ({}, (), 0),
+        (dict([LAW_IN_BASE]), ("base.in.j2 (contact_model)",), 2),
+        ({"process.in.j2": "{% block extra %}# a remark{% endblock %}"}, (), 0),
+        (
+            {"process.in.j2": "{% block extra %}fix f all viscous 1e-4{% endblock %}"
+             "{% block end %}\n# a remark\n{% endblock %}"},
+            ("process.in.j2 (extra)",),
+            0,
+        ),
+        ({"process.in.j2": LID}, ("process.in.j2 (walls)",), 0),
+        ({"process.in.j2": LID.replace("history", "off")}, ("process.in.j2 (walls)",), 1),
+        (
+            {"process.in.j2": '{% block extra %}{% include "own.j2" %}{% endblock %}',
+             "own.j2": "fix f all viscous 1e-4\n"},
+            ("process.in.j2 (extra)",),
+            0,
+        ),
+        ({"process.in.j2": "{% block engine %}{{ super() }}\nprocessors * * 1\n{% endblock %}"},
+         ("process.in.j2 (engine)",), 0),
+        ({"base.in.j2": "{% block contact_settings %}tangential_damping off{% endblock %}",
+          "process.in.j2": "{% block integration %}{{ super() }}\nfix f all viscous 1.0\n"
+          "{% endblock %}"},
+         ("base.in.j2 (contact_settings)", "process.in.j2 (integration)"), 2),
+    ],
+)  # fmt: skip
+def test_what_templates_change_is_recorded_with_its_blocks(
+    files: dict[str, str], changed: tuple[str, ...], law: int, case: Case, project: Project
+) -> None:
+    for name, text in files.items():
+        extended = name in ("base.in.j2", "process.in.j2") and "extends" not in text
+        own_template(case, f'{{% extends "base/{name}" %}}{text}' if extended else text, name)
+    templates, scene = environment(project.templates, study_templates(case)), process_scene(case)
+    found = of_its_templates(deck_text(scene, templates), scene, templates)
+    assert found["changed_scripts"] == changed
+    assert len(found["changed_law"]) == law, found
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_the_projects_own_scripts_count_as_unchanged(
+    name: str, case: Case, project: Project
+) -> None:
+    scene = SCENES[name].build(case, BED)
+    found = of_its_templates(render(case, project, name), scene, environment(project.templates))
+    assert not any(found.values())
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "changed", "law"),
+    [
+        ("tangential spring with history", "tangential spring", False, False),
+        ("timestep {{", "run 0\ntimestep {{", True, False),
+        ("{{ deck.materials.law.model }}{% endblock", "hertz{% endblock", True, True),
+    ],
+)
+def test_an_edit_of_the_projects_own_templates_is_recorded(
+    old: str, new: str, changed: bool, law: bool, case: Case, tmp_path: Path
+) -> None:
+    own = tmp_path / "edited"
+    shutil.copytree(ROOT / "templates", own)
+    text = (own / "base.in.j2").read_text()
+    assert old in text
+    (own / "base.in.j2").write_text(text.replace(old, new))
+    templates, scene = environment(own), process_scene(case)
+    found = of_its_templates(deck_text(scene, templates), scene, templates)
+    assert found["changed_scripts"] == (("templates/base.in.j2 of the project",) if changed else ())
+    assert bool(found["changed_law"]) == law
 
 
 def test_the_outputs_of_the_deck_are_those_of_columns_json(

@@ -52,8 +52,10 @@ def test_one_rank_needs_no_mpirun(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_launcher_of_ones_own_starts_the_ranks(monkeypatch: pytest.MonkeyPatch) -> None:
     engine = Engine("/opt/liggghts", "3.8.0")
     monkeypatch.setenv(LAUNCHER_VARIABLE, "env --mpi=pmix")
-    assert command(engine, "deck", 4, 1, None)[:5] == ["env", "--mpi=pmix", "-n", "4", engine.path]
-    assert command(engine, "deck", 1, 1, None)[0] == engine.path
+    by_line = ["stdbuf", "-oL", engine.path, "-in"]
+    words = ["env", "--mpi=pmix", "-n", "4", *by_line]
+    assert command(engine, "deck", 4, 1, None)[:8] == words
+    assert command(engine, "deck", 1, 1, None)[:4] == by_line
     monkeypatch.setenv(LAUNCHER_VARIABLE, "no-such-launcher -v")
     with pytest.raises(EngineError, match=f"no-such-launcher.*\n.*{LAUNCHER_VARIABLE}"):
         command(engine, "deck", 4, 1, None)

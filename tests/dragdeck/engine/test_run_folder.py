@@ -12,17 +12,19 @@ from typing import Any
 
 import psutil
 import pytest
-from made_scenes import rendered
+from made_scenes import BED, rendered
 from made_study import Made
 from run_files import rewrite
 
 from dragdeck.engine.checkpoints import checkpoint_files, checkpoint_step
+from dragdeck.engine.process import find_engine
 from dragdeck.engine.reports import silent
 from dragdeck.engine.run_folder import fingerprint, run
 from dragdeck.engine.watch import EngineEnded, Watcher, cut_screen
 from dragdeck.errors import EngineError, InputError, RejectedRunError
 from dragdeck.project import Project
 from dragdeck.records.run import CaseFile, RunRecord
+from dragdeck.scenes.process import PROCESS
 
 pytestmark = pytest.mark.engine
 
@@ -174,6 +176,67 @@ def test_a_changed_input_is_refused(filling: Path) -> None:
     assert not (filling / "state.json").exists()
 
 
+def refusal(folder: Path, file: Path) -> str:
+    """Why a run is refused because of a file, before LIGGGHTS starts."""
+    with pytest.raises(InputError) as caught:
+        run(folder, silent)
+    assert not (folder / "state.json").exists()
+    assert caught.value.file == file
+    return caught.value.problem
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "fix part all mesh/surface/stress file {} type 2 move 0 0 1",
+        "fix tall all particletemplate/multisphere 15485863 spheres file {} scale 1.0",
+        "variable times file {}",
+        'if "${{resume}} == 0" then "read_dump {} 0 x y z"',
+        "read_restart {}",
+    ],
+)
+def test_a_file_that_a_template_reads_is_named_if_it_is_missing(
+    command: str, filling: Path
+) -> None:
+    deck, file = filling / "in.liggghts", filling / "part.txt"
+    before = fingerprint(filling, CaseFile.read(filling / "case.json"))
+    rewrite(deck, f"{command.format(file.name)}\n{deck.read_text()}")
+    assert "missing" in refusal(filling, file)
+    file.write_text("")
+    assert "empty" in refusal(filling, file)
+    seen = {before}
+    for content in "ab":  # it belongs to what the run depends on
+        file.write_text(content)
+        seen.add(fingerprint(filling, CaseFile.read(filling / "case.json")))
+    assert len(seen) == 3
+
+
+def test_a_file_that_a_template_writes_need_not_be_there(filling: Path) -> None:
+    deck = filling / "in.liggghts"
+    written = 'print "1.0" file own.txt\nvariable own file own.txt\n# --- Walls'
+    rewrite(deck, deck.read_text().replace("# --- Walls", written, 1))
+    assert run(filling, silent).state == "complete"
+
+
+def test_a_packing_that_is_missing_or_not_whole_is_named(
+    made: Made, project: Project, filling: Path
+) -> None:
+    case = made({"media.count": 150})
+    process = rendered(case, project, PROCESS, BED)  # by hand, before the filling has run
+    packing = filling / "packing.restart"
+    assert "missing" in refusal(process, packing)
+    packing.touch()
+    assert "empty" in refusal(process, packing)
+    run(filling, silent)
+    content = packing.read_bytes()
+    packing.write_bytes(content[: len(content) // 2])
+    assert "truncated" in refusal(process, packing)
+    packing.write_bytes(content)
+    rendered(case, project, PROCESS, BED)
+    packing.write_bytes(content[:-1] + b"x")
+    assert "has changed" in refusal(process, packing)
+
+
 def test_a_queue_that_signals_the_engine_too_stops_the_run(made: Made, project: Project) -> None:
     folder = slow_filling(made, project)
     process = start(folder)
@@ -204,6 +267,47 @@ def test_the_engines_error_reaches_the_user_and_is_not_retried(filling: Path) ->
     rewrite(deck, good)
     run(filling, silent)
     assert (filling / "run.json").is_file()
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        ("fix part all mesh/surface file ${gone} type 1", "Cannot open mesh file gone.stl"),
+        ("fix out all print 1 x file no/such.txt", "Cannot open fix print file"),
+        ("read_restart damaged.restart", "Invalid flag in header section of restart file"),
+    ],
+)
+def test_what_a_single_rank_says_before_it_aborts_reaches_the_user(
+    command: str, said: str, ranks: int, made: Made, project: Project
+) -> None:
+    """LIGGGHTS prints such an error without a flush, and calls ``MPI_Abort``."""
+    filling = small_filling(made, project, ranks=ranks)
+    deck = filling / "in.liggghts"
+    text = deck.read_text()
+    before = "if" if command.startswith("read") else "# --- Time step"
+    (filling / "damaged.restart").write_bytes(b"\xc8" + bytes(4096))
+    hidden = f"variable gone string gone.stl\n{command}\n{before}"  # not seen before the start
+    rewrite(deck, text.replace(f"\n{before}", f"\n{hidden}", 1))
+    unwritten = "print" in command  # as on a full disk
+    with pytest.raises(EngineError if unwritten else RejectedRunError) as caught:
+        run(filling, silent)
+    assert re.search(rf"ERROR.*: {said}", str(caught.value)), caught.value
+    assert not re.search("timestep_fraction|mpirun|energy_ratio", str(caught.value))
+
+
+def test_whoever_lacks_stdbuf_is_told_why_an_error_is_lost(
+    filling: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "bin").mkdir()
+    (tmp_path / "bin/liggghts").symlink_to(Path(find_engine().path).resolve())
+    (tmp_path / "bin/rsh").symlink_to("/bin/true")  # Open MPI looks for one
+    monkeypatch.setenv("PATH", str(tmp_path / "bin"))
+    deck = filling / "in.liggghts"
+    broken = "variable gone string gone.stl\nfix part all mesh/surface file ${gone} type 1\n"
+    rewrite(deck, deck.read_text().replace("# --- Time step", f"{broken}# --- Time step", 1))
+    with pytest.raises(EngineError, match=r"without a message.*stdbuf of GNU coreutils"):
+        run(filling, silent)
 
 
 def test_a_bed_that_does_not_come_to_rest_is_rejected_and_not_resumed(filling: Path) -> None:

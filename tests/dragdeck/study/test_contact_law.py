@@ -1,29 +1,38 @@
 """The contact law: each coefficient is one row, and absent where a study does not name it."""
 
+import contextlib
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from itertools import chain, product
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
-from made_scenes import rendered
+from made_scenes import own_template, rendered
+from made_study import Made
 from scipy.optimize import brentq
 
 from dragchain.run.run_parts import iter_frames
 from dragdeck.cases.case import Case
+from dragdeck.decks import DECK_FILE
 from dragdeck.decks.outputs import load_outputs
-from dragdeck.decks.render import deck_text, of_its_law, write_run
+from dragdeck.decks.render import deck_text, of_its_templates, write_run
 from dragdeck.decks.templates import environment
+from dragdeck.engine.log import engine_errors
+from dragdeck.engine.process import command, execute, find_engine
 from dragdeck.engine.run_folder import run
 from dragdeck.errors import InputError
 from dragdeck.physics.contact_mechanics import effective_modulus, pull_off_force
 from dragdeck.physics.coulomb import FrictionLimit
 from dragdeck.project import Project
-from dragdeck.scenes.filling import filling_scene
+from dragdeck.scenes.filling import bond_numbers, filling_scene
 from dragdeck.scenes.process import SCENES, process_scene
+from dragdeck.scenes.scene import material_table
 from dragdeck.study import contact_law
+from dragdeck.study.check import validate
 from dragdeck.study.contact_law import (
     Coefficient,
     Contact,
@@ -35,6 +44,7 @@ from dragdeck.study.contact_law import (
     contact_model,
     contact_settings,
 )
+from dragdeck.study.model import Study
 from dragdeck.study.workpiece import Material
 from dragdeck.sweep.cases import load_cases
 from evidence.verification.experiment import PlacedSphere, Wall, collide_scene, experiment
@@ -89,7 +99,7 @@ def test_cohesion_of_the_study_is_no_unknown_force(
     case = with_coefficient(small, write_study, "cohesion_j_m3", USED)
     for scene in (filling_scene(case), process_scene(case)):
         templates = environment(project.templates)
-        law = of_its_law(deck_text(scene, templates), scene, templates)
+        law = of_its_templates(deck_text(scene, templates), scene, templates)
         assert law["added_forces"] == ()
 
 
@@ -151,6 +161,82 @@ def test_a_pair_needs_only_what_it_has() -> None:
         assert contact_model([plain, rolling], contact) == words
     assert contact_settings([plain]) == [] and contact_settings([rolling]) == ["torsionTorque on"]
     assert plain.plain() == {"restitution": 0.9, "friction": 0.3}
+
+
+TWO_SPHERES = """{% extends "base/process.in.j2" %}
+{% block start %}
+region all block -0.1 0.1 -0.1 0.1 -0.01 0.2 units box
+create_box {{ deck.materials.names | length }} all
+create_atoms 1 single 0.02 0 0.0029 units box
+create_atoms 1 single 0.02 0 0.0087 units box
+set group all diameter 0.006 density 2500
+{% endblock %}
+{% block outputs %}{% endblock %}
+{% block run %}
+print "LAW {{ self.contact_model() }}; {{ self.contact_settings() }}"
+run 1
+{% endblock %}
+"""
+"""One step of a sphere on the floor and another on top of it."""
+
+
+def combinations(small: Small) -> Iterator[Study]:
+    """Studies with every combination of coefficients and options that a study may have."""
+    optional = {name: field for name, field in Pair.model_fields.items() if not field.is_required()}
+    values = {name: (field.default, USED) for name, field in optional.items()}
+    options = {
+        name: get_args(field.annotation) or (True, False)
+        for name, field in Contact.model_fields.items()
+    }
+    for chosen in product(*values.values(), *options.values()):
+        pairs = dict(zip(values, chosen, strict=False))
+        small["contact"] = dict(zip(options, chosen[len(values) :], strict=True))
+        for pair in small["pairs"].values():
+            pair.update(pairs)
+        with contextlib.suppress(InputError):
+            yield validate(small, "small")
+
+
+@pytest.mark.engine
+def test_liggghts_takes_every_combination_of_coefficients_and_options(
+    case: Case, small: Small, project: Project, tmp_path: Path
+) -> None:
+    """One process: pairs, an analytical bowl and a mesh have each contact law in turn."""
+    (tmp_path / "own").mkdir()
+    (tmp_path / "own/process.in.j2").write_text(TWO_SPHERES)
+    templates = environment(project.templates, tmp_path / "own")
+    plain = process_scene(case)
+    types = plain.deck.materials.names
+    decks = {}
+    for study in combinations(small):
+        materials = material_table(study, types, 1e-3, case)
+        limited = study.contact.limit_force
+        deck = replace(plain.deck, materials=materials, limit_force=limited)
+        decks[materials.law.model, (limited, *materials.law.settings)] = deck
+    assert {row.model.split()[0] for row in coefficients().values() if row.model} <= {
+        *chain.from_iterable(model.split() for model, _ in decks)
+    }
+    scenes = [replace(plain, deck=deck, override="process.in.j2") for deck in decks.values()]
+    for name, text in plain.texts().items():
+        (tmp_path / name).write_text(text)
+    script = "\nclear\n".join(deck_text(scene, templates) for scene in scenes)
+    (tmp_path / DECK_FILE).write_text(script)
+    words = command(find_engine(), DECK_FILE, 1, 1, None)
+    ending = execute(words, tmp_path, tmp_path / "screen", lambda elapsed: None)
+    screen = (tmp_path / "screen").read_text()
+    laws = re.findall("^LAW (.*)$", screen, re.MULTILINE)
+    assert ending.exit_status == 0 and len(laws) == len(decks), (laws, engine_errors(screen))
+
+
+def test_an_order_of_keywords_that_liggghts_refuses_is_refused(
+    case: Case, project: Project
+) -> None:
+    law = "hertz tangential history rolling_friction cdt cohesion sjkr2"
+    text = f'{{% extends "base/base.in.j2" %}}{{% block contact_model %}}{law}{{% endblock %}}'
+    file = own_template(case, text, "base.in.j2")
+    with pytest.raises(InputError, match="order of keywords") as raised:
+        deck_text(filling_scene(case), environment(project.templates, file.parent))
+    assert "tangential cohesion rolling_friction surface" in str(raised.value)
 
 
 @pytest.mark.engine
@@ -233,6 +319,39 @@ def test_a_softened_pair_keeps_its_largest_tension(name: str) -> None:
             for scale in (1.0, 1e-3)
         ]
         assert tensions[0] == pytest.approx(tensions[1]) != 0.0
+
+
+def said_of_cohesion(case: Case) -> list[str]:
+    return [str(one) for one in filling_scene(case).warnings if one.code == "cohesion"]
+
+
+@pytest.mark.parametrize(
+    ("pair", "bodies"),
+    [
+        ("ceramic-ceramic", ["big-big"]),
+        ("ceramic-steel", ["big-small", "big-bowl", "big-workpiece"]),
+        ("steel-steel", ["small-small", "small-bowl", "small-workpiece"]),
+    ],
+)
+def test_a_strong_tension_of_any_pair_is_told(
+    pair: str, bodies: list[str], made: Made, small: Small
+) -> None:
+    """The first class is not the only one that sticks; a tension is proportional to the cube."""
+    small["media"] = {"count": 300, "classes": {
+        "big": {"material": "ceramic", "radius_mean_m": 0.003, "fraction": 0.5},
+        "small": {"material": "steel", "radius_mean_m": 0.002, "fraction": 0.5},
+    }}  # fmt: skip
+    small["pairs"]["steel-steel"] = dict(small["pairs"]["ceramic-steel"])
+    field, value = f"pairs.{pair}.cohesion_j_m3", 1e5
+    numbers = bond_numbers(made({field: value}).study)
+    assert [name for name, number in numbers.items() if number > 0] == bodies
+    enough = value * max(numbers.values()) ** (-1 / 3)
+    assert said_of_cohesion(made({field: 0.999 * enough})) == []
+    (said,) = said_of_cohesion(made({field: 1.001 * enough}))
+    strongest = max(numbers, key=numbers.__getitem__)
+    assert f"is 1 ({strongest}) times the weight" in said
+    (said,) = said_of_cohesion(made({field: 100 * enough}))
+    assert all(f"({name})" in said for name in bodies)
 
 
 @pytest.mark.engine

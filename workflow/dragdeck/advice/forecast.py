@@ -1,4 +1,4 @@
-"""What a study's runs will take: `dragdeck advise`."""
+"""What a study's runs will take: `./run dragdeck advise`."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -112,7 +112,7 @@ def advice_file(case: Case, cases: Sequence[AdvisedCase]) -> AdviceFile:
 
 
 def advice_tables(case: Case, advice: Advice, advised: AdvisedCase) -> Iterator[Table]:
-    """What `dragdeck advise` prints of a case: the options, and what must be said of them."""
+    """What `./run dragdeck advise` prints of a case: the options, and what must be said of them."""
     asked = advice.asked
     what = ", ".join(asked.quantities)
     title = f"{case.study_name} {case.name}: {what} within {shown_share(asked.tolerance)}"

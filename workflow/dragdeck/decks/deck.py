@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Generic, TypeVar
+from typing import Generic, Self, TypeVar
 
 from dragdeck import __version__
 from dragdeck.decks.outputs import Output
@@ -232,6 +232,15 @@ class Scene(Generic[K]):
     warnings: Sequence[Caution] = ()
     override: str | None = None
     facets: int = 0
+
+    def modelling(self, there: set[str], optional: set[str]) -> Self:
+        """The scene with the effects that its script models, of those that it may."""
+        why = "by a template of the study"
+        models = {what: text for what, text in self.models.items() if what not in optional - there}
+        left = {what: text for what, text in self.leaves_out.items() if what not in there}
+        left |= {what: LeftOut(why) for what in sorted(set(self.models) & (optional - there))}
+        added = {what: why for what in sorted(set(self.leaves_out) & there)}
+        return replace(self, models={**added, **models}, leaves_out=left)
 
     @property
     def template(self) -> str:

@@ -71,6 +71,31 @@ def leaving_folder(deck: str, source: str) -> Iterator[tuple[str, str]]:
                     yield command.text, f"access a file outside the run's folder: {word}"
 
 
+def files_read(deck: str) -> set[str]:
+    """Names of the files that a deck reads, its source included, as far as it names them itself.
+
+    A file that another of its commands names too, such as one that it writes, is not among them.
+    """
+    read, others = set(), set()
+    for command in commands(deck):
+        names = _names_read(command.words)
+        read.update(names)
+        others.update([] if names else command.words)
+    return {name for name in read - others if "$" not in name}
+
+
+def _names_read(words: list[str]) -> list[str]:
+    """The files that a command reads."""
+    kind = " ".join([words[0], *words[2:4]])
+    if words[0] in ("read_data", "read_dump", "read_restart"):
+        return words[1:2]
+    if kind.startswith(("variable file ", "variable atomfile ")) or words[1:3] == ["from", "index"]:
+        return words[3:4]
+    if re.match("fix .* (mesh|particletemplate)/", kind):
+        return [value for word, value in pairwise(words) if word == "file"]
+    return []
+
+
 def endless(deck: str) -> Iterator[tuple[str, str]]:
     """Jumps back of a deck between whose label and itself nothing can end the loop."""
     every = list(commands(deck))
@@ -117,13 +142,16 @@ def contact_laws(deck: str) -> Iterator[list[str]]:
 
 
 def law_commands(deck: str) -> list[str]:
-    """The commands of a deck that set the contact law, and the constants and coefficients in it."""
-    return [
-        command.text
-        for command in commands(deck)
-        if command.words[0] in ("pair_style", "pair_coeff")
-        or (command.words[0] == "fix" and command.words[3:4] == ["property/global"])
-    ]
+    """What sets the contact law in a deck: its commands, those of walls without their shapes."""
+    found = []
+    for command in commands(deck):
+        kind = command.words[3:4]
+        if command.words[0] in ("pair_style", "pair_coeff") or kind == ["property/global"]:
+            found.append(" ".join(command.words))
+        elif command.words[0] == "fix" and kind and kind[0].startswith("wall/gran"):
+            text = " ".join(command.words[3:])
+            found.append(re.sub(r"(primitive type|mesh n_meshes) .*?(?=store_force |$)", "", text))
+    return list(dict.fromkeys(found))
 
 
 def _inner(words: list[str]) -> Iterator[str]:

@@ -77,7 +77,7 @@ class OutputOfRun(Part):
 class ColumnsFile(Document):
     """The content of ``columns.json``: the raw output files of a run by name."""
 
-    remedy = "write it with: dragdeck step render"
+    remedy = "write it with: ./run dragdeck step render"
 
     outputs: Mapping[str, OutputOfRun]
 

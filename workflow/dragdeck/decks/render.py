@@ -19,7 +19,16 @@ from dragdeck.decks.engine_commands import (
     leaving_folder,
 )
 from dragdeck.decks.outputs import WORKPIECE_FORCE, ColumnsFile, in_writing_order
-from dragdeck.decks.templates import file_of, replaced, template_errors, used, without
+from dragdeck.decks.templates import (
+    edited,
+    file_of,
+    own_blocks,
+    replaced,
+    template_errors,
+    used,
+    without,
+    without_block,
+)
 from dragdeck.errors import InputError
 from dragdeck.files import file_checksum, write_text
 from dragdeck.study import contact_law
@@ -33,7 +42,8 @@ def deck_text(scene: AnyScene, templates: jinja2.Environment) -> str:
     InputError
         A template cannot be used: names template, line and what is missing. Or the deck would
         start a program, reach files outside of the run's folder, run for ever, rebuild its
-        neighbour lists too late, or not write what ``columns.json`` says.
+        neighbour lists too late, not write what ``columns.json`` says, or has a contact law in an
+        order that LIGGGHTS refuses.
     """
     names = ", ".join(_used(scene, templates))
     text = _rendered(scene, templates, names)
@@ -53,6 +63,15 @@ def deck_text(scene: AnyScene, templates: jinja2.Environment) -> str:
             value=ascii(command),
             remedy="remove the command from the template; see docs/reference/templates.md",
         )
+    for law in contact_laws(text):
+        if not contact_law.in_order(law):
+            raise InputError(
+                "LIGGGHTS refuses the order of keywords in this contact law",
+                file=file,
+                value=" ".join(law),
+                limit=f"the order model {' '.join(contact_law.KEYWORDS)}",
+                remedy="write the block contact_model in this order",
+            )
     if overriding(scene, templates) and scene.override is None:
         _check_outputs(scene, text, _rendered(scene, without(templates)), file)
     return text
@@ -129,16 +148,46 @@ def _added_forces(text: str) -> list[str]:
     return list(dict.fromkeys(force for each in found for force in each))
 
 
-def of_its_law(
+def of_its_templates(
     text: str, scene: AnyScene, templates: jinja2.Environment
 ) -> dict[str, tuple[str, ...]]:
-    """What ``case.json`` says of the contact law in the deck of a scene, which is `text`."""
+    """What ``case.json`` says of the deck of a scene, `text`, and what templates change in it."""
     original = _rendered(scene, without(templates))
-    commands = law_commands(original)
-    changed = tuple(command for command in law_commands(text) if command not in commands)
+    law, limit = scene.deck.materials.law, ["limitForce on"] if scene.deck.limit_force else []
+    options = [*limit, *law.settings]
+    unchanged = {
+        " ".join(["pair_style gran model", law.model, *options]),
+        " ".join(["wall/gran model", law.model, "store_force yes", *options]),
+        *(one for one in law_commands(original) if one.startswith(("fix ", "pair_coeff"))),
+    }
+    changed = tuple(command for command in law_commands(text) if command not in unchanged)
     known = _added_forces(original)  # each has its formula in dragdeck.study.contact_law
     added = tuple(force for force in _added_forces(text) if force not in known or changed)
-    return {"added_forces": added, "changed_law": changed}
+    scripts = changed_scripts(text, scene, templates)
+    return {"added_forces": added, "changed_law": changed, "changed_scripts": scripts}
+
+
+def changed_scripts(text: str, scene: AnyScene, templates: jinja2.Environment) -> tuple[str, ...]:
+    """Templates that change commands of the deck of a scene, `text`, each with its blocks.
+
+    Those of the study, and those of the project that are not as they were shipped.
+    """
+    whole = [command.words for command in commands(text)]
+
+    def changes(others: jinja2.Environment) -> bool:
+        try:
+            return [command.words for command in commands(_rendered(scene, others))] != whole
+        except InputError:  # the rest needs it
+            return True
+
+    found = []
+    for name in sorted(overriding(scene, templates)):
+        if changes(without(templates, name)):
+            blocks = own_blocks(templates, name)
+            named = [block for block in blocks if changes(without_block(templates, name, block))]
+            found.append(f"{name} ({', '.join(named)})" if named else name)
+    names = _used(scene, templates)
+    return *found, *(f"templates/{name} of the project" for name in edited(templates, names))
 
 
 def write_workpiece(
@@ -163,7 +212,7 @@ def write_workpiece(
     outputs = {each.name: each.as_part() for each in scene.deck.outputs}
     forces = [outputs.pop(name) for name in list(outputs) if name.startswith(WORKPIECE_FORCE)]
     columns = ColumnsFile(outputs={**outputs, WORKPIECE_FORCE: forces[number - 1]})
-    own = of_its_law(deck_text(scene, templates), scene, templates)
+    own = of_its_templates(deck_text(scene, templates), scene, templates)
     texts = {
         CASE_FILE: scene.case.model_copy(update=own).as_text(),
         COLUMNS_FILE: columns.as_text(),
@@ -200,7 +249,7 @@ def write_run(scene: AnyScene, folder: Path, templates: jinja2.Environment) -> l
     source = folder / scene.deck.source
     if scene.deck.source not in texts and source.is_file():
         checksums[scene.deck.source] = file_checksum(source)
-    own = {"files": checksums, **of_its_law(texts[DECK_FILE], scene, templates)}
+    own = {"files": checksums, **of_its_templates(texts[DECK_FILE], scene, templates)}
     texts[CASE_FILE] = scene.case.model_copy(update=own).as_text()
     for name, text in texts.items():
         write_text(folder / name, text)

@@ -5,7 +5,9 @@ that it inserts passes `quoted`.
 """
 
 import contextlib
+import hashlib
 import math
+import re
 import resource
 import signal
 import traceback
@@ -23,12 +25,16 @@ from jinja2.sandbox import ImmutableSandboxedEnvironment, safe_range
 from markupsafe import Markup
 
 from dragdeck.errors import InputError, choices, together
+from dragdeck.files import table_rows
 
 _NOT_IN_A_VALUE = set("$&#\"'\\")
 """What LIGGGHTS reads as a variable, a continued line, a comment or a quotation."""
 
 _TRUSTING = ("e", "escape", "forceescape", "random", "safe", "tojson", "urlize", "xmlattr")
 """Filters of Jinja that would pass text by `quoted`, or give another script each time."""
+
+_SHIPPED = Path(__file__).parents[1] / "data" / "templates.csv"
+"""Hash of the commands of each of the project's templates, as this version has them."""
 
 _BASE = "base"
 """Prefix of the project's own templates, which a study's may replace."""
@@ -281,6 +287,39 @@ def without(templates: jinja2.Environment, name: str | None = None) -> jinja2.En
         return every.get_source(templates, f"{_BASE}/{asked}")
 
     return templates.overlay(loader=jinja2.ChoiceLoader([jinja2.FunctionLoader(original), every]))
+
+
+def own_blocks(templates: jinja2.Environment, name: str) -> list[str]:
+    """The blocks that a template overrides; none of one that replaces a whole file."""
+    tree = _parsed(templates, name)
+    blocks = tree.find_all(nodes.Block) if tree.find(nodes.Extends) else ()
+    return list(dict.fromkeys(block.name for block in blocks))
+
+
+def without_block(templates: jinja2.Environment, name: str, block: str) -> jinja2.Environment:
+    """The same templates, but one of them does not override a block."""
+    found = templates.overlay()
+    found.get_template(name).blocks.pop(block)
+    return found
+
+
+def edited(templates: jinja2.Environment, names: Iterable[str]) -> list[str]:
+    """Those of the project's own templates that are not as they were shipped, remarks apart."""
+    shipped = {row["template"]: row["commands"] for row in table_rows(_SHIPPED)}
+    bases = dict.fromkeys(f"{_BASE}/{name.removeprefix(f'{_BASE}/')}" for name in names)
+    files = {base: file_of(templates, base) for base in bases if _is_there(templates, base)}
+    return [
+        file.name
+        for file in files.values()
+        if shipped.get(file.name) != commands_digest(file.read_text(encoding="utf-8"))
+    ]
+
+
+def commands_digest(template: str) -> str:
+    """Hash of a template without remarks and empty lines."""
+    lines = re.sub(r"\{#.*?#\}", "", template, flags=re.DOTALL).splitlines()
+    kept = [line.strip() for line in lines if line.strip() and not line.lstrip().startswith("#")]
+    return hashlib.sha256("\n".join(kept).encode()).hexdigest()[:16]
 
 
 def file_of(templates: jinja2.Environment, name: str) -> Path:

@@ -11,8 +11,9 @@ from dragdeck.records.run import AcceptanceCheck, CheckReason, Decomposition, Pa
 
 
 def engine_errors(screen: str) -> list[str]:
-    """The ERROR lines of LIGGGHTS, once each, in order."""
-    return list(dict.fromkeys(re.findall(r"^.*?(ERROR.*?)\s*$", screen, flags=re.MULTILINE)))
+    """The errors of LIGGGHTS, of all ranks or of one, once each, in order."""
+    line = r"^.*?(ERROR(?: on proc \d+)?: .*?)\s*$"
+    return list(dict.fromkeys(re.findall(line, screen, flags=re.MULTILINE)))
 
 
 def reached_end(screen: str) -> bool:

@@ -1,5 +1,6 @@
 """A part of a run: LIGGGHTS from its start or a checkpoint to an end, good or bad."""
 
+import re
 import time
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -16,14 +17,25 @@ from dragdeck.engine.checkpoints import (
     take_forced_restarts,
 )
 from dragdeck.engine.completeness import cut_outputs, first_gap, part_files
-from dragdeck.engine.process import Ending, Engine, command, execute
+from dragdeck.engine.process import Ending, Engine, command, execute, keeps_last_words
 from dragdeck.engine.reports import Report
 from dragdeck.engine.space import SPARE_BYTES, check_space, free_bytes, space_left
 from dragdeck.engine.watch import EngineEnded, LimitMet, Watcher, cut_screen
 from dragdeck.errors import EngineError, RejectedRunError
-from dragdeck.records.run import REMEDIES, AcceptanceCheck, CaseFile, CheckCode, RunPart, RunRecord
+from dragdeck.records.run import (
+    REMEDIES,
+    AcceptanceCheck,
+    CaseFile,
+    CheckCode,
+    RunPart,
+    RunRecord,
+    causes,
+)
 
 STATE_FILE = "state.json"
+_UNWRITTEN = re.compile("Cannot open (?!mesh|data|clump|file variable)")
+"""What LIGGGHTS says of a file that it cannot write; of some that it reads it says the same."""
+
 _WRITTEN: set[CheckCode] = {"output_complete", "packing_whole"}
 """Checks that a full disk alone can fail."""
 
@@ -179,7 +191,7 @@ class PartOfRun:
         if asked:
             return "stopped on request"
         full = free_bytes(self.folder) < SPARE_BYTES
-        if full or any("Cannot open" in error for error in errors):
+        if full or any(_UNWRITTEN.search(error) for error in errors):
             said = "; ".join(errors) or "no message of LIGGGHTS"
             left = space_left(self.folder, self.columns.outputs, self.inputs.media.n_spheres)
             return f"the disk is full, or a file cannot be written ({said}); {left}"
@@ -187,6 +199,8 @@ class PartOfRun:
             return None
         killed = ending.exit_status < 0 or ending.exit_status >= 128
         how = "was killed" if killed else "ended prematurely without a message"
+        if not killed and not keeps_last_words():
+            how += ": stdbuf of GNU coreutils, which would have kept it, is missing"
         if ending.exit_status == 0:  # a signal between two runs of a script leaves no other trace
             how = "was stopped on request, or its script ends early"
         return f"LIGGGHTS {how} (exit status {ending.exit_status})"
@@ -208,9 +222,9 @@ class PartOfRun:
 
     def _judge(self, checks: list[AcceptanceCheck]) -> RunRecord:
         """Note the checks, and that the run is complete or failed."""
-        passed = all(check.passed for check in checks)
+        passed, told = all(check.passed for check in checks), causes(checks)
         checks = [
-            one if one.passed else one.model_copy(update={"remedy": REMEDIES.get(one.code)})
+            one.model_copy(update={"remedy": REMEDIES.get(one.code)}) if one in told else one
             for one in checks
         ]
         self._update(state="complete" if passed else "failed", checks=checks)
@@ -229,7 +243,7 @@ class PartOfRun:
         parts = self._record.parts
         gap = first_gap(self.folder, self.columns.outputs, parts)
         newest = newest_checkpoint(self.folder, count, ranks, gap, self.report)
-        lines = [f"{self.folder}: {why}"]
+        lines = [f"{self.folder}: {why}", f"  log:    {self._screen}"]
         if newest is None:
             lines.append(f"  remedy: {first}run it again from its start: no usable checkpoint")
         else:
@@ -241,9 +255,8 @@ class PartOfRun:
 def why_rejected(folder: Path, record: RunRecord) -> str:
     """The acceptance checks that a run did not pass, for a reader."""
     lines = [f"{folder}: run rejected: it did not pass the acceptance checks listed below"]
-    for check in record.checks:
-        if not check.passed:
-            lines.append(f"  check:  {check.name}: {check.seen} (limit: {check.limit})")
-            lines += [f"  remedy: {check.remedy}"] if check.remedy else []
+    for check in causes(record.checks):
+        lines.append(f"  check:  {check.name}: {check.seen} (limit: {check.limit})")
+        lines += [f"  remedy: {check.remedy}"] if check.remedy else []
     lines.append(f"  log:    {folder / f'screen.{record.last_part.part}.txt'}")
     return "\n".join(lines)

@@ -98,7 +98,7 @@ def find_engine() -> Engine:
 
 @cache
 def _version(path: str) -> str:
-    words = [path, "-h"]
+    words = [*_by_line(path), "-h"]
     shown = subprocess.run(
         words,
         capture_output=True,
@@ -138,7 +138,7 @@ def command(engine: Engine, deck: str, ranks: int, part: int, source: Path | Non
     source : Path, optional
         The checkpoint to go on from.
     """
-    words = [engine.path, "-in", deck, "-log", "none", "-var", "part", str(part)]
+    words = [*_by_line(engine.path), "-in", deck, "-log", "none", "-var", "part", str(part)]
     if source is not None:
         words += ["-var", "resume", "1", "-var", "from", source.name]
     if ranks == 1:
@@ -153,6 +153,20 @@ def command(engine: Engine, deck: str, ranks: int, part: int, source: Path | Non
         )
     idle = ["--mca", "mpi_yield_when_idle", "1"]  # free, and kind to whoever shares the cores
     return [launcher, "-np", str(ranks), "--bind-to", "none", "--oversubscribe", *idle, *words]
+
+
+def keeps_last_words() -> bool:
+    """Whether an error that LIGGGHTS prints before it aborts arrives in a file."""
+    return shutil.which("stdbuf") is not None
+
+
+def _by_line(path: str) -> list[str]:
+    """The command of an engine that passes on each line at once, with any launcher.
+
+    LIGGGHTS prints an error of a single rank and calls ``MPI_Abort``, which discards what a file
+    or pipe has not got yet.
+    """
+    return ["stdbuf", "-oL", path] if keeps_last_words() else [path]
 
 
 def _own_launcher() -> list[str]:
@@ -185,7 +199,7 @@ def execute(words: Sequence[str], folder: Path, screen: Path, watch: Watch) -> E
     watch : callable
         Called about five times a second with the seconds since the start.
     """
-    begun = time.monotonic()
+    begun, launched = time.monotonic(), not {"-n", "-np"}.isdisjoint(words)
     with screen.open("wb") as sink:
         process = subprocess.Popen(
             words,
@@ -195,7 +209,7 @@ def execute(words: Sequence[str], folder: Path, screen: Path, watch: Watch) -> E
             stderr=subprocess.STDOUT,
             env=_environment(list(words)),
             start_new_session=True,  # a Ctrl-C reaches us, not the engine
-            preexec_fn=_ends_with_us(signal.SIGKILL if words[1] == "-in" else signal.SIGTERM),
+            preexec_fn=_ends_with_us(signal.SIGTERM if launched else signal.SIGKILL),
         )
         with _heeding_signals() as asked:
             try:

@@ -6,12 +6,14 @@ that nothing unfinished can be taken for a result.
 """
 
 import hashlib
+import os
 import shutil
 from pathlib import Path
 
 from dragdeck.decks import CASE_FILE, COLUMNS_FILE, DECK_FILE, RUN_FILE
+from dragdeck.decks.engine_commands import files_read
 from dragdeck.decks.outputs import ColumnsFile
-from dragdeck.engine.checkpoints import take_forced_restarts
+from dragdeck.engine.checkpoints import is_whole, take_forced_restarts
 from dragdeck.engine.part import STATE_FILE, PartOfRun, why_rejected
 from dragdeck.engine.process import LOCK_FILE, find_engine, only_runner
 from dragdeck.engine.reports import Report, say
@@ -27,8 +29,8 @@ _OF_THE_WORKFLOW = ("logs", "benchmarks")
 _AS_RUN = "as_run"
 _PATIENCE_S = 1800.0
 _ANEW = (
-    "write it again with: dragdeck step render, or run the scene that creates it; to change an "
-    "input script, override a block of its template"
+    "write it again with: ./run dragdeck step render, or run the scene that creates it; to change "
+    "an input script, override a block of its template"
 )
 
 
@@ -131,26 +133,49 @@ def fingerprint(folder: Path, inputs: CaseFile) -> str:
     text = (folder / DECK_FILE).read_text(encoding="utf-8")
     commands = [line for line in text.splitlines() if line and not line.startswith("#")]
     total = hashlib.sha256("\n".join(commands).encode())
-    files = {folder / name: checksum for name, checksum in inputs.files.items()}
-    for file in sorted(set(files) - {folder / DECK_FILE, folder / COLUMNS_FILE}):
-        total.update(file.name.encode() + bytes.fromhex(files[file]))
+    names = _names_of_inputs(folder, inputs) - {DECK_FILE, COLUMNS_FILE}
+    for name in sorted(names, key=folder.joinpath):
+        checksum = inputs.files.get(name) or file_checksum(folder / name)
+        total.update(Path(name).name.encode() + bytes.fromhex(checksum))
     return total.hexdigest()
 
 
+def _names_of_inputs(folder: Path, inputs: CaseFile) -> set[str]:
+    """The files that were written for a run, and those that its script reads beside them."""
+    deck = folder / DECK_FILE
+    text = deck.read_text(encoding="utf-8") if deck.is_file() else ""
+    return {*inputs.files, *files_read(text)}
+
+
 def _check_files(folder: Path, inputs: CaseFile) -> None:
-    """Refuse to start from files that are not those that were written.
+    """Refuse to start from files that LIGGGHTS cannot read, or that are not those written.
 
     Raises
     ------
     InputError
-        One is missing or has changed.
+        One is missing, empty or truncated, or has changed.
     """
-    for name, checksum in inputs.files.items():
-        file = folder / name
+    for name in sorted(_names_of_inputs(folder, inputs)):
+        file = Path(os.path.normpath(folder / name))
+        problem = ""
         if not file.is_file():
-            raise InputError("a file that the run starts from is missing", file=file, remedy=_ANEW)
-        if file_checksum(file) != checksum:
-            raise InputError("the file has changed since it was written", file=file, remedy=_ANEW)
+            problem = "a file that the run starts from is missing"
+        elif not file.stat().st_size:
+            problem = "a file that the run starts from is empty"
+        elif name in inputs.files and file_checksum(file) != inputs.files[name]:
+            problem = "the file has changed since it was written"
+        elif _is_cut(file, inputs.media.n_spheres):
+            problem = "a file that the run starts from is truncated"
+        if problem:
+            raise InputError(problem, file=file, remedy=_ANEW)
+
+
+def _is_cut(file: Path, particles: int) -> bool:
+    """Whether a file is the final state of a run, but not a whole one."""
+    record = file.with_name(RUN_FILE)
+    if file.suffix != ".restart" or not record.is_file():
+        return False
+    return not is_whole(file, particles, RunRecord.read(record).ranks)
 
 
 def _record(folder: Path) -> RunRecord | None:

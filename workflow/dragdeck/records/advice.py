@@ -85,7 +85,7 @@ class AdviceFile(Document):
         One entry per process run.
     """
 
-    remedy = "make it with: dragdeck advise"
+    remedy = "make it with: ./run dragdeck advise"
 
     study: str
     date: str

@@ -36,7 +36,7 @@ class DropTest(Document):
         Time of the fall before the first impact, and contact time of an elastic impact, s.
     """
 
-    remedy = "make it with: snakemake calibrate"
+    remedy = "make it with: ./run calibrate"
 
     study: str
     title: str
@@ -129,7 +129,7 @@ class FitFile(Document):
         At the production settings, and at the physical modulus.
     """
 
-    remedy = "make it with: snakemake calibrate"
+    remedy = "make it with: ./run calibrate"
 
     fit: Fit
     fit_full: Fit
@@ -150,7 +150,7 @@ class AnglesFile(Document):
         Folders beside the list; a run that failed is absent.
     """
 
-    remedy = "make it with: snakemake calibrate"
+    remedy = "make it with: ./run calibrate"
 
     study: str
     title: str

@@ -25,7 +25,7 @@ class Packing(Document):
         Mean radius, m.
     """
 
-    remedy = "make it with: dragchain tables FILLING_DIR"
+    remedy = "make it with: ./run dragchain tables FILLING_DIR"
 
     bed_height_m: float
     top_m: float

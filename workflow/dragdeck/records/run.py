@@ -90,7 +90,9 @@ class CaseFile(Document):
         Models of the script's contact law that add a normal force, such as cohesion; Coulomb's
         limit of friction does not follow from the contact force then.
     changed_law : tuple of str
-        Commands on contact law, constants and coefficients that come from a template of the study.
+        Commands on contact law, constants and coefficients that come from a template.
+    changed_scripts : tuple of str
+        Templates that change commands of the script, with their blocks; absent if there are none.
     entry_step : int
         Step of the drag at which it continues its lead; absent if it has none.
     marks : tuple of str
@@ -105,7 +107,7 @@ class CaseFile(Document):
         Speed of a particle that was thrown, m/s; absent if the speeds are not sampled.
     """
 
-    remedy = "write it with: dragdeck step render"
+    remedy = "write it with: ./run dragdeck step render"
 
     study: str
     title: str
@@ -120,6 +122,7 @@ class CaseFile(Document):
     files: Mapping[str, str] = {}
     added_forces: tuple[str, ...] = ()
     changed_law: tuple[str, ...] = ()
+    changed_scripts: tuple[str, ...] = omitted(())
     entry_step: int = omitted(0)
     marks: tuple[str, ...] = omitted(())
     settled: SettlingCriterion | None = omitted(None)
@@ -134,6 +137,11 @@ class CaseFile(Document):
                 f"phases: {after.name} does not start where {before.name} ends"
             )
         return self
+
+
+def changed_in_words(scripts: Sequence[str]) -> str:
+    """What templates change in input scripts, in one line; empty where nothing."""
+    return f"input scripts changed by templates: {'; '.join(scripts)}" if scripts else ""
 
 
 State = Literal["running", "stopped", "failed", "complete"]
@@ -166,11 +174,11 @@ REMEDIES: Mapping[CheckCode, str] = {
     "stable_timestep": _SMALLER_STEP,
     "within_limits": _SMALLER_STEP,
     "none_thrown": "a contact was found too late: look at the workpiece where the force peaks, try "
-    "dragdeck mesh FILE on its mesh, or choose a smaller timestep_fraction",
-    "output_complete": "start the run again with: dragdeck run --again",
+    "./run dragdeck mesh FILE on its mesh, or choose a smaller timestep_fraction",
+    "output_complete": "start the run again with: ./run dragdeck run --again RUN_DIR",
     "ranks": "use the mpirun that belongs to this LIGGGHTS (DRAGDECK_LAUNCHER)",
 }
-"""What to do where a check did not pass; of others, the end of the screen output says it."""
+"""What to do where a check did not pass; of others, its words or the screen output say it."""
 
 
 class ParticlesPerRank(Part):
@@ -229,6 +237,13 @@ class AcceptanceCheck(Part):
     limit: str
     number: float | None = None
     remedy: str | None = None
+
+
+def causes(checks: Sequence[AcceptanceCheck]) -> Sequence[AcceptanceCheck]:
+    """The checks that did not pass; where LIGGGHTS stopped with an error, that one alone."""
+    failed = [check for check in checks if not check.passed]
+    stopped = [one for one in failed if one.code == "no_engine_error" and one.reason == "other"]
+    return stopped or failed
 
 
 class RunPart(Part):

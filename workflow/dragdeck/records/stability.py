@@ -159,9 +159,7 @@ class StabilityFile(Document):
     regimes : mapping of str to SafeSteps
     """
 
-    remedy = (
-        "measure it: snakemake stability; then copy its stability.json to workflow/dragdeck/data/"
-    )
+    remedy = "measure it: ./run stability; then copy its stability.json to workflow/dragdeck/data/"
 
     commands: tuple[str, ...]
     engine_versions: tuple[str, ...]

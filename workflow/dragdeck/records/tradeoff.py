@@ -157,7 +157,7 @@ class TradeoffRecord(Document):
     """
 
     remedy = (
-        "name a fidelity instead of a tolerance; or measure the trade-off, `snakemake "
+        "name a fidelity instead of a tolerance; or measure the trade-off, `./run "
         "tradeoff --config study=uhlmann2015 plan=long`, and copy its "
         "tradeoff.json to workflow/dragdeck/data/"
     )

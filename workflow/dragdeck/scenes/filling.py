@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import product
+from itertools import combinations_with_replacement, product
 from typing import NamedTuple
 
 import numpy as np
@@ -27,7 +27,6 @@ from dragdeck.cases.bed import (
     particle_material,
     skin,
     smallest_radius,
-    weight_acceleration,
     weight_density,
 )
 from dragdeck.cases.case import Case
@@ -43,6 +42,7 @@ from dragdeck.physics.contact_mechanics import (
     particle_mass,
     pull_off_force,
     rayleigh_time,
+    sphere_mass,
     wedge_ratio,
 )
 from dragdeck.physics.coulomb import FrictionLimit
@@ -350,19 +350,42 @@ def _overlap_caution(study: Study) -> Iterator[Caution]:
 
 
 def _cohesion_caution(study: Study) -> Iterator[Caution]:
-    """A warning where the largest tension exceeds a particle's weight."""
-    particle, radius = particle_material(study), study.media.typical_radius_m
-    pair = study.pair(study.media.main_material, study.media.main_material)
-    one, half = np.ones(1), np.full(1, radius / 2)
-    slope = float(FrictionLimit(0.0, pair.attractive(), wall=False).attraction_n(half, one)[0])
-    largest = pull_off_force(slope, effective_modulus(particle, particle), radius / 2)
-    bond = largest / (particle_mass(particle, radius) * weight_acceleration(study))
-    if bond > 1:
+    """A warning where the largest tension of some pair exceeds a particle's weight."""
+    bonds = {pair: bond for pair, bond in bond_numbers(study).items() if bond > 1}
+    if bonds:
+        pairs = ", ".join(f"{bond:.3g} ({pair})" for pair, bond in bonds.items())
         yield Caution(
             "cohesion",
-            f"the largest tension by cohesion is {bond:.3g} times the weight of a mean particle "
-            "(Bond number); above 1 a bed fills loosely or bridges, and may not come to rest",
+            f"the largest tension by cohesion is {pairs} times the weight of a mean particle "
+            "(Bond number); above 1 a bed fills loosely or bridges, and may not come to rest, and "
+            "particles stick to walls and workpiece",
         )
+
+
+def bond_numbers(study: Study) -> dict[str, float]:
+    """Largest tension of each pair over the weight minus buoyancy of its lighter mean particle."""
+    parts = study.media.parts.items()
+    particles = [
+        (name or "particle", str(part.material), part.mean_radius_m) for name, part in parts
+    ]
+    walls = [
+        ("bowl", study.bowl.material, math.inf),
+        ("workpiece", study.workpiece.material, math.inf),
+    ]
+    pairs = [*combinations_with_replacement(particles, 2), *product(particles, walls)]
+    displaced, found = buoyancy_density(study), {}
+    for (one, material, radius), (other, against, far) in pairs:
+        kinds = [study.materials[name] for name in (material, against)]
+        reduced = 1 / (1 / radius + 1 / far)
+        limit = FrictionLimit(0.0, study.pair(material, against).attractive(), math.isinf(far))
+        slope = float(limit.attraction_n(np.full(1, reduced), np.ones(1))[0])
+        mass = min(
+            sphere_mass(size, kind.density_kg_m3 - displaced)
+            for size, kind in zip((radius, far), kinds, strict=True)
+        )
+        largest = pull_off_force(slope, effective_modulus(*kinds), reduced)
+        found[f"{one}-{other}"] = largest / (mass * study.gravity_m_s2)
+    return found
 
 
 _DEAR = 10.0

@@ -32,6 +32,9 @@ RollingModel = Literal["epsd2", "cdt", "epsd"]
 _BASE_MODEL = "hertz tangential history"
 """Hertz-Mindlin with the history of the tangential spring (LIGGGHTS: ``pair gran``)."""
 
+KEYWORDS = ("tangential", "cohesion", "rolling_friction", "surface")
+"""Keywords after the normal model, in the only order that LIGGGHTS takes."""
+
 
 @dataclass(frozen=True)
 class Coefficient:
@@ -44,8 +47,8 @@ class Coefficient:
     words : str
         What it is called in a sentence.
     model : str
-        Keywords that the contact model needs for it; none where it always counts. Fields of
-        `Contact` may stand in it.
+        What the contact model needs for it, one of `KEYWORDS` first; nothing where it always
+        counts. Fields of `Contact` may stand in it.
     settings : str
         Options of the contact model that go with it.
     compared : {"each", "lowest"}
@@ -176,8 +179,15 @@ def present(pairs: Iterable[Pair]) -> Mapping[str, Coefficient]:
 
 def contact_model(pairs: Iterable[Pair], contact: Contact) -> str:
     """LIGGGHTS's contact model with what these pairs need."""
-    models = (row.model.format(**dict(contact)) for row in present(pairs).values() if row.model)
+    models = [row.model.format(**dict(contact)) for row in present(pairs).values() if row.model]
+    models.sort(key=lambda model: KEYWORDS.index(model.split()[0]))
     return " ".join([_BASE_MODEL, *models])
+
+
+def in_order(law: Iterable[str]) -> bool:
+    """Whether the words of a contact law have their keywords in the order of LIGGGHTS."""
+    places = [KEYWORDS.index(word) for word in law if word in KEYWORDS]
+    return places == sorted(places)
 
 
 def contact_settings(pairs: Iterable[Pair]) -> list[str]:
@@ -213,6 +223,16 @@ def added_forces(law: Sequence[str]) -> list[str]:
     law_words = f"{' '.join(words)} "
     found += [model for model in rows if f"{model} " in law_words and model not in found]
     return found
+
+
+def modelled(law: Iterable[str]) -> set[str]:
+    """Words for the optional coefficients that the words of a contact law model."""
+    named = dict(pairwise(law))
+    return {
+        row.words
+        for row in coefficients().values()
+        if row.model and named.get(row.model.split()[0], "off") != "off"
+    }
 
 
 def coefficient_words(pairs: Iterable[Pair]) -> tuple[list[str], list[str]]:

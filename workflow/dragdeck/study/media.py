@@ -126,6 +126,14 @@ class Grains(Model):
         )
 
     @property
+    def mean_radius_m(self) -> float:
+        """Mean radius, m; of a sieve analysis the Sauter mean."""
+        if self.radius_mean_m is not None:
+            return self.radius_mean_m
+        sizes = self.radii(LEVELS)
+        return float((sizes**3).sum() / (sizes**2).sum())
+
+    @property
     def mean_volume_m3(self) -> float:
         """Mean volume of a particle, m3."""
         return float(4 / 3 * math.pi * (self.radii(LEVELS) ** 3).mean())
@@ -287,11 +295,7 @@ class Media(Grains):
     @property
     def typical_radius_m(self) -> float:
         """Mean radius of the first class, m; of a sieve analysis the Sauter mean."""
-        main = self.main
-        if main.radius_mean_m is not None:
-            return main.radius_mean_m
-        sizes = main.radii(LEVELS)
-        return float((sizes**3).sum() / (sizes**2).sum())
+        return self.main.mean_radius_m
 
     @property
     def typical_std_m(self) -> float:

@@ -76,7 +76,7 @@ class ParticleShape(Model):
     denser: ClassVar[float] = 1.04
 
     spheres: Annotated[Whole, Field(ge=FEWEST_SPHERES, le=MOST_SPHERES)] = Field(
-        description="number of spheres; `dragdeck shapes` lists the errors"
+        description="number of spheres; `./run dragdeck shapes` lists the errors"
     )
 
     def corners(self) -> Corners:

@@ -288,7 +288,7 @@ def settle_case(
             field="fidelity.tolerance",
             value=study.fidelity.tolerance,
             limit="the name of a fidelity, or its settings",
-            remedy="use the settings that dragdeck advise shows for it",
+            remedy="use the settings that ./run dragdeck advise shows for it",
         )
     return resolve(case, study.fidelity)
 
