@@ -270,17 +270,17 @@ def _size_warnings(small: Small, write_study: Write, ratio: float, **frictions: 
 @pytest.mark.parametrize(
     ("ratio", "media", "wall", "said"),
     [
-        (12.6, 0.34, 0.28, "not measured"),  # 1 / 0.28^2 = 12.8
+        (12.6, 0.34, 0.28, ""),  # 1 / 0.28^2 = 12.8
         (12.9, 0.34, 0.28, "the bowl"),
         (8.7, 0.34, 0.5, "the bowl"),  # the smaller friction counts: 1 / 0.34^2 = 8.65
-        (8.5, 0.34, 0.5, "not measured"),
-        (17.7, 0.34, 0.0, "not measured"),  # 1 / (sqrt(1 + 0.34^2) - 1) = 17.8
+        (8.5, 0.34, 0.5, ""),
+        (17.7, 0.34, 0.0, ""),  # 1 / (sqrt(1 + 0.34^2) - 1) = 17.8
         (18.0, 0.34, 0.0, "another large one"),
         (2.5, 1.0, 0.0, "another large one"),
         (2.3, 1.0, 0.0, ""),
         (1.4, 1.0, 1.0, ""),  # stayed nowhere
         (1.6, 1.0, 1.0, "the bowl"),
-        (5.9, 0.34, 0.28, ""),
+        (20.5, 0.2, 0.2, "nothing was measured"),  # 1 / 0.2^2 = 25
     ],
 )
 def test_a_size_ratio_at_which_friction_holds_small_particles_is_named(
@@ -389,4 +389,6 @@ def test_particles_of_different_sizes_pack_more_densely() -> None:
     for alike in ([1.0, 1.0], [0.96, 1.04]):
         assert solid_fraction(np.array(alike), np.ones(2), 1.0) == 0.59
     for ratio in (5.0, 50.0):  # not measured: as the widest that was
-        assert solid_fraction(np.array([1.0, ratio]), numbers, 1.0) == pytest.approx(0.59 * (1 + 0.23 * 0.42 + 0.55 * 0.42**2))
+        assert solid_fraction(np.array([1.0, ratio]), numbers, 1.0) == pytest.approx(
+            0.59 * (1 + 0.23 * 0.42 + 0.55 * 0.42**2)
+        )

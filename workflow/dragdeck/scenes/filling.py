@@ -416,9 +416,9 @@ def _class_cautions(study: Study) -> Iterator[Caution]:
             )
 
 
-_NEVER_HELD, _WIDEST_BED = 1.5, 6.0
-"""Size ratio at which no small particle stayed in a groove, whatever its friction; largest of the
-beds that were measured (docs/data/liggghts)."""
+_NEVER_HELD, _WIDEST = 1.5, 20.0
+"""Size ratio at which no small particle stayed in a groove, whatever its friction; largest one
+that was measured (docs/data/liggghts/groove.csv)."""
 
 
 def _size_cautions(study: Study) -> Iterator[Caution]:
@@ -443,10 +443,10 @@ def _size_cautions(study: Study) -> Iterator[Caution]:
             "LIGGGHTS squeezes it in as it rolls (docs/development/liggghts.md): leave out the "
             "fines, or compare with a run at a quarter of the fidelity.timestep_fraction",
         )
-    elif found and (widest := max(ratio for _, ratio, _ in found)) > _WIDEST_BED:
+    elif found and (widest := max(ratio for _, ratio, _ in found)) > _WIDEST:
         yield Caution(
             "size_ratio",
-            f"diameters differ by a factor of {widest:.3g}: beds above {_WIDEST_BED:g} were not "
+            f"diameters differ by a factor of {widest:.3g}: above {_WIDEST:g}, nothing was "
             "measured (docs/development/liggghts.md); leave out the fines, or compare with a run "
             "at a quarter of the fidelity.timestep_fraction",
         )
