@@ -262,6 +262,7 @@ def written(project: Project, small: dict[str, Any]) -> tuple[Path, dict[str, An
     return project.studies / "rich/study.yaml", small
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RICH)
 def test_a_run_has_another_name_if_its_script_differs(
     written: tuple[Path, dict[str, Any]], name: str
