@@ -57,7 +57,7 @@ def map_spread(values: Floats, errors: Floats, areas: Floats, patch: Ints) -> Ma
         The patch of each facet.
     """
     _, first, at = np.unique(patch, return_index=True, return_inverse=True)
-    area = np.bincount(at, areas)
+    area = np.asarray(np.bincount(at, areas), dtype=np.float64)
     means = np.average(values[:, first], axis=1, weights=area)[:, None]
     if not means.all():
         unknown = Estimate(*[math.nan] * 3)
