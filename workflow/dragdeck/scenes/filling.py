@@ -383,7 +383,7 @@ def bond_numbers(study: Study) -> dict[str, float]:
             sphere_mass(size, kind.density_kg_m3 - displaced)
             for size, kind in zip((radius, far), kinds, strict=True)
         )
-        largest = pull_off_force(slope, effective_modulus(*kinds), reduced)
+        largest = pull_off_force(slope, effective_modulus(kinds[0], kinds[1]), reduced)
         found[f"{one}-{other}"] = largest / (mass * study.gravity_m_s2)
     return found
 
