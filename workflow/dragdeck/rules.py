@@ -344,7 +344,13 @@ class Workflow:
         if place != POINTS:
             yield self.fidelity_option, by_folder(own, scene)
         for plan in (self.plan, self.validation):
-            yield f"--plan {plan}", self.points_by_run(scene.name, plan, leads=True)
+            try:
+                runs = self.points_by_run(scene.name, plan, leads=True)
+            except WorkflowError:  # a plan that does not fit the study matters to its points alone
+                if place == POINTS:
+                    raise
+            else:
+                yield f"--plan {plan}", runs
 
     def _origin(self, place: str, run: str) -> tuple[str, Case]:
         """How to name the cases among which a run is, and its case: a study's before a plan's."""
