@@ -129,7 +129,7 @@ RICH: dict[str, dict[str, Any]] = {
     "line": {
         "media": {"material": "ceramic", "count": 60, "radius_mean_m": 3e-3},
         "workpiece.shape": {
-            "kind": "mesh", "file": "shaft.step", "unit": "mm", "facet_size_m": 0.003,
+            "kind": "mesh", "file": "shaft.step", "unit": "mm", "axis": "+x", "facet_size_m": 0.003,
             "edge_facet_size_m": 0.002},
         "motion.path": LINE,
         "fidelity": {**SOFT, "soft_start": {"youngs_modulus_scale": 1e-3}},
@@ -181,7 +181,7 @@ def with_value(data: Any, name: str, value: Any) -> Any:
     for key in above:
         block = block[int(key) if isinstance(block, list) else key]
     block[int(last) if isinstance(block, list) else last] = value
-    if last == "fraction":  # those of all classes sum to 1
+    if last == "fraction" and "classes" in above:  # those of all classes sum to 1
         (other,) = found["media"]["classes"].keys() - {above[-1]}
         found["media"]["classes"][other][last] = 1 - value
     return found
