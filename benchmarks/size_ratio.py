@@ -226,9 +226,9 @@ def grooves(folder: Path, wall: bool) -> Iterator[dict[str, float]]:
 
 
 def beds(folder: Path) -> Iterator[dict[str, float]]:
-    """Beds of the smallest ratios, at the long step."""
-    for ratio, friction in product(RATIOS[:2], (0.34, 1.0)):
-        fraction = FRACTIONS[1]
+    """Beds of all ratios at the long step, and of the largest one at the short step too."""
+    steps = [(ratio, FRACTIONS[1]) for ratio in RATIOS] + [(RATIOS[-1], FRACTIONS[0])]
+    for (ratio, fraction), friction in product(steps, (0.34, 1.0)):
         name = f"bed-{ratio:g}-{friction:g}-{fraction:g}"
         yield bed(folder / name, ratio, friction, fraction)
 
