@@ -71,7 +71,8 @@ def test_every_key_of_the_configuration_is_in_its_file_and_on_the_page() -> None
 
 def test_every_check_and_warning_is_on_the_page() -> None:
     checks, _, rest = text_of("reference/checks.md").partition("## Warnings")
-    codes, cautions = set(get_args(CheckCode)), set(get_args(CautionCode))
+    codes = set(get_args(CheckCode)) - {"neighbour_builds"}  # of runs of version 0.2
+    cautions = set(get_args(CautionCode))
     assert first_cells(checks.partition("`within_limits` is also")[0]) == codes
     named = {name for name in first_cells(rest) if re.fullmatch("[a-z_]+", name)}
     assert cautions <= named <= cautions | codes

@@ -153,7 +153,7 @@ def test_columns_have_units_and_meanings(project: Path) -> None:
     assert "(" not in run.describe("step")
     meanings = run.describe("azimuth_rad").splitlines()
     assert {line.split(":")[0] for line in meanings} == {
-        *("workpiece_contacts", "chains", "contact_events")
+        *("workpiece_contacts, sphere_contacts", "chains", "contact_events")
     }
     assert all(line.endswith("(rad)") for line in meanings)
     for ask in (run.describe, run.units.__getitem__):
