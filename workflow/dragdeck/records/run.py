@@ -104,7 +104,8 @@ class CaseFile(Document):
     limits : RunLimits or None
         Limits of energy and speed; beyond them the run is stopped. Absent if it is not watched.
     thrown_m_s : float or None
-        Speed of a particle that was thrown, m/s; absent if the speeds are not sampled.
+        Speed of a particle that was thrown, m/s; absent if the speeds are not sampled, or if
+        particles may be squeezed out between workpiece and bowl.
     """
 
     remedy = "write it with: ./run dragdeck step render"

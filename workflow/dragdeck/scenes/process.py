@@ -63,6 +63,7 @@ from dragdeck.scenes.workpiece import (
     check_headroom,
     describe,
     fastest_motion,
+    may_jam,
     process_cautions,
     reference_height,
     simulated_mesh,
@@ -151,6 +152,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
     own = {WORKPIECE_MESH: partial(_stl, each[number])}
     fastest = max(map(_fastest, each, courses))
     limits = bed_limits(study, top, fastest)
+    jam = any(may_jam(body, bed.surface_m) for body in each)
     models = {body.mesh: partial(_stl, one) for one, body in zip(each, moved, strict=True)}
     return Scene(
         deck=deck,
@@ -161,7 +163,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
             courses[number],
             limits,
             steps,
-            thrown_speed(study.gravity_m_s2, top, fastest),
+            None if jam else thrown_speed(study.gravity_m_s2, top, fastest),
         ),
         steps=steps.end - steps.entry,
         facets=sum(counts),
@@ -246,7 +248,7 @@ def _process_case(
     way: Course,
     limits: RunLimits,
     steps: Covered,
-    thrown_m_s: float,
+    thrown_m_s: float | None,
 ) -> ProcessCase:
     case, drag = each[number], way.drag
     study, motion = case.study, case.study.motion

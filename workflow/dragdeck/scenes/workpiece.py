@@ -368,6 +368,12 @@ def _wall_gap(case: Case) -> float:
     return case.study.bowl.radius_m - farthest_surface(case)
 
 
+def may_jam(case: Case, surface_m: float) -> bool:
+    """Whether particles can be squeezed between a workpiece and the bowl, and leave fast."""
+    gaps = clearances(case, surface_m)
+    return in_diameters(case, min(gaps.wall_m, gaps.floor_m)) < _JAMMING_GAP
+
+
 def check_fit(case: Case, surface_m: float, timestep_s: float) -> None:
     """Refuse a workpiece that leaves the bowl, goes through its floor or jumps over particles.
 
