@@ -277,7 +277,7 @@ def test_packings_are_one_removal_with_the_scatter_between_them(tmp_path: Path) 
 
 
 def test_a_run_without_its_wear_is_named(tmp_path: Path) -> None:
-    with pytest.raises(TableError, match=r"no wear\.json: make it with: dragchain loading"):
+    with pytest.raises(TableError, match=r"no wear\.json: make it with: ./run dragchain loading"):
         report(tmp_path, GIVEN, wear=False)
 
 
