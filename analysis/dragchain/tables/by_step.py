@@ -67,7 +67,7 @@ def _command(path: Path) -> str:
     folder = path.parent.parent
     if path.stem == "summary":
         return f"./run report --config study={folder.name}"
-    return f"dragchain {_MADE_BY.get(path.stem, 'tables')} {folder}"
+    return f"./run dragchain {_MADE_BY.get(path.stem, 'tables')} {folder}"
 
 
 def read_groups(
