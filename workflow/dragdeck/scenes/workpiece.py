@@ -448,7 +448,8 @@ def process_cautions(case: Case) -> Iterator[Caution]:
     """What a user should know of the workpiece and its motion before a process runs."""
     study = case.study
     yield from workpiece_warnings(case)
-    left_out = workpiece_facets(case) - len(simulated_mesh(case).faces)
+    of_file = isinstance(study.workpiece.shape, MeshShape)
+    left_out = workpiece_facets(case) - len(simulated_mesh(case).faces) if of_file else 0
     if left_out:
         yield Caution(
             "mesh",
