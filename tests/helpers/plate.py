@@ -57,6 +57,8 @@ fix workpiece all mesh/surface/stress file workpiece.stl type 1 reference_point 
 fix workpiece_wall all wall/gran model {{ law }} mesh n_meshes 1 meshes workpiece store_force yes
 compute workpiece_contacts all wall/gran/local pos id force delta
 fix integrate all nve/sphere
+variable speed_of_particle atom sqrt(vx*vx+vy*vy+vz*vz)
+compute fastest_particle all reduce max v_speed_of_particle
 variable part index 1
 variable reference_x equal f_workpiece[7]
 variable reference_y equal f_workpiece[8]
