@@ -11,7 +11,7 @@ from dragdeck.physics.contact_mechanics import fall_speed, rayleigh_time
 from dragdeck.physics.rounding import timestep
 from dragdeck.records.case import DropTestCase
 from dragdeck.scenes.scene import SceneType, case_of_study, material_table
-from dragdeck.study.base import Json, without
+from dragdeck.study.base import Json, without_fields
 from dragdeck.study.model import Study
 
 _MARGIN = 0.5
@@ -164,10 +164,10 @@ def _content(case: Case) -> Json:
     study = case.study
     particle, plate = study.media.main_material, study.workpiece.material
     return {
-        **without(study.of_runs(), *_NOT_READ),
+        **without_fields(study.of_runs(), *_NOT_READ),
         "materials": {name: study.materials[name].plain() for name in (particle, plate)},
         "pairs": {f"{particle}-{plate}": study.pair(particle, plate).plain()},
-        "media": without(study.media.main.plain(), *_NOT_READ_OF_MEDIA),
+        "media": without_fields(study.media.main.plain(), *_NOT_READ_OF_MEDIA),
     }
 
 

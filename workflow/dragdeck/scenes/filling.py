@@ -61,7 +61,7 @@ from dragdeck.scenes.scene import (
     material_table,
     media_of_run,
 )
-from dragdeck.study.base import Json, without
+from dragdeck.study.base import Json, without_fields
 from dragdeck.study.media import MOST_SIZES, Media
 from dragdeck.study.model import Study
 from dragdeck.study.shapes import SOLID_FRACTION_STD
@@ -507,8 +507,8 @@ _NOT_READ = (
 def _content(case: Case) -> Json:
     """What a filling depends on."""
     study = case.of_filling.study
-    own = without(study.of_runs(study.bowl.material), *_NOT_READ)
-    return {**own, "types": len(study.type_names())}
+    content = without_fields(study.of_runs(study.bowl.material), *_NOT_READ)
+    return {**content, "types": len(study.type_names())}
 
 
 def _impact_speed(case: Case) -> float:

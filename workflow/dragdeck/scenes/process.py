@@ -73,7 +73,7 @@ from dragdeck.scenes.workpiece import (
     workpiece_radius,
     workpiece_reach,
 )
-from dragdeck.study.base import Json, without
+from dragdeck.study.base import Json, without_fields
 from dragdeck.study.contact_law import coefficient_words
 from dragdeck.study.drive import Drive
 from dragdeck.study.model import OF_NO_RUN, Study
@@ -259,7 +259,7 @@ def _process_case(
         ProcessCase,
         case,
         PROCESS.run_id(case),
-        without(study.plain(), *OF_NO_RUN, "fidelities", "fidelity"),
+        without_fields(study.plain(), *OF_NO_RUN, "fidelities", "fidelity"),
         drag.timestep_s,
         bed_rayleigh_time(study),
         settings=study.chosen_fidelity().model_dump(include={"timestep_fraction", "speed_factor"}),
@@ -424,12 +424,14 @@ def _content(case: Case) -> Json:
     """What a process depends on."""
     case = led(case)
     study = case.study
-    own = without(study.of_runs(study.bowl.material, study.workpiece.material), *_NOT_READ)
+    content = without_fields(
+        study.of_runs(study.bowl.material, study.workpiece.material), *_NOT_READ
+    )
     shapes = [one.study.workpiece.shape for one in of_each_workpiece(case)]
     files = [mesh_file(case, shape) for shape in shapes if isinstance(shape, MeshShape)]
     checksums = [file_checksum(file) for file in dict.fromkeys(files)]
     mesh = {"mesh": " ".join(checksums)} if checksums else {}
-    return {**own, "filling": FILLING.run_id(case), **mesh, **_stretches(case)}
+    return {**content, "filling": FILLING.run_id(case), **mesh, **_stretches(case)}
 
 
 PROCESS = SceneType(

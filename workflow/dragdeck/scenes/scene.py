@@ -29,7 +29,7 @@ from dragdeck.records.case import (
     MediaOfRun,
 )
 from dragdeck.records.packing import Packing
-from dragdeck.study.base import Json, flat, without
+from dragdeck.study.base import Json, flat, without_fields
 from dragdeck.study.contact_law import Pair
 from dragdeck.study.model import Study
 
@@ -131,10 +131,10 @@ class SceneType:
         said: dict[str, Any] = {"content": content}
         if self.needs_bed:
             asked = case.advised and case.advised.model_dump(mode="json")
-            values = without(study.plain(), *_NOT_SAID)
+            values = without_fields(study.plain(), *_NOT_SAID)
             said |= {**values, "asked": asked, "assumptions": [dict(one) for one in assumed(study)]}
         else:
-            said |= without(study.plain(), *_NOT_SAID, *_OF_PROCESS)
+            said |= without_fields(study.plain(), *_NOT_SAID, *_OF_PROCESS)
         return digest(said)
 
 

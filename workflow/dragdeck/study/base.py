@@ -116,13 +116,13 @@ def flat(data: Json, prefix: str = "") -> Json:
     return values
 
 
-def without(data: Json, *fields: str) -> dict[str, JsonValue]:
+def without_fields(data: Json, *fields: str) -> dict[str, JsonValue]:
     """Nested mappings without some fields, by their dotted names."""
     kept = {key: value for key, value in data.items() if key not in fields}
     for key, value in kept.items():
         inner = [name.removeprefix(f"{key}.") for name in fields if name.startswith(f"{key}.")]
         if inner and isinstance(value, Mapping):
-            kept[key] = without(value, *inner)
+            kept[key] = without_fields(value, *inner)
     return kept
 
 

@@ -125,11 +125,8 @@ def _crowd(study: Study) -> _Found:
         name: count * media.spheres_of(media.parts[name])
         for name, count in study.class_counts.items()
     }
-    name, total, most = (
-        max(spheres, key=lambda one: spheres[one]),
-        study.sphere_count,
-        known.refused_above,
-    )
+    name = max(spheres, key=lambda part: spheres[part])
+    total, most = study.sphere_count, known.refused_above
     if total <= most or (media.count or 0) > most:
         return
     part = media.parts[name]

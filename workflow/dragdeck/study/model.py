@@ -21,7 +21,7 @@ from dragdeck.study.base import (
     Number,
     Positive,
     Whole,
-    without,
+    without_fields,
 )
 from dragdeck.study.calibration import Calibration
 from dragdeck.study.contact_law import Contact, Pair
@@ -613,7 +613,7 @@ class Study(Model):
         names = {*particles, *materials}
         met = {name: set(name.split("-")) for name in self.pairs}
         return {
-            **without(self.plain(), *OF_NO_RUN, "fidelities"),
+            **without_fields(self.plain(), *OF_NO_RUN, "fidelities"),
             "materials": {
                 name: one.plain() for name, one in self.materials.items() if name in names
             },
