@@ -126,7 +126,7 @@ MADE_BY = {"contacts": "tables", "chains": "chains", "facets": "loading", "event
 def test_a_missing_table_names_its_command(project: Path, name: str, command: str) -> None:
     run = load("small").run("deep")
     (run.folder / "tables" / f"{TABLES[name]}.parquet").unlink()
-    with pytest.raises(TableError, match=f"`dragchain {command} .*process/deep-1`"):
+    with pytest.raises(TableError, match=f"`./run dragchain {command} .*process/deep-1`"):
         getattr(run, name)
     assert f" {TABLES[name]}," not in repr(run)
 
