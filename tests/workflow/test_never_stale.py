@@ -4,7 +4,9 @@ Results are empty files, which Snakemake records as made by its rules; what a ca
 observed in a dry run.
 """
 
+import json
 import os
+import re
 import shutil
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -12,6 +14,7 @@ from typing import Any
 
 import pytest
 import yaml
+from made_run import run_json
 from made_study import put
 from paths import DATA, ROOT
 from snakemake_calls import copy_of_project, jobs, snakemake, succeed
@@ -38,15 +41,18 @@ def restore(file: Path, text: str) -> None:
     os.utime(file, (1e9, 1e9))
 
 
-def let_be_made(folder: Path, target: str) -> None:
-    """Let all outputs of a target be there, as if it had been made."""
-    for line in succeed(folder, target, *STUDY, "--summary").stdout.splitlines():
-        name = line.partition("\t")[0]
-        if name.startswith("results/"):
-            (folder / name).parent.mkdir(parents=True, exist_ok=True)
-            (folder / name).touch()
-    succeed(folder, target, *STUDY, "--touch")
-    assert jobs(folder, target, *STUDY) == set()
+def results_of(folder: Path, *targets: str) -> list[str]:
+    """Names of the files in the results that targets stand on."""
+    lines = succeed(folder, *targets, *STUDY, "--summary").stdout.splitlines()
+    return [name for line in lines if (name := line.partition("\t")[0]).startswith("results/")]
+
+
+def let_be_made(folder: Path, *targets: str) -> None:
+    """Let all outputs of targets be there, as if they had been made."""
+    for name in results_of(folder, *targets):
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).touch()
+    succeed(folder, *targets, *STUDY, "--touch")
 
 
 WAY = "time_s,x_m,y_m\n0,-0.01,0\n1,0.01,0\n"
@@ -70,6 +76,7 @@ def reported(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (study / "way.csv").write_text(WAY)
     (study / "templates/process.in.j2").write_text(TEMPLATE)
     let_be_made(folder, "report")
+    assert jobs(folder, "report", *STUDY) == set()
     return folder
 
 
@@ -118,6 +125,38 @@ def test_what_an_edit_concerns_is_made_again(reported: Path, tmp_path: Path, nam
     change, expected = EDITS[name]
     change(folder)
     assert expected <= jobs(folder, "report", *STUDY)
+
+
+STATES = {
+    "a filling is rendered": "filling/.*/in.liggghts",
+    "it is run": "filling/.*/run.json",
+    "a process is rendered": "process/.*/in.liggghts",
+    "it is run, too": "process/.*/run.json",
+    "it is tabulated": "process/.*/tables/workpiece_force.parquet",
+}
+
+
+def test_an_edit_in_any_state_before_the_report_runs_all(tmp_path: Path) -> None:
+    folder = copy_of_project(tmp_path)
+    names = results_of(folder, "report")
+    planned = jobs(folder, "report", *STUDY)
+    assert FILLING <= planned
+    for state, pattern in STATES.items():
+        let_be_made(folder, *(name for name in names if re.search(pattern, name)))
+        edit(folder, {"seed": 2})
+        assert FILLING <= jobs(folder, "report", *STUDY), state
+        edit(folder, {"seed": 1})
+    assert not jobs(folder, "report", *STUDY) & FILLING - {"write_report"}  # found again
+
+
+def test_runs_of_another_engine_are_named(tmp_path: Path) -> None:
+    folder = copy_of_project(tmp_path)
+    names = results_of(folder, "process")
+    (name,) = (name for name in names if re.fullmatch("results/small/process/[^/]*/run.json", name))
+    (folder / name).parent.mkdir(parents=True)
+    (folder / name).write_text(json.dumps(run_json() | {"engine_version": "3.8.9"}))
+    done = succeed(folder, "process", *STUDY, "--dry-run")
+    assert "LIGGGHTS 3.8.9 made 1 run(s)" in done.stdout + done.stderr
 
 
 def test_a_run_that_the_study_has_no_longer_is_refused(reported: Path, tmp_path: Path) -> None:
