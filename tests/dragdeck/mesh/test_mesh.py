@@ -286,6 +286,12 @@ def test_several_bodies_are_refused():
     assert str(caught.value.value).startswith("2 bodies; the largest has 4 of 8 facets")
 
 
+def test_an_open_body_does_not_hide_that_there_are_several():
+    beside = surfaces.surface(TETRAHEDRON.vertices + np.array([0.02, 0, 0]), TETRAHEDRON.faces[1:])
+    found = problems(both(TETRAHEDRON, beside))
+    assert found == ["the mesh is not closed", "the mesh contains several bodies"]
+
+
 def test_a_hollow_body_is_refused():
     void = surfaces.surface(0.1 * TETRAHEDRON.vertices + 0.001, TETRAHEDRON.faces[:, ::-1])
     assert problems(both(TETRAHEDRON, void)) == ["the mesh contains several bodies"]

@@ -139,7 +139,7 @@ def findings(
     found += _sharp_angles(mesh, sound) + _overlaps(mesh, sound)
     found += _crowded_edges(mesh)
     if workpiece:
-        found += _open_edges(mesh) or _several_bodies(mesh) or _turned_normals(mesh)
+        found += (_open_edges(mesh) + _several_bodies(mesh)) or _turned_normals(mesh)
         found += _merged_nodes(mesh) + _lost_volume(mesh)
     return sorted(found, key=lambda finding: finding.severity)
 
