@@ -11,6 +11,7 @@ import yaml
 from pydantic import JsonValue
 
 from dragdeck.errors import InputError, choices
+from dragdeck.shipped import SHIPPED
 from dragdeck.study.base import DECIMAL, NAME, STUDY_FILE, Json
 from dragdeck.study.media import INSTEAD_OF
 
@@ -140,13 +141,13 @@ def lineage(file: Path) -> list[tuple[Path, Json]]:
     found: list[tuple[Path, Json]] = [(file, read_yaml(file))]
     while (name := found[-1][1].get("extends")) is not None:
         studies, place = file.parent.parent, found[-1][0]
-        base = studies / str(name) / STUDY_FILE
+        base = studies_called(studies, str(name))
         used = {other.parent.name for other, _ in found}
-        known = {other.parent.name for other in studies.glob(f"*/{STUDY_FILE}")} - used
+        known = {other.parent.name for other in studies_called(studies)} - used
         problem = None
-        if not isinstance(name, str) or not NAME.fullmatch(name) or not base.is_file():
+        if not base:
             problem = "extends an unknown study"
-        elif any(base == other for other, _ in found):
+        elif any(base[0] == other for other, _ in found):
             problem = "extends itself"
         if problem:
             raise InputError(
@@ -154,8 +155,16 @@ def lineage(file: Path) -> list[tuple[Path, Json]]:
                 limit=choices(str(name), filter(NAME.fullmatch, sorted(known))),
                 remedy="name another study, or remove the line",
             )  # fmt: skip
-        found.append((base, read_yaml(base)))
+        found.append((base[0], read_yaml(base[0])))
     return found
+
+
+def studies_called(studies: Path, name: str | None = None) -> list[Path]:
+    """The files of the studies of a name, or of all: those of a project before those of dragdeck."""
+    if name is not None and not NAME.fullmatch(name):
+        return []
+    folders = (studies, SHIPPED / "studies")
+    return [file for folder in folders for file in folder.glob(f"{name or '*'}/{STUDY_FILE}")]
 
 
 def study_folders(file: Path) -> tuple[Path, ...]:
@@ -169,7 +178,7 @@ def _folders(file: Path, _changed: int) -> tuple[Path, ...]:
 
 
 def mesh_beside(study: Path, name: str) -> Path:
-    """The file of a mesh: beside the study, in its meshes/, or in the project's meshes/.
+    """The file of a mesh: beside the study, in its meshes/, in the project's or dragdeck's meshes/.
 
     A study that extends another finds its meshes, too.
 
@@ -179,7 +188,7 @@ def mesh_beside(study: Path, name: str) -> Path:
         No such file in any of these places.
     """
     places = [place for one in study_folders(study) for place in (one, one / "meshes")]
-    places.append(study.parent.parent.parent / "meshes")
+    places += dict.fromkeys([study.parent.parent.parent / "meshes", SHIPPED / "meshes"])
     for place in places:
         if (place / name).is_file():
             return place / name
