@@ -63,7 +63,7 @@ COMMANDS = (
             "./run dragdeck preview planetary"),
     Command("init", "make a project outside of a clone",
             "Write a project into a folder: Snakefile, configuration, profiles, the study "
-            "quickstart, and ./run with the commands of a clone. Nothing is overwritten.",
+            "quickstart, and the script run with the commands of a clone. Nothing is overwritten.",
             "new_project:init", (
         Argument("folder", type=Path, metavar="FOLDER", help="folder of the project"),),
             "dragdeck init my-project"),

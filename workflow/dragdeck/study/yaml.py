@@ -160,7 +160,7 @@ def lineage(file: Path) -> list[tuple[Path, Json]]:
 
 
 def studies_called(studies: Path, name: str | None = None) -> list[Path]:
-    """The files of the studies of a name, or of all: those of a project before those of dragdeck."""
+    """The files of the studies of this name, or of all: a project's before those of dragdeck."""
     if name is not None and not NAME.fullmatch(name):
         return []
     folders = (studies, SHIPPED / "studies")
