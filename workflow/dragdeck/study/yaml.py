@@ -141,19 +141,19 @@ def lineage(file: Path) -> list[tuple[Path, Json]]:
     found: list[tuple[Path, Json]] = [(file, read_yaml(file))]
     while (name := found[-1][1].get("extends")) is not None:
         studies, place = file.parent.parent, found[-1][0]
-        base = studies_called(studies, str(name))
-        used = {other.parent.name for other, _ in found}
-        known = {other.parent.name for other in studies_called(studies)} - used
+        base = studies_called(studies, name) if isinstance(name, str) else []
         problem = None
         if not base:
             problem = "extends an unknown study"
         elif any(base[0] == other for other, _ in found):
             problem = "extends itself"
         if problem:
+            used = {other.parent.name for other, _ in found}
+            known = dict.fromkeys(other.parent.name for other in studies_called(studies))
+            names = [word for word in known if NAME.fullmatch(word) and word not in used]
             raise InputError(
                 problem, file=place, field="extends", value=shown(name),
-                limit=choices(str(name), filter(NAME.fullmatch, sorted(known))),
-                remedy="name another study, or remove the line",
+                limit=choices(str(name), names), remedy="name another study, or remove the line",
             )  # fmt: skip
         found.append((base[0], read_yaml(base[0])))
     return found
@@ -164,7 +164,7 @@ def studies_called(studies: Path, name: str | None = None) -> list[Path]:
     if name is not None and not NAME.fullmatch(name):
         return []
     folders = (studies, SHIPPED / "studies")
-    return [file for folder in folders for file in folder.glob(f"{name or '*'}/{STUDY_FILE}")]
+    return [file for of in folders for file in sorted(of.glob(f"{name or '*'}/{STUDY_FILE}"))]
 
 
 def study_folders(file: Path) -> tuple[Path, ...]:

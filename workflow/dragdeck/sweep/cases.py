@@ -303,7 +303,7 @@ def study_file(studies: Path, name: str) -> Path:
     """
     files = studies_called(studies, name)
     if not files:
-        known = sorted({file.parent.name for file in studies_called(studies)})
+        known = dict.fromkeys(file.parent.name for file in studies_called(studies))
         raise InputError(
             f"unknown study {name!a}",
             file=studies,
