@@ -10,7 +10,7 @@ import reference
 import yaml
 from doc_pages import PAGES, template_examples
 from made_scenes import own_template
-from paths import ROOT
+from paths import ROOT, SNAKEFILES
 from pybtex.database import parse_file
 from records import chosen
 
@@ -55,8 +55,9 @@ def section(page: str, start: str, end: str) -> str:
 
 
 def test_every_target_is_on_the_page_and_in_the_usage() -> None:
-    snakefile, usage = (ROOT / "Snakefile").read_text(), (ROOT / "run").read_text()
-    targets = set(re.findall(r"^rule (\w+):", snakefile, re.M)) - INSIDE
+    usage = "".join((ROOT / name).read_text() for name in ("run", "workflow/run.sh"))
+    rules = "".join(file.read_text() for file in SNAKEFILES)
+    targets = set(re.findall(r"^rule (\w+):", rules, re.M)) - INSIDE
     assert first_cells(section("docs/reference/snakemake.md", "## Targets", "\n## ")) == targets
     assert all(re.search(rf"\b{target}\b", usage) for target in targets)
 

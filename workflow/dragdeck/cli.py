@@ -61,6 +61,16 @@ COMMANDS = (
         Argument("--case", metavar="NAME",
                   help="case to draw, as ./run dragdeck cases lists it (default: the first)")),
             "./run dragdeck preview planetary"),
+    Command("init", "make a project outside of a clone",
+            "Write a project into a folder: Snakefile, configuration, profiles, the study "
+            "quickstart, and the script run with the commands of a clone. Nothing is overwritten.",
+            "new_project:init", (
+        Argument("folder", type=Path, metavar="FOLDER", help="folder of the project"),),
+            "dragdeck init my-project"),
+    Command("files", "print the folder of templates and examples",
+            "Print the folder in which this version of dragdeck has its templates, plans, meshes "
+            "and example studies. A project uses its own if it has them.",
+            "shipped:files", ()),
     Command("new", "create a study",
             "Create studies/STUDY/study.yaml, which takes the fields that it does not set from "
             "another study.",

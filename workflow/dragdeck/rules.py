@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import cache, partial
+from importlib.util import find_spec
 from pathlib import Path
 from shlex import quote
 from typing import Any, NoReturn, Protocol, TypeVar
@@ -53,10 +54,6 @@ ENGINE_RUN = "[A-Za-z0-9._-]+-[0-9a-f]{8}"
 FURTHER_WORKPIECE = f"{ENGINE_RUN}[.][0-9]+"
 """A further workpiece of one: its number follows the run's name."""
 
-WINDOWS_RECORD = "workflow/dragdeck/data/windows.json"
-
-_PAGES = "analysis/dragchain"
-
 V = TypeVar("V")
 
 
@@ -71,6 +68,13 @@ class RoundOfRun(Wildcards, Protocol):
     """What a rule knows of a round of windows of a run."""
 
     round: str
+
+
+def _folder_of(package: str) -> Path:
+    """The folder of a package of this project."""
+    spec = find_spec(package)
+    assert spec is not None and spec.origin is not None
+    return Path(spec.origin).parent
 
 
 FromRun = Callable[[Wildcards], V]
@@ -132,14 +136,14 @@ def of_whole_run(place: str, file: str) -> FromRun[str]:
     )
 
 
-def add_records(rules: Iterable[Any]) -> None:
+def add_records(rules: Iterable[Any], environment_file: str = "../envs/python.yaml") -> None:
     """Give each of Snakemake's rules that has a command a log, a benchmark and an environment.
 
     They stand in ``logs/`` and ``benchmarks/`` of the folder of its run or study, and are called
-    like the rule, without the place of its runs.
+    like the rule, without the place of its runs. Rules that have a log already are left alone.
     """
     for rule in rules:
-        if rule.norun:
+        if rule.norun or rule.log:
             continue
         folders, name = str(next(iter(rule.output), "results")).split("/"), rule.name
         depth = 2
@@ -151,7 +155,7 @@ def add_records(rules: Iterable[Any]) -> None:
         rule.log_modifier = rule.benchmark_modifier = rule.output_modifier
         rule.set_log(f"{folder}/logs/{name}.log")
         rule.benchmark = f"{folder}/benchmarks/{name}.tsv"
-        rule.conda_env = "../envs/python.yaml"
+        rule.conda_env = environment_file
         rule.set_params(content=_content_of(list(rule.input), bool(rule.wildcard_names)))
 
 
@@ -287,11 +291,19 @@ class Workflow:
         """The project's files of this pattern."""
         return sorted(map(self.relative, self.project.root.glob(pattern)))
 
-    def page_templates(self, *names: str, package: str = _PAGES) -> list[str]:
+    def page_templates(self, *names: str, package: str = "dragchain") -> list[str]:
         """The templates of a page, with those that all pages are made of."""
-        shared = [f"{_PAGES}/report/{name}.html.j2" for name in ("page", "macros")]
-        own = [f"{package}/{name}" for name in names]
-        return [str(self.project.root / name) for name in (*own, *shared)]
+        shared = [_folder_of("dragchain") / f"report/{name}.html.j2" for name in ("page", "macros")]
+        return [str(file) for file in (*(_folder_of(package) / name for name in names), *shared)]
+
+    def page_files(self, pattern: str) -> list[str]:
+        """The files of this pattern that pages of dragchain are made of."""
+        return sorted(map(self.relative, _folder_of("dragchain").glob(pattern)))
+
+    @property
+    def windows_record(self) -> str:
+        """The record that windows are judged with."""
+        return self.relative(_folder_of("dragdeck") / "data/windows.json")
 
     def if_measured(self, part: str, *files: str) -> list[str]:
         """Files in the folder of the calibration, if the study has this part of it."""

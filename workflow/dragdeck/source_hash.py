@@ -12,8 +12,8 @@ from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
-_PACKAGES = ("dragdeck", "dragchain", "evidence")
-"""The packages of this project."""
+_PACKAGES = ("dragdeck", "dragchain")
+"""The packages that others of this project import."""
 
 
 def source_hash(*modules: str) -> str:

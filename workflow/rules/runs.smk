@@ -155,7 +155,7 @@ checkpoint judge_windows:
         WORK.records_of_round,
         run=of_run("process", "run.json"),
         before=WORK.round_before,
-        record=WINDOWS_RECORD,
+        record=WORK.windows_record,
     output:
         of_run("process", "windows/round-{round}.json"),
     wildcard_constraints:
@@ -174,7 +174,7 @@ rule extrapolate_process:
     input:
         tables_of("process", [*SCENES["process"].tables, *SCENES["process"].network]),
         run=of_run("process", "run.json"),
-        record=WINDOWS_RECORD,
+        record=WORK.windows_record,
         windows=WORK.last_round,
     output:
         of_run("process", "tables/extrapolated.json"),

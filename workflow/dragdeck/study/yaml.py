@@ -11,6 +11,7 @@ import yaml
 from pydantic import JsonValue
 
 from dragdeck.errors import InputError, choices
+from dragdeck.shipped import SHIPPED
 from dragdeck.study.base import DECIMAL, NAME, STUDY_FILE, Json
 from dragdeck.study.media import INSTEAD_OF
 
@@ -140,22 +141,30 @@ def lineage(file: Path) -> list[tuple[Path, Json]]:
     found: list[tuple[Path, Json]] = [(file, read_yaml(file))]
     while (name := found[-1][1].get("extends")) is not None:
         studies, place = file.parent.parent, found[-1][0]
-        base = studies / str(name) / STUDY_FILE
-        used = {other.parent.name for other, _ in found}
-        known = {other.parent.name for other in studies.glob(f"*/{STUDY_FILE}")} - used
+        base = studies_called(studies, name) if isinstance(name, str) else []
         problem = None
-        if not isinstance(name, str) or not NAME.fullmatch(name) or not base.is_file():
+        if not base:
             problem = "extends an unknown study"
-        elif any(base == other for other, _ in found):
+        elif any(base[0] == other for other, _ in found):
             problem = "extends itself"
         if problem:
+            used = {other.parent.name for other, _ in found}
+            known = dict.fromkeys(other.parent.name for other in studies_called(studies))
+            names = [word for word in known if NAME.fullmatch(word) and word not in used]
             raise InputError(
                 problem, file=place, field="extends", value=shown(name),
-                limit=choices(str(name), filter(NAME.fullmatch, sorted(known))),
-                remedy="name another study, or remove the line",
+                limit=choices(str(name), names), remedy="name another study, or remove the line",
             )  # fmt: skip
-        found.append((base, read_yaml(base)))
+        found.append((base[0], read_yaml(base[0])))
     return found
+
+
+def studies_called(studies: Path, name: str | None = None) -> list[Path]:
+    """The files of the studies of this name, or of all: a project's before those of dragdeck."""
+    if name is not None and not NAME.fullmatch(name):
+        return []
+    folders = (studies, SHIPPED / "studies")
+    return [file for of in folders for file in sorted(of.glob(f"{name or '*'}/{STUDY_FILE}"))]
 
 
 def study_folders(file: Path) -> tuple[Path, ...]:
@@ -169,7 +178,7 @@ def _folders(file: Path, _changed: int) -> tuple[Path, ...]:
 
 
 def mesh_beside(study: Path, name: str) -> Path:
-    """The file of a mesh: beside the study, in its meshes/, or in the project's meshes/.
+    """The file of a mesh: beside the study, in its meshes/, in the project's or dragdeck's meshes/.
 
     A study that extends another finds its meshes, too.
 
@@ -179,7 +188,7 @@ def mesh_beside(study: Path, name: str) -> Path:
         No such file in any of these places.
     """
     places = [place for one in study_folders(study) for place in (one, one / "meshes")]
-    places.append(study.parent.parent.parent / "meshes")
+    places += dict.fromkeys([study.parent.parent.parent / "meshes", SHIPPED / "meshes"])
     for place in places:
         if (place / name).is_file():
             return place / name

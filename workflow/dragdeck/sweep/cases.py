@@ -31,7 +31,7 @@ from dragdeck.study.base import NAME, NAME_LIMIT, STUDY_FILE, Json, Model
 from dragdeck.study.check import explained, validate
 from dragdeck.study.model import Tolerance
 from dragdeck.study.search import Search, SearchRecord
-from dragdeck.study.yaml import read_study, read_yaml
+from dragdeck.study.yaml import read_study, read_yaml, studies_called
 
 Settings = Mapping[str, Any]
 """Dotted name of a field to its value."""
@@ -301,16 +301,16 @@ def study_file(studies: Path, name: str) -> Path:
     InputError
         No such study; lists those there are.
     """
-    file = studies / name / STUDY_FILE
-    if not NAME.fullmatch(name) or not file.is_file():
-        known = sorted(found.parent.name for found in studies.glob(f"*/{STUDY_FILE}"))
+    files = studies_called(studies, name)
+    if not files:
+        known = dict.fromkeys(file.parent.name for file in studies_called(studies))
         raise InputError(
             f"unknown study {name!a}",
             file=studies,
             limit=choices(name, filter(NAME.fullmatch, known)),
             remedy=f"choose one of these, or create a folder; its name has {NAME_LIMIT}",
         )
-    return file
+    return files[0]
 
 
 _NEW_STUDY = """\
