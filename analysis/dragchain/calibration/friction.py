@@ -15,6 +15,7 @@ import pandas as pd
 from dragchain.arrays import Floats
 from dragchain.calibration.angles import read_angle
 from dragchain.errors import TableError
+from dragchain.statistics.bed_effects import EffectsFit, fit_effects
 from dragchain.statistics.estimate import CONFIDENCE, Estimate
 from dragdeck.documents import Part
 from dragdeck.files import write_text
@@ -39,15 +40,12 @@ class AngleModel:
     ----------
     ranges : (2, 2) array
         Lower and upper end of friction and rolling friction.
-    factors, covariance : (10,) and (10, 10) array
-    scatter_deg : float
-        Standard deviation of the angles about the polynomial: that of a run, and lack of fit.
+    fit : EffectsFit
+        Factors of its 10 terms; the residuals are those of a run, and lack of fit.
     """
 
     ranges: Floats
-    factors: Floats
-    covariance: Floats
-    scatter_deg: float
+    fit: EffectsFit
 
     @classmethod
     def through(cls, pairs: Floats, angle_deg: Floats, ranges: Floats) -> "AngleModel":
@@ -63,16 +61,13 @@ class AngleModel:
         if spare < _SPARE:
             least = terms.shape[1] + _SPARE
             raise TableError(f"{len(terms)} runs of a measured angle succeeded, not {least}")
-        inverse = np.asarray(np.linalg.inv(terms.T @ terms), dtype=np.float64)
-        factors = inverse @ terms.T @ angle_deg
-        variance = float(((angle_deg - terms @ factors) ** 2).sum() / spare)
-        return cls(ranges, factors, variance * inverse, variance**0.5)
+        return cls(ranges, fit_effects(terms, angle_deg, range(len(terms))))
 
     def at(self, pairs: Floats) -> tuple[Floats, Floats]:
         """Mean angle at (M, 2) pairs of coefficients and its standard uncertainty, degrees."""
         terms = _terms(pairs, self.ranges)
-        variance = ((terms @ self.covariance) * terms).sum(axis=1)
-        return terms @ self.factors, np.sqrt(variance)
+        variance = ((terms @ self.fit.covariance) * terms).sum(axis=1)
+        return terms @ self.fit.effects, np.sqrt(variance)
 
 
 def _terms(pairs: Floats, ranges: Floats) -> Floats:
@@ -205,7 +200,7 @@ def find_friction(known: AnglesFile, runs: pd.DataFrame) -> FrictionFile:
         **dict(known),
         best=(float(posterior.axes[0, i]), float(posterior.axes[1, j])),
         misfit={name: float(one[i, j]) for name, one in posterior.misfit.items()},
-        scatter_deg={name: one.scatter_deg for name, one in models.items()},
+        scatter_deg={name: model.fit.residual_std for name, model in models.items()},
         found={name: posterior.coefficients(name) for name in posterior.weights},
     )
 

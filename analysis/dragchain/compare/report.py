@@ -19,6 +19,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 from pydantic import JsonValue
 
 from dragchain.arrays import Floats
@@ -31,6 +32,7 @@ from dragchain.report.cases import ReportedCase, StudyRuns, cases_of, read_study
 from dragchain.report.page import NETWORK_PAGE, TIMES, render_page, with_interval, write_bundle
 from dragchain.run.basis import QUANTITIES, Quantity, Standing
 from dragchain.run.case import changed_inputs
+from dragchain.statistics.bed_effects import fit_effects
 from dragchain.statistics.estimate import Estimate, flattened, mean_of
 from dragchain.tables.by_step import read_table
 from dragchain.tradeoff.measure_run import MAP_AZIMUTHS, MAP_DEPTHS, loading_along
@@ -194,43 +196,54 @@ def effects_of(
     assumed; numbers are ordered, others are as they come. A packing that all cases share is a
     block. Interactions are left out where too few runs remain for the scatter.
     """
-    from statsmodels.formula.api import ols
-
-    columns = {f"x{k}": _ordered(levels) for k, levels in enumerate(factors.values())}
-    rows = [
-        {"y": standing.run.value, "seed": seed, "case": k}
-        | {name: order[k] for name, (order, _) in columns.items()}
-        for k, one in enumerate(cases)
-        for seed, standing in _standings(one, quantity).items()
+    columns = {name: _ordered(levels) for name, levels in factors.items()}
+    values = [
+        (number, seed, standing.run.value)
+        for number, case in enumerate(cases)
+        for seed, standing in _standings(case, quantity).items()
     ]
-    if len({row["case"] for row in rows}) < len(cases):
+    if len({number for number, *_ in values}) < len(cases):
         return []
-    frame = pd.DataFrame(rows)
-    if not 0.0 < np.ptp(frame["y"]) < math.inf:
+    numbers, seeds, measured = zip(*values, strict=True)
+    if not 0.0 < np.ptp(measured) < math.inf:
         return []
-    shared = all(one.by_seed.keys() == cases[0].by_seed.keys() for one in cases)
-    block = " + C(seed)" if shared and len(cases[0].by_seed) > 1 else ""
+    shared = all(case.by_seed.keys() == cases[0].by_seed.keys() for case in cases)
+    packings = list(dict.fromkeys(seeds))[1:] if shared else []
+    blocks = np.array([[float(seed == packing) for packing in packings] for seed in seeds])
     pairs = list(combinations(columns, 2)) if len(columns) <= _LARGEST_MODEL else []
     singles = [(name,) for name in columns]
     for terms in ([*singles, *pairs], singles):
-        formula = " + ".join(":".join(f"C({name})" for name in term) for term in terms)
-        fit = ols(f"y ~ {formula}{block}", frame).fit()
-        if fit.df_resid >= 1:
+        changes = [change for term in terms for change in _changes(term, columns)]
+        of_cases = np.column_stack([np.ones(len(cases)), *(_at(c, columns) for c in changes)])
+        design = np.hstack([of_cases[list(numbers)], blocks])
+        if np.linalg.matrix_rank(design) == design.shape[1] < len(design):
             break
     else:
         return []
-    exog = pd.DataFrame(fit.model.exog).groupby(frame["case"]).mean()
-    titles = dict(zip(columns, factors, strict=True))
-    found = []
-    for term in terms:
-        for others in product(*(range(1, len(columns[name][1])) for name in term)):
-            test = fit.t_test(_contrast(exog, columns, dict(zip(term, others, strict=True))))
-            names = tuple(titles[name] for name in term)
-            words = [(columns[name][1], other) for name, other in zip(term, others, strict=True)]
-            levels = tuple(f"{labels[0]} to {labels[other]}" for labels, other in words)
-            effect = Estimate(float(test.effect[0]), *map(float, test.conf_int()[0]))
-            found.append(FactorEffect(quantity, names, levels, effect))
-    return found
+    fit = fit_effects(design, np.array(measured), range(len(design)))
+    effects = []
+    for change in changes:
+        weights = np.append(_contrast(of_cases, columns, change), np.zeros(len(packings)))
+        words = tuple(
+            f"{columns[name][1][0]} to {columns[name][1][level]}" for name, level in change.items()
+        )
+        effects.append(FactorEffect(quantity, tuple(change), words, fit.estimate(weights)))
+    return effects
+
+
+_Columns = Mapping[str, tuple[list[int], list[str]]]
+"""The number of each case's level and the names of the levels, by factor."""
+
+
+def _changes(term: Sequence[str], columns: _Columns) -> list[dict[str, int]]:
+    """Every combination of levels of some factors but their first ones."""
+    others = product(*(range(1, len(columns[name][1])) for name in term))
+    return [dict(zip(term, levels, strict=True)) for levels in others]
+
+
+def _at(levels: Mapping[str, int], columns: _Columns) -> NDArray[np.bool_]:
+    """Which cases have these levels, (cases,)."""
+    return np.all([np.equal(columns[name][0], level) for name, level in levels.items()], axis=0)
 
 
 def _ordered(levels: Sequence[JsonValue]) -> tuple[list[int], list[str]]:
@@ -243,16 +256,15 @@ def _ordered(levels: Sequence[JsonValue]) -> tuple[list[int], list[str]]:
     return [known.index(one) for one in levels], [str(one) for one in known]
 
 
-def _contrast(
-    exog: pd.DataFrame, columns: Mapping[str, tuple[list[int], list[str]]], term: Mapping[str, int]
-) -> Floats:
+def _contrast(of_cases: Floats, columns: _Columns, change: Mapping[str, int]) -> Floats:
     """Weights of coefficients: from the first levels to others, averaged over other factors."""
-    weights = np.zeros(exog.shape[1])
-    for ends in product((0, 1), repeat=len(term)):
-        at = {name: other * end for (name, other), end in zip(term.items(), ends, strict=True)}
-        here = np.all([np.equal(columns[name][0], level) for name, level in at.items()], axis=0)
-        weights += (-1) ** (len(term) - sum(ends)) * exog.to_numpy()[here].mean(axis=0)
-    return weights / len(term)  # of an interaction, half
+    weights = np.zeros(of_cases.shape[1])
+    for ends in product((0, 1), repeat=len(change)):
+        levels = {
+            name: level * end for (name, level), end in zip(change.items(), ends, strict=True)
+        }
+        weights += (-1) ** (len(change) - sum(ends)) * of_cases[_at(levels, columns)].mean(axis=0)
+    return weights / len(change)  # of an interaction, half
 
 
 # --- figures -------------------------------------------------------------------------------------

@@ -5,8 +5,7 @@ chance. Runs that start from the same bed are alike to some degree; how much is
 estimated too, so that pairing counts exactly as much as it helps.
 
 How much those have in common is estimated by the restricted likelihood (Patterson and Thompson
-1971, Biometrika 58, 545), which differs with what else is known: `fit_effects` estimates one
-variance of all runs, `dragchain.statistics.power_law` what comes on top of each run's known error.
+1971, Biometrika 58, 545). Runs that share no bed make it ordinary least squares.
 """
 
 import math
@@ -110,9 +109,16 @@ class Whitened:
         return float(np.log(np.diag(self.root)).sum() + np.log(np.abs(np.diag(triangle))).sum())
 
 
+Combination = tuple[tuple[str, Hashable], ...]
+"""Factors and their levels, those of the reference left out."""
+
+_LARGEST_FRACTION = 0.98
+"""Largest fraction of the variance that a bed is allowed to explain."""
+
+
 @dataclass(frozen=True)
-class Effects:
-    """Effects of a linear model with their covariance.
+class EffectsFit:
+    """Effects of settings, with their covariance.
 
     Attributes
     ----------
@@ -120,11 +126,17 @@ class Effects:
     covariance : (P, P) ndarray
     degrees : int
         Degrees of freedom of an interval.
+    residual_std : float
+        Standard deviation of one run about its settings' effects, bed included.
+    bed_fraction : float
+        The part of that variance which runs from the same bed have in common.
     """
 
     effects: Floats
     covariance: Floats
     degrees: int
+    residual_std: float
+    bed_fraction: float
 
     @property
     def quantile(self) -> float:
@@ -140,29 +152,6 @@ class Effects:
     def estimate(self, weights: ArrayLike) -> Estimate:
         """A combination of the effects, weights (P,), with its interval."""
         return t_interval(*self.contrast(weights), self.degrees)
-
-
-Combination = tuple[tuple[str, Hashable], ...]
-"""Factors and their levels, those of the reference left out."""
-
-_LARGEST_FRACTION = 0.98
-"""Largest fraction of the variance that a bed is allowed to explain."""
-
-
-@dataclass(frozen=True)
-class EffectsFit(Effects):
-    """Effects of settings.
-
-    Attributes
-    ----------
-    residual_std : float
-        Standard deviation of one run about its settings' effects, bed included.
-    bed_fraction : float
-        The part of that variance which runs from the same bed have in common.
-    """
-
-    residual_std: float
-    bed_fraction: float
 
 
 def fit_effects(design: Floats, values: Floats, beds: Sequence[Hashable]) -> EffectsFit:

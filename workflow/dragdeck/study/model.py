@@ -476,7 +476,7 @@ class Scaling(Model):
     expected_exponent: Number | None = Field(default=None, description="expected exponent")
     source: str | None = Field(default=None, description="source of the expected exponent")
     fit_range: tuple[Positive, Positive] | None = Field(
-        default=None, description="lowest and highest value at which it is expected; none: all"
+        default=None, description="lowest and highest value of the fit; none: all"
     )
 
     @model_validator(mode="after")
