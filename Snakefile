@@ -59,9 +59,9 @@ rule process:
 rule searched:
     input:
         WORK.needed_advice,
-        WORK.every("process", "run.json", "tables/figures.json", "tables/loading.json"),
+        WORK.every("process", "run.json", "tables/findings.json", "tables/loading.json"),
         WORK.every("process", "tables/extrapolated.json"),
-        WORK.every("filling", "run.json", "tables/figures.json"),
+        WORK.every("filling", "run.json", "tables/findings.json"),
 
 
 # summary.csv, summary.parquet, summary.xlsx and report.html.

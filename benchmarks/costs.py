@@ -112,7 +112,7 @@ def option_case(case: Case, values: Settings, seconds: float) -> Case:
     own = {field: _value(value, case.study) for field, value in values.items()}
     study = settle_case(case.file, data, own).study
     path, name = study.motion.path, study.motion.path.length_field
-    fraction = min(1.0, seconds * study.motion.axis_speed_m_s / study.motion.path_length_m)
+    fraction = min(1.0, seconds * study.motion.nominal_speed_m_s / study.motion.path_length_m)
     length: Json = {
         f"motion.path.{name}": fraction * getattr(path, name),
         "motion.transient_m": 0.0,

@@ -194,7 +194,7 @@ class FinishedRun(RunData):
     def findings(self) -> ProcessFindings:
         """Means, profiles and peaks of a process run, as its report shows them.
 
-        They are read from ``figures.json``, or computed if it does not exist; errors as in
+        They are read from ``findings.json``, or computed if it does not exist; errors as in
         `write_findings`.
         """
         if self.case.scene != "process":

@@ -75,7 +75,7 @@ def _motion(study: Study, speed: float) -> Motion:
     if around is None:
         raise InputError("the map's study drags on a circle", field="motion.path")
     length = min(max(_DRAG_S * speed, _SHORTEST_DRAG_M), _LONGEST_DRAG_REVOLUTIONS * around)
-    motion = study.motion.at(speed / study.motion.axis_speed_m_s, length)
+    motion = study.motion.at(speed / study.motion.nominal_speed_m_s, length)
     return motion.model_copy(update={"transient_m": _TRANSIENT_FRACTION * length})
 
 

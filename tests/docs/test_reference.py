@@ -12,7 +12,6 @@ from doc_pages import PAGES, template_examples
 from made_scenes import own_template
 from paths import ROOT
 from pybtex.database import parse_file
-from records import chosen
 
 import dragchain
 from dragchain.report.page import MINUS

@@ -16,8 +16,8 @@ from rich.table import Table
 
 from dragdeck.advice.advise import advised_settings
 from dragdeck.advice.forecast import advice_file, advice_tables, advised_case, question
-from dragdeck.campaigns.angle_runs import run_angles
-from dragdeck.campaigns.restitution_drops import confirmation, run_drops, sweep
+from dragdeck.calibration_batches.angle_runs import run_angles
+from dragdeck.calibration_batches.restitution_drops import confirmation, run_drops, sweep
 from dragdeck.cases.bed import clump_of
 from dragdeck.cases.case import Case
 from dragdeck.cases.ranks import check_ranks, cores_here
@@ -193,7 +193,7 @@ def _check_tolerance(case: Case, changed_law: Sequence[str]) -> None:
     InputError
         A template changes the contact law of a case whose settings follow from a tolerance.
     """
-    if case.asked and changed_law:
+    if case.requested and changed_law:
         raise located(
             InputError(
                 "the errors of settings are not known for the contact law of a template",

@@ -17,7 +17,7 @@ from uuid import uuid4
 from jsonschema import Draft202012Validator
 from snakemake_interface_common.exceptions import WorkflowError
 
-from dragdeck.campaigns.restitution_drops import record_file
+from dragdeck.calibration_batches.restitution_drops import record_file
 from dragdeck.cases.case import Case, digest
 from dragdeck.decks import RUN_FILE
 from dragdeck.decks.templates import environment, template_files
@@ -39,7 +39,7 @@ from dragdeck.project import (
     study_templates,
 )
 from dragdeck.records.run import RunRecord
-from dragdeck.scenes.lead import FIRST_WINDOWS, led, windows_of, with_leads
+from dragdeck.scenes.lead import FIRST_WINDOWS, windows_of, with_lead, with_leads
 from dragdeck.scenes.process import SCENES
 from dragdeck.study.base import Json
 from dragdeck.study.recorded import recorded_file
@@ -426,7 +426,7 @@ class Workflow:
         """The record of the run from which a run goes on, if there is one."""
 
         def names(wildcards: Wildcards) -> list[str]:
-            lead = led(self.case_of(place, wildcards.run)).lead
+            lead = with_lead(self.case_of(place, wildcards.run)).lead
             if lead is None:
                 return []
             run = SCENES["process"].run_id(lead)
@@ -437,7 +437,7 @@ class Workflow:
     @property
     def needed_advice(self) -> list[str]:
         """The advice of a study in which a case asks for a tolerance; nothing for another one."""
-        return [self.advice] if any(case.asked for case in self.cases) else []
+        return [self.advice] if any(case.requested for case in self.cases) else []
 
     def advice_option(self, _: object = None) -> str:
         """How to name the advice on the command line, if there is or will be one."""

@@ -20,7 +20,7 @@ rule draw_set_up:
 
 rule write_report:
     input:
-        [WORK.every(name, "run.json", "tables/figures.json") for name in SCENES],
+        [WORK.every(name, "run.json", "tables/findings.json") for name in SCENES],
         [WORK.every_table(name) for name in SCENES],
         WORK.every("process", "tables/loading.json"),
         WORK.every("process", "network.html"),

@@ -243,7 +243,8 @@ def _changes(term: Sequence[str], columns: _Columns) -> list[dict[str, int]]:
 
 def _at(levels: Mapping[str, int], columns: _Columns) -> NDArray[np.bool_]:
     """Which cases have these levels, (cases,)."""
-    return np.all([np.equal(columns[name][0], level) for name, level in levels.items()], axis=0)
+    alike = [np.equal(columns[name][0], level) for name, level in levels.items()]
+    return np.asarray(np.all(alike, axis=0))
 
 
 def _ordered(levels: Sequence[JsonValue]) -> tuple[list[int], list[str]]:

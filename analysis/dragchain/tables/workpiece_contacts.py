@@ -18,7 +18,8 @@ from dragchain.arrays import Floats, Ints, places
 from dragchain.errors import TableError
 from dragchain.tables.columns import ATTRACTION, CENTRE, FORCES, POINT, SPIN, VELOCITY
 from dragdeck.dumps.frame import Columns, Frame
-from dragdeck.physics.coulomb import FrictionLimit, within_friction
+from dragdeck.physics.coulomb import within_friction
+from dragdeck.study.contact_law import FrictionLimit
 
 _NORMAL = ("normal_x", "normal_y", "normal_z")
 

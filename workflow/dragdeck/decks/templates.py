@@ -1,14 +1,13 @@
 """The templates of input scripts: what they may use, and whether a study's own fit the project's.
 
-A template is data: it runs in Jinja's sandbox, within limits of time and memory, and each value
-that it inserts passes `quoted`.
+A template is data: it runs in Jinja's sandbox for a limited time, and each value that it
+inserts passes `quoted`.
 """
 
 import contextlib
 import hashlib
 import math
 import re
-import resource
 import signal
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -17,7 +16,6 @@ from pathlib import Path
 from typing import Any
 
 import jinja2
-import psutil
 from jinja2 import nodes
 from jinja2.exceptions import SecurityError
 from jinja2.runtime import BlockReference, Context, Macro
@@ -39,8 +37,8 @@ _SHIPPED = Path(__file__).parents[1] / "data" / "templates.csv"
 _BASE = "base"
 """Prefix of the project's own templates, which a study's may replace."""
 
-_MOST_SECONDS, _MOST_BYTES = 3.0, 2**30
-"""Limits of rendering a script, far above its need: CPU time (s) and memory (bytes)."""
+_MOST_SECONDS = 3.0
+"""Limit of the CPU time of rendering a script, far above its need, s."""
 
 
 _FAILURES: Mapping[type[BaseException], tuple[str, str]] = {
@@ -48,7 +46,7 @@ _FAILURES: Mapping[type[BaseException], tuple[str, str]] = {
         "the template extends or calls itself endlessly",
         'extend "base/<name>" instead',
     ),
-    MemoryError: ("the template requires more memory than allowed", "make it smaller"),
+    MemoryError: ("the template requires more memory than there is", "make it smaller"),
     TimeoutError: (f"the template takes longer than {_MOST_SECONDS:g} s", "make it smaller"),
     SecurityError: (
         "is not allowed: ",
@@ -163,7 +161,7 @@ def _inserted(context: Context, value: object) -> Markup:
 
 @contextlib.contextmanager
 def template_errors(template: Path | str) -> Iterator[None]:
-    """Limit what templates take, and turn what they raise into an error with file and line.
+    """Limit the time of templates, and turn what they raise into an error with file and line.
 
     Parameters
     ----------
@@ -176,7 +174,7 @@ def template_errors(template: Path | str) -> Iterator[None]:
         Whatever went wrong in the template.
     """
     try:
-        with _limited():
+        with _timed():
             yield
     except InputError:
         raise
@@ -201,23 +199,19 @@ def _place(error: Exception, template: Path | str) -> tuple[Path | str, str | No
 
 
 @contextlib.contextmanager
-def _limited() -> Iterator[None]:
-    """Let no template run for ever or fill the memory."""
+def _timed() -> Iterator[None]:
+    """Let no template run for ever: rendering would end without a word."""
 
     def stop(number: int, frame: object) -> None:
         raise TimeoutError
 
-    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
-    most = psutil.Process().memory_info().vms + _MOST_BYTES
     before = signal.signal(signal.SIGVTALRM, stop)
     try:
-        resource.setrlimit(resource.RLIMIT_AS, (most if soft < 0 else min(soft, most), hard))
         signal.setitimer(signal.ITIMER_VIRTUAL, _MOST_SECONDS, 1.0)
         yield
     finally:
         signal.setitimer(signal.ITIMER_VIRTUAL, 0)
         signal.signal(signal.SIGVTALRM, before)
-        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
 
 
 _REFERENCES = (nodes.Extends, nodes.FromImport, nodes.Import, nodes.Include)

@@ -6,13 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
+from dragdeck.arrays import Floats, Ints
 from dragdeck.decks import CASE_FILE, PACKING_FILE
 from dragdeck.decks.outputs import WORKPIECE_FORCE, OutputOfRun
 from dragdeck.engine import log
 from dragdeck.engine.checkpoints import is_whole
 from dragdeck.engine.completeness import coverage, part_files, some_frames
-from dragdeck.physics.contact_mechanics import Floats, stability_number
-from dragdeck.physics.rigid import Ints, RigidBodies, pose
+from dragdeck.physics.contact_mechanics import stability_number
+from dragdeck.physics.rigid import RigidBodies, pose
 from dragdeck.physics.run_limits import SPEED_FACTOR
 from dragdeck.records.case import CaseOfRun
 from dragdeck.records.run import (

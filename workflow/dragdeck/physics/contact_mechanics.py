@@ -8,14 +8,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass
 from functools import partial
-from typing import TypeVar
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dragdeck.arrays import Floats, Ints
 from dragdeck.physics.rigid import Levers, RigidBodies
-from dragdeck.study.shapes import SOLID_FRACTION_ESTIMATE
-from dragdeck.study.workpiece import Material
 
 Size = TypeVar("Size", float, NDArray[np.float64])
 
@@ -23,22 +22,33 @@ COORDINATION_ESTIMATE = 5.0
 """Contacts of a particle in a poured bed with friction, an estimate used only for expectations."""
 
 
-@dataclass(frozen=True)
-class Elastic:
-    """Elastic constants of a material: Young's modulus, Pa, and Poisson's ratio."""
-
-    youngs_modulus_pa: float
-    poissons_ratio: float
+SOLID_FRACTION_ESTIMATE = 0.59
+"""Solid fraction of a poured bed of spheres of about one size, about twelve of them wide, an
+estimate used only for expectations before the bed exists (measured beds replace it)."""
 
 
-def shear_modulus(material: Material | Elastic, scale: float = 1.0) -> float:
+class Material(Protocol):
+    """An elastic material, as a study describes it."""
+
+    @property
+    def youngs_modulus_pa(self) -> float:
+        """Young's modulus, Pa."""
+
+    @property
+    def poissons_ratio(self) -> float:
+        """Poisson's ratio."""
+
+    @property
+    def density_kg_m3(self) -> float:
+        """Density of the solid, kg/m3."""
+
+
+def shear_modulus(material: Material, scale: float = 1.0) -> float:
     """Shear modulus G = E / (2 (1 + nu)), Pa, with E scaled by `scale`."""
     return scale * material.youngs_modulus_pa / (2 * (1 + material.poissons_ratio))
 
 
-def effective_modulus(
-    first: Material | Elastic, second: Material | Elastic, scale: float = 1.0
-) -> float:
+def effective_modulus(first: Material, second: Material, scale: float = 1.0) -> float:
     """Effective modulus of a contact, Pa (Johnson 1985, Contact Mechanics, eq. 4.21 ff.)."""
     compliance = sum(
         (1 - material.poissons_ratio**2) / (scale * material.youngs_modulus_pa)
@@ -56,9 +66,7 @@ def pull_off_force(slope_n_m: float, modulus_pa: float, reduced_radius_m: float)
     return slope_n_m**3 / (12 * modulus_pa**2 * reduced_radius_m)
 
 
-def effective_shear(
-    first: Material | Elastic, second: Material | Elastic, scale: float = 1.0
-) -> float:
+def effective_shear(first: Material, second: Material, scale: float = 1.0) -> float:
     """Effective shear modulus of a contact, Pa: 1 / G* sums (2 - nu) / G (Mindlin 1949)."""
     bodies = (first, second)
     return 1 / sum((2 - body.poissons_ratio) / shear_modulus(body, scale) for body in bodies)
@@ -219,9 +227,6 @@ ENGINE_HARD_PA = 1e9
 
 # --- the contact network of a packing ------------------------------------------------------------
 
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 _TOLERANCE = 1e-3
 """Relative error of the largest eigenvalue, far below its scatter from frame to frame."""

@@ -7,14 +7,14 @@ from typing import Literal
 import numpy as np
 from pydantic import JsonValue, PositiveFloat, PositiveInt
 
+from dragdeck.arrays import Floats, Ints, class_numbers
 from dragdeck.documents import Part, omitted
 from dragdeck.errors import DocumentError, choices
-from dragdeck.physics.contact_mechanics import ContactConstants, Floats
+from dragdeck.physics.contact_mechanics import ContactConstants
 from dragdeck.physics.run_limits import RunLimits
 from dragdeck.records.advised import AdvisedSettings
 from dragdeck.records.run import CaseFile, CountOfRun, RanksOfRun, SettlingCriterion
 from dragdeck.study.drive import PathEntry, SuperposedEntry
-from dragdeck.study.media import Ints, class_numbers
 from dragdeck.study.reference import Reference
 from dragdeck.study.removal import Removal
 

@@ -25,7 +25,7 @@ from dragdeck.errors import InputError
 from dragdeck.mesh.files import stl_text
 from dragdeck.mesh.shapes import tube
 from dragdeck.mesh.surface import surface
-from dragdeck.physics.contact_mechanics import ENGINE_SOFTEST_PA, fall_time
+from dragdeck.physics.contact_mechanics import ENGINE_SOFTEST_PA, SOLID_FRACTION_ESTIMATE, fall_time
 from dragdeck.physics.packing import pour
 from dragdeck.physics.rounding import rounded
 from dragdeck.records.calibration import AngleRun
@@ -34,7 +34,6 @@ from dragdeck.scenes.scene import case_of_study, material_table
 from dragdeck.study.calibration import Drum, Repose
 from dragdeck.study.media import Array
 from dragdeck.study.model import Fidelity, Study
-from dragdeck.study.shapes import SOLID_FRACTION_ESTIMATE
 
 STIFFNESS = 1e4
 """Young's modulus over density, gravity, and radius of the cylinder or drum: soft, but the angles

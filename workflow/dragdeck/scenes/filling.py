@@ -45,7 +45,6 @@ from dragdeck.physics.contact_mechanics import (
     sphere_mass,
     wedge_ratio,
 )
-from dragdeck.physics.coulomb import FrictionLimit
 from dragdeck.physics.domain_split import FilledBowl, Split, rank_warnings, split
 from dragdeck.physics.packing import Bed, Particles, pour, primes, room_to_insert
 from dragdeck.physics.rounding import rounded
@@ -62,6 +61,7 @@ from dragdeck.scenes.scene import (
     media_of_run,
 )
 from dragdeck.study.base import Json, without_fields
+from dragdeck.study.contact_law import FrictionLimit
 from dragdeck.study.media import MOST_SIZES, Media
 from dragdeck.study.model import Study
 from dragdeck.study.shapes import SOLID_FRACTION_STD

@@ -59,7 +59,7 @@ class Covered:
     counted: int
 
 
-def led(case: Case) -> Case:
+def with_lead(case: Case) -> Case:
     """The case with what its process covers, and with its lead, as its fidelity says."""
     study, chosen = case.study, case.study.chosen_fidelity()
     if case.stretch != Stretch():
@@ -73,7 +73,7 @@ def led(case: Case) -> Case:
         return case
     begin = _entry_fraction(study)
     whole = replace(case.all_workpieces, stretch=Stretch(0.0, begin, (begin,)), part=LEAD)
-    lead = replace(whole, study=whole.study.at_start(), asked=None, advised=None)
+    lead = replace(whole, study=whole.study.at_start(), requested=None, advised=None)
     return replace(case, stretch=Stretch(begin), lead=lead)
 
 
@@ -84,7 +84,7 @@ def windows_of(case: Case) -> list[Case]:
     and samples a stretch. Any number of the first ones is spread over the path. Those of a further
     workpiece are those of the run, seen from it.
     """
-    lead, found = led(case.all_workpieces), []
+    lead, found = with_lead(case.all_workpieces), []
     if lead.study.chosen_fidelity().windows is None:
         return []
     study = _window_study(lead.study)
@@ -133,7 +133,7 @@ def covered_fraction(study: Study) -> float:
 
 def with_leads(cases: Iterable[Case]) -> list[Case]:
     """Cases, each after the case of its lead and before its windows."""
-    every = (one for case in cases for one in (led(case).lead, case, *windows_of(case)))
+    every = (one for case in cases for one in (with_lead(case).lead, case, *windows_of(case)))
     return [one for one in every if one is not None]
 
 
@@ -148,7 +148,7 @@ def covered(case: Case, drag: Drive) -> Covered:
     Parameters
     ----------
     case : Case
-        As `led` returns it.
+        As `with_lead` returns it.
     drag : Drive
         The whole drag.
     """
@@ -176,7 +176,7 @@ def stops(case: Case, drag: Drive, steps: Covered, materials: Materials) -> Iter
     Parameters
     ----------
     case : Case
-        As `led` returns it.
+        As `with_lead` returns it.
     drag : Drive
     steps : Covered
     materials : Materials

@@ -112,7 +112,7 @@ def surface_speed(motion: Motion, radius_m: float) -> float:
     radius_m : float
         Of the workpiece.
     """
-    axis = motion.axis_speed_m_s * motion.path.peak_speed_ratio
+    axis = motion.nominal_speed_m_s * motion.path.peak_speed_ratio
     return axis + added_speed(motion, radius_m, 1.0)
 
 
@@ -127,7 +127,7 @@ def added_speed(motion: Motion, radius_m: float, factor: float) -> float:
     factor : float
         On the study's own speeds.
     """
-    turning = motion.path.turning_rad_s if motion.leans else 0.0
+    turning = motion.path.turning_rad_s if motion.inclined else 0.0
     arm = math.hypot(radius_m, deepest(motion))
     moving = motion.superposed(factor).values()
     return turning * factor * arm + sum(one.surface_speed_m_s(radius_m) for one in moving)
@@ -255,7 +255,7 @@ def course(study: Study, bed: Bed, reference_m: float = 0.0) -> Course:
         )
     )
     start = (*plunge_point(motion), clear + reference_m)
-    has_front = isinstance(study.workpiece.shape, MeshShape) or motion.leans
+    has_front = isinstance(study.workpiece.shape, MeshShape) or motion.inclined
     turn = path.direction_rad if has_front else 0.0  # a mesh looks along +x in its own file
     return Course(start_m=start, turn_rad=turn, legs=found, driven=way)
 

@@ -36,7 +36,7 @@ from dragdeck.scenes.filling import (
     partners_in_bed,
     rank_split,
 )
-from dragdeck.scenes.lead import Covered, covered, led, mark_file, stops
+from dragdeck.scenes.lead import Covered, covered, mark_file, stops, with_lead
 from dragdeck.scenes.motion import (
     Course,
     Periods,
@@ -99,7 +99,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         The workpiece does not fit between path and bowl, would reach below the
         floor, or has a mesh that cannot be used.
     """
-    whole = led(case.all_workpieces)
+    whole = with_lead(case.all_workpieces)
     each = of_each_workpiece(whole)
     study, counts = whole.study, [workpiece_facets(one) for one in each]
     fidelity, facets = study.chosen_fidelity(), study.bowl_facet_size_m is not None
@@ -277,7 +277,7 @@ def _process_case(
         numbers=describe(case),
         surface_m=surface_m,
         workpiece=WorkpieceOfRun(
-            kind="mesh" if motion.leans else study.workpiece.shape.kind,
+            kind="mesh" if motion.inclined else study.workpiece.shape.kind,
             radius_m=workpiece_reach(case),
             length_m=workpiece_length(case),
             mesh=WORKPIECE_MESH,
@@ -422,7 +422,7 @@ _NOT_READ = ("drop_test", "fidelity.windows")
 
 def _content(case: Case) -> Json:
     """What a process depends on."""
-    case = led(case)
+    case = with_lead(case)
     study = case.study
     content = without_fields(
         study.of_runs(study.bowl.material, study.workpiece.material), *_NOT_READ

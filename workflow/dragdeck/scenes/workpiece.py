@@ -124,7 +124,7 @@ def reference_height(case: Case) -> float:
 
 def dip(case: Case) -> float:
     """How far a workpiece that leans on its path reaches below its lowest point at the start, m."""
-    if not case.study.motion.path.leans:
+    if not case.study.motion.path.inclined:
         return 0.0
     return max(0.0, *(float(-points[:, 2].min()) for points in _postures(case)))
 
@@ -204,7 +204,7 @@ def simulated_mesh(case: Case) -> "Trimesh":
         A facet reaches from the bed out of the box.
     """
     mesh, motion = workpiece_mesh(case), case.study.motion
-    if motion.path.leans or motion.turns_about_inclined_axis:
+    if motion.path.inclined or motion.turns_about_inclined_axis:
         return mesh
     half_width_m = box_half_width(case.study)
     outside = np.hypot(*mesh.triangles_center[:, :2].T) + farthest_reach(motion) > half_width_m
@@ -245,13 +245,13 @@ def workpiece_radius(case: Case) -> float:
     if isinstance(shape, CylinderShape):
         return cylinder_radius(shape.radius_m, _generated_length(case), shape.facet_size_m)
     mesh, _ = _of_case(case, shape)
-    below = points_below(mesh, mesh.bounds[1, 2] if motion.leans else deepest(motion))
+    below = points_below(mesh, mesh.bounds[1, 2] if motion.inclined else deepest(motion))
     return float(np.hypot(*below[:, :2].T).max())
 
 
 def workpiece_reach(case: Case) -> float:
     """Radius of the upright cylinder about the tip around what is in the bed, m."""
-    if not case.study.motion.leans:
+    if not case.study.motion.inclined:
         return workpiece_radius(case)
     return float(np.hypot(*_in_bed(case)).max())
 
@@ -283,7 +283,7 @@ def _in_bed(case: Case) -> NDArray[np.float64]:
 def fastest_surface(case: Case) -> float:
     """Highest speed of the workpiece's surface in the drag, at the study's own speed, m/s."""
     motion = case.study.motion
-    turns = motion.superposed() or motion.path.leans
+    turns = motion.superposed() or motion.path.inclined
     return surface_speed(motion, workpiece_radius(case) if turns else 0.0)
 
 
@@ -537,7 +537,7 @@ def _up_and_down(case: Case, tip_m: float) -> Iterator[InputError]:
     depth, (low, high) = motion.immersion_depth_m, vertical_range(motion)
     low -= dip(case)
     deepest = min(depth + tip_m - _largest_particle(case), workpiece_length(case))
-    moving = ["path"] if any(path_heights(motion)) or motion.path.leans else []
+    moving = ["path"] if any(path_heights(motion)) or motion.path.inclined else []
     moving += [name for name, one in motion.superposed().items() if one.vertical_reach_m]
     problems = (
         (depth <= deepest < depth - low, "takes the workpiece too deep", deepest - depth),
@@ -657,7 +657,7 @@ def describe(case: Case) -> dict[str, float]:
     motion = study.motion
     speed = fastest_surface(case)
     rate = speed / diameter
-    added = speed / motion.axis_speed_m_s - 1
+    added = speed / motion.nominal_speed_m_s - 1
     superposed = {"superposed_speed": added} if motion.superposed() or added > 1e-9 else {}
     own = weight_acceleration(study)
     optional = {

@@ -188,7 +188,7 @@ def _shape(study: Study) -> _Found:
 def _motion(study: Study) -> _Found:
     """Statistics need a frame of the contact network after all that they leave out."""
     motion, problem = study.motion, "no path is left for the statistics"
-    length, speed = motion.path_length_m, motion.axis_speed_m_s
+    length, speed = motion.path_length_m, motion.nominal_speed_m_s
     frame = speed / study.outputs.network_hz
     if length < frame * (1 - 1e-9):
         problem = "not one frame of the contact network is written during the drag"
@@ -335,7 +335,7 @@ def _signal(study: Study, file: Path) -> Iterator[InputError]:
         field, problem = "reference.signal.low_pass_hz", "the simulated force is sampled too slowly"
         limit = f"at most {most:g} Hz, a fifth of outputs.workpiece_force_hz"
         yield InputError(problem, field=field, value=signal.low_pass_hz, limit=limit)
-    transient_s = motion.uncounted_m / motion.axis_speed_m_s + motion.ramp_s / 2
+    transient_s = motion.uncounted_m / motion.nominal_speed_m_s + motion.ramp_s / 2
     field = "reference.signal.file"
     try:
         measured_signal(recorded_file(signal.file, file, field), signal, transient_s)

@@ -43,7 +43,7 @@ class DrivenMotion:
         start : int
             Step at which the drag begins.
         """
-        length, asked = motion.path_length_m, motion.axis_speed_m_s * speed_factor
+        length, asked = motion.path_length_m, motion.nominal_speed_m_s * speed_factor
         begin = SmoothStart(round(motion.ramp_s / speed_factor / timestep_s))
         steps = max(1, round(length / asked / timestep_s + begin.steps / 2))
         return cls(
@@ -62,7 +62,7 @@ class DrivenMotion:
     @property
     def factor(self) -> float:
         """Its speed over the study's own: about the speed factor."""
-        return self.drive.speed_m_s / self.motion.axis_speed_m_s
+        return self.drive.speed_m_s / self.motion.nominal_speed_m_s
 
     @cached_property
     def superposed(self) -> Mapping[str, SuperposedMotion]:

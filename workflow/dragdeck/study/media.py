@@ -377,11 +377,6 @@ def few_sizes(radii_m: Array) -> Array:
     return np.concatenate([np.full(len(part), np.cbrt((part**3).mean())) for part in parts])
 
 
-def class_numbers(particle_id: Ints, first_ids: Sequence[int]) -> Ints:
-    """Number of the class, from 0, of (N,) particles, whose ids rise from class to class."""
-    return np.searchsorted(first_ids or [1], particle_id, side="right") - 1
-
-
 def _whole_numbers(wanted: Mapping[str, float]) -> dict[str, int]:
     """Whole numbers with the rounded total of all: the largest remainders are rounded up."""
     found = {name: math.floor(number) for name, number in wanted.items()}

@@ -148,9 +148,9 @@ class Motion(Superposed):
             raise ValueError(
                 "counted_from_revolution applies to circles only: this path has no revolutions"
             )
-        if (self.path.turning or self.path.leans) and self.spin is not None:
+        if (self.path.turning or self.path.inclined) and self.spin is not None:
             raise ValueError("spin and waypoints that turn cannot be combined: remove one of them")
-        if self.leans and self.path.most_turned_deg >= _MOST_TURNED_DEG:
+        if self.inclined and self.path.most_turned_deg >= _MOST_TURNED_DEG:
             raise ValueError(
                 f"an inclined workpiece turns by {self.path.most_turned_deg:g} degrees from one "
                 f"waypoint to the next, not by less than {_MOST_TURNED_DEG}: add waypoints"
@@ -169,15 +169,15 @@ class Motion(Superposed):
     def superposed(self, speed_factor: float = 1.0) -> Mapping[str, SuperposedMotion]:
         """What is superposed on the path, the rotation that it gives included."""
         found = super().superposed(speed_factor)
-        if not self.path.turning or self.leans:
+        if not self.path.turning or self.inclined:
             return found
         stages = [SpinStage(until_s=end, rpm=rpm) for end, rpm in self.path.turning]
         return {**found, "spin": Spin(schedule=stages, ramp_s=0.0).faster(speed_factor)}
 
     @property
-    def leans(self) -> bool:
+    def inclined(self) -> bool:
         """Whether the workpiece's axis is ever inclined."""
-        return bool(self.tilt_deg) or self.path.leans
+        return bool(self.tilt_deg) or self.path.inclined
 
     @property
     def turns_about_inclined_axis(self) -> bool:
@@ -185,14 +185,14 @@ class Motion(Superposed):
         return bool(self.tilt_deg) and self.spin is not None
 
     @property
-    def axis_speed_m_s(self) -> float:
+    def nominal_speed_m_s(self) -> float:
         """Speed of the workpiece's axis relative to the bowl, m/s."""
         return self.path.own_speed_m_s or self.speed_m_s or math.nan
 
     @property
     def bowl_rad_s(self) -> float:
         """Angular speed of the bowl about +z, rad/s."""
-        return self.path.bowl_rad_s(self.axis_speed_m_s)
+        return self.path.bowl_rad_s(self.nominal_speed_m_s)
 
     @property
     def path_length_m(self) -> float:
@@ -208,7 +208,7 @@ class Motion(Superposed):
 
     def passed_m(self, time_s: float) -> float:
         """Length of the path after a time, at the end of its start or later, m."""
-        return (max(time_s, self.ramp_s) - self.ramp_s / 2) * self.axis_speed_m_s
+        return (max(time_s, self.ramp_s) - self.ramp_s / 2) * self.nominal_speed_m_s
 
     def turned(self, angle_deg: float) -> "Motion":
         """The same motion turned about the bowl's axis, immersed where the drag begins."""

@@ -227,7 +227,7 @@ def _check_doubles(found: list[Case]) -> None:
     """Refuse two cases of the same content: a value is given twice, perhaps written otherwise."""
     first: dict[str, Case] = {}
     for case in found:
-        same = first.setdefault(f"{case.asked} {case.study.model_dump_json()}", case)
+        same = first.setdefault(f"{case.requested} {case.study.model_dump_json()}", case)
         if same is not case:
             raise InputError(
                 f"a value is given twice: the cases {same.name} and {case.name} are the same",

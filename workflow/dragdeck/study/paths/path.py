@@ -147,7 +147,7 @@ class WorkpiecePath(Model):
         return ()
 
     @property
-    def leans(self) -> bool:
+    def inclined(self) -> bool:
         """Whether it inclines the workpiece."""
         return False
 
@@ -243,7 +243,7 @@ class WorkpiecePath(Model):
         ----------
         drive : Drive
         since : (N,) ndarray of int
-            StepCounts from the start of the drag.
+            Number of steps from the start of the drag.
         point_m, ref_m : (N, 3) ndarray
             The points, and the reference point, at these steps.
 

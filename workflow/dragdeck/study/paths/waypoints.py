@@ -114,12 +114,12 @@ class WaypointsPath(WorkpiecePath):
 
     def plain(self) -> dict[str, JsonValue]:
         """Waypoints have their inclination only if there is any: no run is named anew."""
-        count = 7 if self.leans else 5
+        count = 7 if self.inclined else 5
         shown: list[JsonValue] = [list[JsonValue](point[:count]) for point in self.points]
         return super().plain() | {"points": shown}
 
     @property
-    def leans(self) -> bool:
+    def inclined(self) -> bool:
         """Whether a waypoint has a pitch or a roll."""
         return any(any(point[5:]) for point in self.points)
 
@@ -244,7 +244,7 @@ class WaypointsPath(WorkpiecePath):
 
     def _inclined(self, drive: Drive) -> bool:
         """Whether its rotations are more than turns about the vertical of an upright workpiece."""
-        return self.leans or bool(self.turning and drive.tilt_deg)
+        return self.inclined or bool(self.turning and drive.tilt_deg)
 
     def _orientation(self, time_s: float) -> Floats:
         """Orientation relative to the first waypoint after a recorded time, (3, 3).
@@ -358,9 +358,7 @@ def _chains(
 
 def _by_angles(point: Waypoint, first: Waypoint) -> Floats:
     """Orientation at a waypoint relative to the first one: roll, then pitch, then turn, (3, 3)."""
-    turn, pitch, roll = (
-        math.radians(angle)
-        for angle in (point.turn_deg - first.turn_deg, point.pitch_deg, point.roll_deg)
-    )
-    x, y, z = np.eye(3)
-    return np.asarray(by_vector(turn * z) @ by_vector(pitch * y) @ by_vector(roll * x))
+    from scipy.spatial.transform import Rotation as Turn
+
+    angles = [point.turn_deg - first.turn_deg, point.pitch_deg, point.roll_deg]
+    return np.asarray(Turn.from_euler("ZYX", angles, degrees=True).as_matrix())
