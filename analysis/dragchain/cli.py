@@ -102,7 +102,7 @@ COMMANDS = (
         Argument("--advice", type=Path, metavar="FILE",
                   help="advice.json of ./run dragdeck advise, to compare costs with it"),
         Argument("--preview", type=Path, metavar="FILE",
-                  help="picture of the set-up: set_up.png of ./run dragdeck preview"),
+                  help="picture of the set-up: results/STUDY/set_up.png"),
         Argument("--signal", type=Path, metavar="FILE",
                   help="measured force signal: reference.signal.file of the study"))),
     Command("compare", "compare cases of one study or of several",

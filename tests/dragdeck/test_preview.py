@@ -60,9 +60,10 @@ def test_the_picture_shows_the_workpiece(
 ) -> None:
     assert main(["preview", "small"]) == 0
     said = capsys.readouterr().out
-    for name in ("preview.png", "set_up.png"):
-        file = project.results("small") / name
-        assert str(file) in said and file.is_file()
+    assert str(project.results("small") / "preview.png") in said
+    assert not (project.results("small") / "set_up.png").exists()
+    assert main(["step", "set-up", "small"]) == 0
+    assert (project.results("small") / "set_up.png").is_file()
     image = picture(project)
     assert pixels(image, "workpiece") > 5000
     for name in ("drag", "approach", "plunge"):

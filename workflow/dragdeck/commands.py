@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import product
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import jinja2
 from pydantic import ValidationError
@@ -73,6 +74,9 @@ from dragdeck.study.check import explained, warnings
 from dragdeck.study.contact_law import coefficients, modelled
 from dragdeck.study.yaml import located
 from dragdeck.sweep.cases import new_study
+
+if TYPE_CHECKING:
+    from trimesh import Trimesh
 
 
 def _scene_type(name: str) -> SceneType:
@@ -291,7 +295,7 @@ def preview(study: str, fidelity: str | None, case: str | None) -> None:
     one = _case_named(every, case)
     warnings, refused = _judged(one)
     try:
-        found = layout(one)
+        scene = layout(one)
     except InputError as error:
         raise together([*refused, located(error)]) from None
     particles = ("particles", str(one.study.particle_count))
@@ -299,26 +303,28 @@ def preview(study: str, fidelity: str | None, case: str | None) -> None:
     title = [f"{study}, case {one.name}", *(f"{name}: {text}" for name, text in numbers[:2])]
     if refused:
         title.append(textwrap.fill(f"REFUSED: {str(together(refused)).splitlines()[0]}"))
-    files = _drawn(found, "\n".join(title), bool(refused), project.results(study))
+    file = project.results(study) / "preview.png"
+    file.parent.mkdir(parents=True, exist_ok=True)
+    write_bytes(file, picture(scene, _swept(scene), "\n".join(title), bool(refused)))
     print(f"{study}: case {one.name}" + (f", one of {len(every)} (--case)" if every[1:] else ""))
     for name, text in numbers:
         print(f"  {name}: {text}")
     for warning in warnings:
         print(f"warning: {warning}")
-    print(*files, sep="\n")
+    print(file)
     if refused:
         raise together(refused)
 
 
-def _drawn(found: CaseLayout, title: str, refused: bool, folder: Path) -> list[Path]:
-    """Write the pictures of a layout into a folder and return their files."""
-    swept = [swept_volume(body.mesh, body.drag.poses) for body in found.workpieces]
-    png = picture(found, swept, title, refused)
-    folder.mkdir(parents=True, exist_ok=True)
-    files = [folder / name for name in ("preview.png", "set_up.png")]
-    write_bytes(files[0], png)
-    write_bytes(files[1], small_picture(found, swept))
-    return files
+def _swept(scene: CaseLayout) -> list["Trimesh"]:
+    return [swept_volume(body.mesh, body.drag.poses) for body in scene.workpieces]
+
+
+def set_up(study: str, fidelity: str | None) -> None:
+    """Draw the first case of a study for its report."""
+    project = find_project(Path.cwd())
+    scene = layout(project.cases(study, fidelity)[0])
+    write_bytes(project.results(study) / "set_up.png", small_picture(scene, _swept(scene)))
 
 
 def _case_named(cases: list[Case], name: str | None) -> Case:

@@ -15,7 +15,7 @@ rule draw_set_up:
         fidelity=WORK.fidelity_option,
         source=source_hash("dragdeck.preview.picture"),
     shell:
-        "dragdeck preview {params.study} {params.fidelity} > {log} 2>&1"
+        "dragdeck step set-up {params.study} {params.fidelity} > {log} 2>&1"
 
 
 rule write_report:
