@@ -159,11 +159,11 @@ def _content_of(inputs: Sequence[Any], of_runs: bool) -> Callable[[Any], str]:
     """Checksum of the project's own files among a rule's inputs: a restored file may be older."""
 
     def content(wildcards: Any) -> str:
-        given = [one(wildcards) if callable(one) else one for one in inputs
-                 if not (of_runs and callable(one))]  # fmt: skip
-        names = [name for one in given for name in ([one] if isinstance(one, str) else one)]
-        own = (Path(name) for name in names if not name.startswith(("results/", _HOMES)))
-        return " ".join(file_checksum(file)[:12] for file in own if file.is_file())
+        given = [input_(wildcards) if callable(input_) else input_ for input_ in inputs
+                 if not (of_runs and callable(input_))]  # fmt: skip
+        names = [name for item in given for name in ([item] if isinstance(item, str) else item)]
+        paths = (Path(name) for name in names if not name.startswith(("results/", _HOMES)))
+        return " ".join(file_checksum(file)[:12] for file in paths if file.is_file())
 
     return content
 
@@ -279,8 +279,8 @@ class Workflow:
 
     def _templates_of(self, scene: str) -> list[str]:
         """Every template that a scene's deck is made of."""
-        own = study_templates(self.cases[0])
-        templates = or_stop(environment, self.project.templates, own)
+        folders = study_templates(self.cases[0])
+        templates = or_stop(environment, self.project.templates, folders)
         return [self.relative(file) for file in or_stop(template_files, templates, scene)]
 
     def files(self, pattern: str) -> list[str]:
@@ -290,8 +290,8 @@ class Workflow:
     def page_templates(self, *names: str, package: str = _PAGES) -> list[str]:
         """The templates of a page, with those that all pages are made of."""
         shared = [f"{_PAGES}/report/{name}.html.j2" for name in ("page", "macros")]
-        own = [f"{package}/{name}" for name in names]
-        return [str(self.project.root / name) for name in (*own, *shared)]
+        files = [f"{package}/{name}" for name in names]
+        return [str(self.project.root / name) for name in (*files, *shared)]
 
     def if_measured(self, part: str, *files: str) -> list[str]:
         """Files in the folder of the calibration, if the study has this part of it."""
@@ -336,13 +336,13 @@ class Workflow:
 
     def _origins(self, place: str) -> Iterator[tuple[str, dict[str, Case]]]:
         """Where cases of a folder's runs come from: how to name them, and by run."""
-        scene, own = PLACES[place], self.cases
+        scene, cases = PLACES[place], self.cases
         if place == WINDOWS:
-            own = [window for case in own for window in windows_of(case)]
+            cases = [window for case in cases for window in windows_of(case)]
         elif scene.needs_bed:
-            own = with_leads(own)
+            cases = with_leads(cases)
         if place != POINTS:
-            yield self.fidelity_option, by_folder(own, scene)
+            yield self.fidelity_option, by_folder(cases, scene)
         for plan in (self.plan, self.validation):
             try:
                 runs = self.points_by_run(scene.name, plan, leads=True)

@@ -151,8 +151,12 @@ class Posterior:
             log[name] = -(misfit[name] ** 2) / 2 - np.log(width)
         if len(log) > 1:
             log["both"] = np.sum(list(log.values()), axis=0)
-        found = {name: np.exp(one - one.max()) for name, one in log.items()}
-        return cls(axes, misfit, {name: one / one.sum() for name, one in found.items()})
+        likelihoods = {name: np.exp(logarithm - logarithm.max()) for name, logarithm in log.items()}
+        return cls(
+            axes,
+            misfit,
+            {name: likelihood / likelihood.sum() for name, likelihood in likelihoods.items()},
+        )
 
     def coefficients(self, name: str) -> Coefficients:
         """Means, equal-tailed intervals and correlation."""
@@ -165,7 +169,7 @@ class Posterior:
         away = self.axes - mean[:, None]
         spread = np.sqrt((away**2 * marginal).sum(axis=1))
         length = CONFIDENCE * np.ptp(self.axes, axis=1)
-        first, second = (Estimate(*one) for one in np.column_stack([mean, ends]).tolist())
+        first, second = (Estimate(*row) for row in np.column_stack([mean, ends]).tolist())
         return Coefficients(
             friction=first,
             rolling_friction=second,
@@ -176,12 +180,12 @@ class Posterior:
 
 def angle_models(known: AnglesFile, runs: pd.DataFrame) -> dict[Rig, AngleModel]:
     """The angle of each measurement as a function of the coefficients, from ``angles.csv``."""
-    ranges, found = np.array([known.friction, known.rolling_friction]), {}
+    ranges, models = np.array([known.friction, known.rolling_friction]), {}
     for name in known.measured:
-        own = runs[runs["rig"] == name]
-        pairs = own[["friction", "rolling_friction"]].to_numpy(np.float64)
-        found[name] = AngleModel.through(pairs, own["angle_deg"].to_numpy(np.float64), ranges)
-    return found
+        of_rig = runs[runs["rig"] == name]
+        pairs = of_rig[["friction", "rolling_friction"]].to_numpy(np.float64)
+        models[name] = AngleModel.through(pairs, of_rig["angle_deg"].to_numpy(np.float64), ranges)
+    return models
 
 
 def find_friction(known: AnglesFile, runs: pd.DataFrame) -> FrictionFile:
@@ -199,7 +203,7 @@ def find_friction(known: AnglesFile, runs: pd.DataFrame) -> FrictionFile:
     return FrictionFile(
         **dict(known),
         best=(float(posterior.axes[0, i]), float(posterior.axes[1, j])),
-        misfit={name: float(one[i, j]) for name, one in posterior.misfit.items()},
+        misfit={name: float(misfits[i, j]) for name, misfits in posterior.misfit.items()},
         scatter_deg={name: model.fit.residual_std for name, model in models.items()},
         found={name: posterior.coefficients(name) for name in posterior.weights},
     )
@@ -215,13 +219,13 @@ def write_friction(runs_file: Path, out_dir: Path) -> str:
     """
     known = AnglesFile.read(runs_file)
     runs = pd.DataFrame([read_angle(runs_file.parent / name) for name in known.runs])
-    found = find_friction(known, runs)
+    result = find_friction(known, runs)
     write_text(out_dir / "angles.csv", runs.to_csv(index=False, lineterminator="\n"))
-    found.write(out_dir / "angles.json")
-    last, (friction, rolling) = [*found.found.values()][-1], found.best
+    result.write(out_dir / "angles.json")
+    last, (friction, rolling) = [*result.found.values()][-1], result.best
     ends = [
-        f"{one.ci95_low:.3g} to {one.ci95_high:.3g}"
-        for one in (last.friction, last.rolling_friction)
+        f"{coefficient.ci95_low:.3g} to {coefficient.ci95_high:.3g}"
+        for coefficient in (last.friction, last.rolling_friction)
     ]
     return (
         f"set pairs.{known.pair}.friction: {friction:.3g}, rolling_friction: {rolling:.3g}\n"

@@ -51,12 +51,12 @@ class ComparedCase:
     @cached_property
     def by_seed(self) -> Mapping[JsonValue, StudyRuns]:
         """Its process runs by the seed of their packing."""
-        return {one.process.case.inputs.get("seed"): one for one in self.case.studies}
+        return {study.process.case.inputs.get("seed"): study for study in self.case.studies}
 
     @cached_property
     def load_maps(self) -> Mapping[JsonValue, Floats]:
         """Mean normal load of each packing by depth and azimuth, N."""
-        return {seed: _load_map(one) for seed, one in self.by_seed.items()}
+        return {seed: _load_map(study) for seed, study in self.by_seed.items()}
 
 
 @dataclass(frozen=True)
@@ -102,25 +102,25 @@ class CaseDifference:
 
 def differences(first: ComparedCase, other: ComparedCase) -> list[CaseDifference]:
     """Every quantity that two cases have."""
-    found = []
+    rows = []
     for quantity in QUANTITIES:
-        pair = [one.case.values.of(quantity.name) for one in (first, other)]
+        pair = [case.case.values.of(quantity.name) for case in (first, other)]
         if all(pair):
-            found.append(_difference(quantity, first, other))
-    return found
+            rows.append(_difference(quantity, first, other))
+    return rows
 
 
 def _difference(quantity: Quantity, first: ComparedCase, other: ComparedCase) -> CaseDifference:
-    several = [_standings(one, quantity) for one in (first, other)]
-    corrected = all(one.corrected for packings in several for one in packings.values())
-    before, after = (_mean(one, quantity, corrected) for one in (first, other))
-    own = [
-        {seed: _number(one, corrected).value for seed, one in packings.items()}
+    several = [_standings(case, quantity) for case in (first, other)]
+    corrected = all(standing.corrected for packings in several for standing in packings.values())
+    before, after = (_mean(case, quantity, corrected) for case in (first, other))
+    numbers = [
+        {seed: _number(standing, corrected).value for seed, standing in packings.items()}
         for packings in several
     ]
-    paired = len(own[0]) > 1 and own[0].keys() == own[1].keys()
+    paired = len(numbers[0]) > 1 and numbers[0].keys() == numbers[1].keys()
     if paired:
-        change = mean_of([own[1][seed] - own[0][seed] for seed in own[0]])
+        change = mean_of([numbers[1][seed] - numbers[0][seed] for seed in numbers[0]])
     else:
         half = math.hypot(before.half_width, after.half_width)
         change = Estimate.around(after.value - before.value, half)
@@ -128,17 +128,17 @@ def _difference(quantity: Quantity, first: ComparedCase, other: ComparedCase) ->
     return CaseDifference(other.name, quantity, before, after, change, basis, paired)
 
 
-def _standings(one: ComparedCase, quantity: Quantity) -> dict[JsonValue, Standing]:
-    found = {seed: study.values.of(quantity.name) for seed, study in one.by_seed.items()}
-    return {seed: standing for seed, standing in found.items() if standing}
+def _standings(case: ComparedCase, quantity: Quantity) -> dict[JsonValue, Standing]:
+    standings = {seed: study.values.of(quantity.name) for seed, study in case.by_seed.items()}
+    return {seed: standing for seed, standing in standings.items() if standing}
 
 
 def _number(standing: Standing, corrected: bool) -> Estimate:
     return standing.shown if corrected else standing.run
 
 
-def _mean(one: ComparedCase, quantity: Quantity, corrected: bool) -> Estimate:
-    standing = one.case.values.of(quantity.name)
+def _mean(case: ComparedCase, quantity: Quantity, corrected: bool) -> Estimate:
+    standing = case.case.values.of(quantity.name)
     assert standing is not None
     return _number(standing, corrected)
 
@@ -178,9 +178,11 @@ def factors_of(cases: Sequence[ComparedCase]) -> dict[str, list[JsonValue]]:
 
     Empty unless there are at least two, and every combination of their levels is a case.
     """
-    inputs = [one.case.first.process.case.inputs for one in cases]
+    inputs = [case.case.first.process.case.inputs for case in cases]
     names = {name for other in inputs[1:] for name in changed_inputs(other, inputs[0])} - {"seed"}
-    found = {name: [one.get(name) for one in inputs] for name in sorted(names)}
+    found = {
+        name: [inputs_of_case.get(name) for inputs_of_case in inputs] for name in sorted(names)
+    }
     levels = [{repr(level) for level in column} for column in found.values()]
     combined = {tuple(map(repr, row)) for row in zip(*found.values(), strict=True)}
     crossed = len(combined) == math.prod(map(len, levels)) == len(cases)
@@ -249,12 +251,12 @@ def _at(levels: Mapping[str, int], columns: _Columns) -> NDArray[np.bool_]:
 
 def _ordered(levels: Sequence[JsonValue]) -> tuple[list[int], list[str]]:
     """The number of each case's level, from 0, and what the levels are called."""
-    numeric = all(isinstance(one, int | float) for one in levels)
+    numeric = all(isinstance(item, int | float) for item in levels)
     known: list[JsonValue] = []
-    for level in sorted(levels, key=lambda one: float(str(one))) if numeric else levels:
+    for level in sorted(levels, key=lambda item: float(str(item))) if numeric else levels:
         if level not in known:
             known.append(level)
-    return [known.index(one) for one in levels], [str(one) for one in known]
+    return [known.index(item) for item in levels], [str(item) for item in known]
 
 
 def _contrast(of_cases: Floats, columns: _Columns, change: Mapping[str, int]) -> Floats:
@@ -273,9 +275,9 @@ def _contrast(of_cases: Floats, columns: _Columns, change: Mapping[str, int]) ->
 
 def _load_map(study: StudyRuns) -> Floats:
     """Load map of a run: that from its windows where it has one."""
-    found = study.extrapolated.load_map if study.extrapolated else None
-    if found is not None:
-        return np.array(found.value).reshape(MAP_DEPTHS, MAP_AZIMUTHS)
+    load_map = study.extrapolated.load_map if study.extrapolated else None
+    if load_map is not None:
+        return np.array(load_map.value).reshape(MAP_DEPTHS, MAP_AZIMUTHS)
     return loading_along(study.process.folder, study.process.case, 1)[1]
 
 
@@ -286,12 +288,12 @@ def draw_maps(cases: Sequence[ComparedCase]) -> Figure:
     """
     first, *others = cases
     width = max(12, 88 // len(cases))
-    means = [np.mean([*one.load_maps.values()], axis=0) for one in cases]
+    means = [np.mean([*case.load_maps.values()], axis=0) for case in cases]
     figure, panels = new_panels(4.2, 2 * len(cases), WIDE_IN, len(cases), sharex=True, sharey=True)
     scale = Normalize(0.0, max(float(mean.max()) for mean in means))
-    for axes, one, mean in zip(panels, cases, means, strict=False):
+    for axes, case, mean in zip(panels, cases, means, strict=False):
         drawn = _patches(axes, mean, cmap=force_map(), norm=scale)
-        axes.set_title(fill(one.name, width))
+        axes.set_title(fill(case.name, width))
     figure.colorbar(drawn, ax=panels[: len(cases)], label="normal load (N per patch)")
     panels[len(cases)].set_visible(False)
     panels[0].tick_params(labelbottom=True)
@@ -299,13 +301,13 @@ def draw_maps(cases: Sequence[ComparedCase]) -> Figure:
     largest = max(float(np.abs(change).max()) for change in changes)
     below = panels[len(cases) + 1 :]
     below[0].tick_params(labelleft=True)
-    for axes, one, change in zip(below, others, changes, strict=True):
+    for axes, case, change in zip(below, others, changes, strict=True):
         drawn = _patches(axes, change, cmap="RdBu_r", norm=Normalize(-largest, largest))
-        title = f"{fill(one.name, width)}\nminus the first"
+        title = f"{fill(case.name, width)}\nminus the first"
         axes.set(title=title, xlabel="azimuth from motion")
-        if len(one.load_maps) > 1 and one.load_maps.keys() == first.load_maps.keys():
+        if len(case.load_maps) > 1 and case.load_maps.keys() == first.load_maps.keys():
             _mark_certain(
-                axes, [one.load_maps[seed] - first.load_maps[seed] for seed in first.load_maps]
+                axes, [case.load_maps[seed] - first.load_maps[seed] for seed in first.load_maps]
             )
     figure.colorbar(drawn, ax=below, label="difference (N per patch)")
     for axes in panels[:: len(cases)]:
@@ -345,10 +347,10 @@ def draw_response(
     figure, panels = new_panels(3.4, len(quantities), WIDE_IN)
     for axes, quantity in zip(panels, quantities, strict=True):
         for number, label in enumerate(dict.fromkeys(labels)):
-            here = [k for k, own in enumerate(labels) if own == label]
-            found = [_mean(cases[k], quantity, corrected=False) for k in here]
+            here = [k for k, other in enumerate(labels) if other == label]
+            means = [_mean(cases[k], quantity, corrected=False) for k in here]
             value, low, high = np.array(
-                [(one.value, one.ci95_low, one.ci95_high) for one in found]
+                [(mean.value, mean.ci95_low, mean.ci95_high) for mean in means]
             ).T
             reach = np.nan_to_num([value - low, high - value])
             style: dict[str, Any] = {
@@ -389,16 +391,16 @@ def read_compared(folders: Sequence[Path]) -> list[ComparedCase]:
     studies: dict[str, list[StudyRuns]] = {}
     for folder in folders:
         for run_dir in _process_runs(folder):
-            one = read_study_runs(run_dir)
-            studies.setdefault(one.process.case.study, []).append(one)
+            study_runs = read_study_runs(run_dir)
+            studies.setdefault(study_runs.process.case.study, []).append(study_runs)
     grouped = {study: cases_of(runs) for study, runs in studies.items()}
     cases = [
-        ComparedCase(_name(study, case, len(grouped), len(found)), case)
-        for study, found in grouped.items()
-        for case in found
+        ComparedCase(_name(study, case, len(grouped), len(of_study)), case)
+        for study, of_study in grouped.items()
+        for case in of_study
     ]
     if len(cases) < 2:
-        known = ", ".join(one.name for one in cases)
+        known = ", ".join(case.name for case in cases)
         raise TableError(
             f"a comparison has at least two cases, and this one has only {known}: name another "
             "study, or one with a sweep (packings of one case are one case)"
@@ -432,16 +434,26 @@ def write_comparison(out_dir: Path, folders: Sequence[Path]) -> None:
     cases = read_compared(folders)
     first, *others = cases
     rows = [row for other in others for row in differences(first, other)]
-    by_quantity = {one: [row for row in rows if row.quantity == one] for one in QUANTITIES}
-    notes = Counter(note for one in cases for note in one.case.values.notes)
+    by_quantity = {
+        quantity: [row for row in rows if row.quantity == quantity] for quantity in QUANTITIES
+    }
+    notes = Counter(note for case in cases for note in case.case.values.notes)
     factors = factors_of(cases)
-    measured = [one for one in QUANTITIES if first.case.values.of(one.name)]
+    measured = [quantity for quantity in QUANTITIES if first.case.values.of(quantity.name)]
     effects = (
-        [row for one in measured for row in effects_of(cases, factors, one)] if factors else []
+        [row for quantity in measured for row in effects_of(cases, factors, quantity)]
+        if factors
+        else []
     )
     linked = _write_networks(out_dir, cases)
-    inputs = [one.case.first.process.case.inputs for one in cases]
-    changed = sorted({name for own in inputs[1:] for name in changed_inputs(own, inputs[0])})
+    inputs = [case.case.first.process.case.inputs for case in cases]
+    changed = sorted(
+        {
+            name
+            for inputs_of_case in inputs[1:]
+            for name in changed_inputs(inputs_of_case, inputs[0])
+        }
+    )
 
     def draw() -> dict[str, Figure]:
         figures = {"maps": draw_maps(cases)}
@@ -461,11 +473,15 @@ def write_comparison(out_dir: Path, folders: Sequence[Path]) -> None:
         filters={"relative": _relative, "joined": f" {TIMES} ".join},
         cases=cases,
         rows=rows,
-        by_quantity={one: found for one, found in by_quantity.items() if found},
+        by_quantity={
+            quantity: of_quantity for quantity, of_quantity in by_quantity.items() if of_quantity
+        },
         notes=notes,
         effects=effects,
         linked=linked,
-        changed=[(name, [own.get(name) for own in inputs]) for name in changed],
+        changed=[
+            (name, [inputs_of_case.get(name) for inputs_of_case in inputs]) for name in changed
+        ],
     )
 
 
@@ -475,7 +491,7 @@ def _relative(estimate: Estimate) -> str:
 
 def _table(rows: Sequence[CaseDifference | FactorEffect], *estimates: str) -> pd.DataFrame:
     """Rows as a table, with their estimates in three columns each."""
-    found = []
+    table = []
     for row in rows:
         plain: dict[str, object] = {"quantity": row.quantity.name, "unit": row.quantity.unit}
         if isinstance(row, CaseDifference):
@@ -484,17 +500,17 @@ def _table(rows: Sequence[CaseDifference | FactorEffect], *estimates: str) -> pd
         else:
             plain["factors"] = " x ".join(row.factors)
             plain["levels"] = " x ".join(row.levels)
-        found.append(flattened(plain | {name: getattr(row, name) for name in estimates}))
-    return pd.DataFrame(found)
+        table.append(flattened(plain | {name: getattr(row, name) for name in estimates}))
+    return pd.DataFrame(table)
 
 
 def _write_networks(out_dir: Path, cases: Sequence[ComparedCase]) -> bool:
     """Copy the contact networks of the cases side by side on one page; whether all have one."""
-    files = [one.case.first.process.folder / NETWORK_PAGE for one in cases]
+    files = [case.case.first.process.folder / NETWORK_PAGE for case in cases]
     if not all(file.is_file() for file in files):
         return False
     copies = {f"network-{number}.html": file.read_bytes() for number, file in enumerate(files, 1)}
-    shown = list(zip(copies, (one.name for one in cases), strict=True))
+    shown = list(zip(copies, (case.name for case in cases), strict=True))
     page = render_page("compare/networks.html.j2", shown=shown)
     write_bundle(out_dir, files=copies, pages={"networks": page})
     return True

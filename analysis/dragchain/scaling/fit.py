@@ -120,12 +120,12 @@ def _read_run(folder: Path, field: str) -> RunOfScaling:
 
 def _check_alike(cases: Sequence[CaseOfRun], field: str) -> None:
     first, *others = ({**case.inputs, "fidelity": case.fidelity.model_dump()} for case in cases)
-    for case, own in zip(cases[1:], others, strict=True):
-        changed = changed_inputs(own, first)
+    for case, case_inputs in zip(cases[1:], others, strict=True):
+        changed = changed_inputs(case_inputs, first)
         name = next((name for name in changed if name not in (field, *_UNLIKE)), None)
         if name is not None:
             raise TableError(
-                f"{case.run}: {name} is {own.get(name)!r}, in {cases[0].run} it is "
+                f"{case.run}: {name} is {case_inputs.get(name)!r}, in {cases[0].run} it is "
                 f"{first.get(name)!r}; the runs of a scaling differ in {field} and seed only"
             )
 
@@ -311,14 +311,14 @@ def write_scaling(
     """
     within = (fit_range[0], fit_range[1]) if fit_range else None
     asked = Expectation(exponent=expected, source=source, within=within)
-    found = find(run_dirs, field, asked, [command] if command else [])
+    scaling = find(run_dirs, field, asked, [command] if command else [])
     with drawing():
-        picture = png(draw_scalings([found]))
-    found.write(out_dir / "scaling.json")
-    rows = table(found).to_csv(index=False, float_format="%.6g", lineterminator="\n")
+        picture = png(draw_scalings([scaling]))
+    scaling.write(out_dir / "scaling.json")
+    rows = table(scaling).to_csv(index=False, float_format="%.6g", lineterminator="\n")
     write_text(out_dir / "scaling.csv", rows)
     write_bytes(out_dir / "scaling.png", picture)
-    return said(found)
+    return said(scaling)
 
 
 def table(scaling: ScalingFile) -> pd.DataFrame:
@@ -329,16 +329,18 @@ def table(scaling: ScalingFile) -> pd.DataFrame:
 
 def read_scalings() -> list[ScalingFile]:
     """The scalings that come with the package, those of slow drag first."""
-    found = [ScalingFile.read(file) for file in _STORED.glob("*.json")]
+    scalings = [ScalingFile.read(file) for file in _STORED.glob("*.json")]
     place = {name: number for number, name in enumerate(_ORDER)}
-    return sorted(found, key=lambda one: (place.get(one.study, len(_ORDER)), one.study))
+    return sorted(
+        scalings, key=lambda scaling: (place.get(scaling.study, len(_ORDER)), scaling.study)
+    )
 
 
-def said(found: ScalingFile) -> str:
+def said(scaling: ScalingFile) -> str:
     """What a scaling says in words, one remark per line."""
     words = page_environment().get_template("scaling/words.html.j2").module
-    statement, remarks = (str(getattr(words, name)(found)) for name in ("statement", "remarks"))
-    lines = [f"{found.field}: {statement.strip()}"]
+    statement, remarks = (str(getattr(words, name)(scaling)) for name in ("statement", "remarks"))
+    lines = [f"{scaling.field}: {statement.strip()}"]
     lines += [f"  {line}" for line in remarks.splitlines() if line]
     return html.unescape("\n".join(lines))
 
@@ -360,24 +362,24 @@ def draw_scalings(scalings: Sequence[ScalingFile]) -> Figure:
     width = (0.72 if len(scalings) == 1 else 1.2) * WIDTH_IN
     height = 3.35 * math.ceil(len(scalings) / 2) + 0.55
     figure, panels = new_panels(height, len(scalings), width, 2)
-    for axes, found in zip(panels, scalings, strict=True):
-        label, unit, factor = found.axis
+    for axes, scaling in zip(panels, scalings, strict=True):
+        label, unit, factor = scaling.axis
         axes.set(xscale="log", yscale="log", ylabel="mean drag force magnitude (N)")
-        axes.set(xlabel=f"{label} ({unit})" if unit else label, title=_title(found))
-        _law(axes, found, factor)
-        _points(axes, found, factor)
-        _ticks(axes, found, factor)
+        axes.set(xlabel=f"{label} ({unit})" if unit else label, title=_title(scaling))
+        _law(axes, scaling, factor)
+        _points(axes, scaling, factor)
+        _ticks(axes, scaling, factor)
     return legend_below(figure)
 
 
-def _title(found: ScalingFile) -> str:
-    exponent, expected = found.fit.exponent, found.expected.exponent
+def _title(scaling: ScalingFile) -> str:
+    exponent, expected = scaling.fit.exponent, scaling.expected.exponent
     value, low, high = (
         f"{round(number, 2) + 0.0:.2f}"
         for number in (exponent.value, exponent.ci95_low, exponent.ci95_high)
     )
     words = f"exponent {value} ({low} to {high})"
-    return words if expected is None else f"{words}, expected {expected:g}: {found.verdict}"
+    return words if expected is None else f"{words}, expected {expected:g}: {scaling.verdict}"
 
 
 def _law(axes: Axes, scaling: ScalingFile, factor: float) -> None:
@@ -394,13 +396,13 @@ def _law(axes: Axes, scaling: ScalingFile, factor: float) -> None:
         axes.plot(x, slope, "--", color=ORANGE, lw=1.4, label="expected slope")
 
 
-def _points(axes: Axes, found: ScalingFile, factor: float) -> None:
-    levels = [level for level in found.levels if level.runs > 1]
+def _points(axes: Axes, scaling: ScalingFile, factor: float) -> None:
+    levels = [level for level in scaling.levels if level.runs > 1]
     x = [factor * level.x for level in levels]
     means = [level.drag_n for level in levels]
     axes.plot(x, means, "_", ms=17, mew=2.0, color=INK, label="mean per level")
-    x = [factor * place for place in _beside(found.runs)]
-    drag, error = zip(*((run.drag_n, run.standard_error_n) for run in found.runs), strict=True)
+    x = [factor * place for place in _beside(scaling.runs)]
+    drag, error = zip(*((run.drag_n, run.standard_error_n) for run in scaling.runs), strict=True)
     label = "run, ± standard error"
     axes.errorbar(x, drag, error, color=INK, fmt="o", mfc="white", zorder=3, label=label)
 
@@ -412,9 +414,9 @@ def _beside(runs: Sequence[ScaledRun]) -> list[float]:
     return [run.level * (1.0 + _SIDEWAYS * (beds.index(run.bed) - middle)) for run in runs]
 
 
-def _ticks(axes: Axes, found: ScalingFile, factor: float) -> None:
+def _ticks(axes: Axes, scaling: ScalingFile, factor: float) -> None:
     """Every level on the horizontal axis, round numbers on the vertical."""
-    levels = [factor * level.x for level in found.levels]
+    levels = [factor * level.x for level in scaling.levels]
     axes.set_xlim(levels[0] / _PAD, levels[-1] * _PAD)
     low, high = axes.get_ylim()
     stretch = max(1.0, math.sqrt(_LEAST_SPAN * low / high))

@@ -70,14 +70,14 @@ class Whitened:
     def of(cls, design: Floats, values: Floats, covariance: Floats) -> "Whitened":
         """Whiten a design (N, P) and values (N,) by their covariance (N, N)."""
         root = np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
-        left, right = (np.linalg.solve(root, one) for one in (design, values))
+        left, right = (np.linalg.solve(root, part) for part in (design, values))
         return cls(root, np.asarray(left), np.asarray(right))
 
     @cached_property
     def effects(self) -> Floats:
         """The effects by least squares, (P,)."""
-        found = np.linalg.lstsq(self.design, self.values, rcond=None)[0]
-        return np.asarray(found, dtype=np.float64)
+        solution = np.linalg.lstsq(self.design, self.values, rcond=None)[0]
+        return np.asarray(solution, dtype=np.float64)
 
     @cached_property
     def residuals(self) -> Floats:
@@ -196,8 +196,8 @@ def _best_fraction(design: Floats, values: Floats, same_bed: Floats) -> float:
         model = Whitened.of(design, values, correlation(same_bed, fraction))
         return model.log_determinants + 0.5 * model.degrees * math.log(max(model.square, 1e-300))
 
-    found = minimize_scalar(loss, bounds=(0.0, _LARGEST_FRACTION), method="bounded")
-    return float(found.x) if found.fun < loss(0.0) else 0.0
+    optimum = minimize_scalar(loss, bounds=(0.0, _LARGEST_FRACTION), method="bounded")
+    return float(optimum.x) if optimum.fun < loss(0.0) else 0.0
 
 
 @dataclass(frozen=True)
@@ -226,8 +226,8 @@ class Factors:
 
     def _terms(self, setting: Mapping[str, Hashable]) -> list[Combination]:
         """The columns that are 1 for a setting, besides the first."""
-        own = tuple((f, setting[f]) for f in self.reference if setting[f] != self.reference[f])
-        return [(pair,) for pair in own] if self.additive else [own] * bool(own)
+        changed = tuple((f, setting[f]) for f in self.reference if setting[f] != self.reference[f])
+        return [(pair,) for pair in changed] if self.additive else [changed] * bool(changed)
 
     def row(self, setting: Mapping[str, Hashable]) -> Floats:
         """Row of the design matrix for some settings, (1 + columns,)."""

@@ -46,7 +46,7 @@ class Bodies:
             raise TableError(
                 f"step {spheres.step}: the spheres of particles are not those of case.json"
             )
-        parts = [_moving(spheres, one) for one in self.case.bodies]
+        parts = [_moving(spheres, body) for body in self.case.bodies]
         return Frame(
             spheres.step,
             {name: np.concatenate([part[name] for part in parts]) for name in parts[0]},
@@ -157,6 +157,6 @@ def _sum(at: Ints, values: Floats, count: int) -> Floats:
 
 
 def _largest(at: Ints, count: int, values: Floats) -> Floats:
-    found = np.full(count, -np.inf)
-    np.maximum.at(found, at, values)
-    return found
+    largest = np.full(count, -np.inf)
+    np.maximum.at(largest, at, values)
+    return largest

@@ -165,10 +165,10 @@ def join_workpiece_frames(
     TableError
         If the frames are of different steps, or a particle comes twice in one.
     """
-    for one, other in zip(particles, contacts, strict=True):
-        if one.step != other.step:
+    for particle, other in zip(particles, contacts, strict=True):
+        if particle.step != other.step:
             raise TableError(
-                f"the next step of workpiece_particles is {one.step}, but that of "
+                f"the next step of workpiece_particles is {particle.step}, but that of "
                 f"workpiece_contacts is {other.step}: both must be written with the same period"
             )
     frames = (*particles, *contacts)
@@ -190,16 +190,16 @@ def join_workpiece_frames(
     unplaced = np.ones(len(known), dtype=np.bool_)
     unplaced[_rows_of(touching, pushed)[1]] = False
     placed, mesh = _place(touching, pushed, above), _on(touching)
-    own = mesh == meshes.workpiece
+    facing = mesh == meshes.workpiece
     return WorkpieceFrames(
         np.array([frame.step for frame in particles]),
         np.array([frame.opening for frame in particles]),
-        placed.select(own),
+        placed.select(facing),
         placed.select(mesh == meshes.bowl),
-        touching.ids("particle_id")[own] // above,
+        touching.ids("particle_id")[facing] // above,
         pushed.vectors(*FORCES)[unplaced],
         known[unplaced] // above,
-        written - int(np.count_nonzero(own)),
+        written - int(np.count_nonzero(facing)),
     )
 
 
@@ -284,13 +284,13 @@ def _heads(particle_id: Ints, body: Ints, points: Floats, patch_m2: Floats) -> I
 
     The contacts of a particle with a body follow each other, deepest first.
     """
-    own = np.arange(len(points))
+    positions = np.arange(len(points))
     new = np.r_[True, (np.diff(particle_id) != 0) | np.diff(body)][: len(points)]
-    rank = own - np.maximum.accumulate(np.where(new, own, 0))
-    head = own.copy()
+    rank = positions - np.maximum.accumulate(np.where(new, positions, 0))
+    head = positions.copy()
     for place in range(1, rank.max(initial=0) + 1):
         for ahead in range(place, 0, -1):
-            rows = np.flatnonzero((rank == place) & (head == own))
+            rows = np.flatnonzero((rank == place) & (head == positions))
             others = rows - ahead
             apart = np.square(points[rows] - points[others]).sum(axis=1)
             inside = (head[others] == others) & (apart <= patch_m2[others])
