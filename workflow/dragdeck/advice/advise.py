@@ -99,7 +99,7 @@ class Work:
             expected_surface(study) / motion.plunge_speed_m_s + way / motion.approach_speed_m_s
         )
         process_s = entry_s + motion.path_length_m / motion.nominal_speed_m_s + motion.ramp_s / 2
-        facets = sum(workpiece_facets(one) for one in of_each_workpiece(case))
+        facets = sum(workpiece_facets(workpiece) for workpiece in of_each_workpiece(case))
         return cls(study, tradeoff, expected_time(study), process_s, entry_s, facets)
 
     def steps(self, fidelity: Fidelity, windows: int = 0) -> float:
@@ -123,8 +123,8 @@ class Work:
                     "timestep_fraction": fidelity.windows.timestep_fraction,
                 }
             )
-            own = self.study.model_copy(update={"fidelity": stiff})
-            steps += windows * self._steps(own, window_fraction(study) * drag_s)
+            stiffer = self.study.model_copy(update={"fidelity": stiff})
+            steps += windows * self._steps(stiffer, window_fraction(study) * drag_s)
         return steps
 
     def cpu_time(self, fidelity: Fidelity, windows: int = 0) -> float:
@@ -236,8 +236,8 @@ def consistent(case: Case) -> Fidelity:
 def _remedies(case: Case) -> Iterator[Mapping[str, float]]:
     """What checks that a case's settings do not pass take; the next one may need less after it."""
     stable = stable_step_cautions(case, surely=True)
-    found = chain(filling_cautions(case), process_cautions(case), stable)
-    yield from (one.settings for one in found if one.settings)
+    cautions = chain(filling_cautions(case), process_cautions(case), stable)
+    yield from (caution.settings for caution in cautions if caution.settings)
 
 
 def _with(case: Case, **settings: float | str | SoftStart) -> Case:
@@ -416,7 +416,9 @@ def advised_settings(case: Case, requested: Tolerance, tradeoff: TradeoffRecord)
         )
     finest = finest_drop(case, tradeoff)
     good = [
-        one for one in drop_options(case, tradeoff) if (one.error or 0.0) <= requested.tolerance
+        option
+        for option in drop_options(case, tradeoff)
+        if (option.error or 0.0) <= requested.tolerance
     ]
     if good:
         return Advice(requested, min(good, key=lambda option: option.relative_cost), finest)

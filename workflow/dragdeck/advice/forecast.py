@@ -80,7 +80,9 @@ def _forecast(case: Case, role: str, option: Option, results: Path) -> OptionEnt
     about_drop = option.drop_timestep_fraction is not None
     for kind in [DROP_TEST] if about_drop else [FILLING, PROCESS]:
         runs = with_leads([chosen]) if kind is PROCESS else [chosen]
-        scenes = (kind.build(one, None) for one in runs if one.rank_of_window <= FIRST_WINDOWS)
+        scenes = (
+            kind.build(member, None) for member in runs if member.rank_of_window <= FIRST_WINDOWS
+        )
         speeds = measured_speeds(results / kind.name)
         costs = [expected_cost(kind, scene, speeds) for scene in scenes]
         steps[kind.name] = sum(cost.steps for cost in costs)

@@ -40,7 +40,7 @@ def commands(deck: str) -> Iterator[EngineCommand]:
 
 
 def _commands(text: str, within: str) -> Iterator[EngineCommand]:
-    words = [next(filter(None, found), "") for found in _WORD.findall(text)]
+    words = [next(filter(None, groups), "") for groups in _WORD.findall(text)]
     if words:
         yield EngineCommand(text, words, within)
         for inner in _inner(words):

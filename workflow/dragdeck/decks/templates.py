@@ -97,7 +97,7 @@ def environment(project: Path, study: Path | None = None) -> jinja2.Environment:
             jinja2.PrefixLoader({_BASE: jinja2.FileSystemLoader(str(project))}),
         ]
     )
-    found = _Sandbox(
+    sandbox = _Sandbox(
         loader=loader,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
@@ -107,12 +107,12 @@ def environment(project: Path, study: Path | None = None) -> jinja2.Environment:
         finalize=_inserted,
     )
     for name in _TRUSTING:
-        del found.filters[name]
-    found.filters.update(num=exact_number, nums=numbers, comment=comment)
+        del sandbox.filters[name]
+    sandbox.filters.update(num=exact_number, nums=numbers, comment=comment)
     if folders and study is not None:
         with template_errors(study):
-            _check_own(found, study, project)
-    return found
+            _check_own(sandbox, study, project)
+    return sandbox
 
 
 def exact_number(value: float) -> str:
@@ -225,8 +225,8 @@ def used(templates: jinja2.Environment, *names: str) -> list[str]:
     InputError
         One of them names a template that there is not.
     """
-    found = list(names)
-    for current in found:
+    used_names = list(names)
+    for current in used_names:
         for node in _parsed(templates, current).find_all(_REFERENCES):
             for name in _named(node):
                 if not _is_there(templates, name):
@@ -237,9 +237,9 @@ def used(templates: jinja2.Environment, *names: str) -> list[str]:
                         field=f"line {node.lineno}",
                         remedy=remedy,
                     )
-                if name not in found:
-                    found.append(name)
-    return found
+                if name not in used_names:
+                    used_names.append(name)
+    return used_names
 
 
 def _named(reference: nodes.Node) -> list[str]:
@@ -292,9 +292,9 @@ def own_blocks(templates: jinja2.Environment, name: str) -> list[str]:
 
 def without_block(templates: jinja2.Environment, name: str, block: str) -> jinja2.Environment:
     """The same templates, but one of them does not override a block."""
-    found = templates.overlay()
-    found.get_template(name).blocks.pop(block)
-    return found
+    copy = templates.overlay()
+    copy.get_template(name).blocks.pop(block)
+    return copy
 
 
 def edited(templates: jinja2.Environment, names: Iterable[str]) -> list[str]:
@@ -357,17 +357,17 @@ def _check_own(templates: jinja2.Environment, study: Path, project: Path) -> Non
     files = {str(file.relative_to(study)) for file in study.rglob("[!.]*") if file.is_file()}
     known = {str(file.relative_to(project)) for file in project.rglob("*.j2")}
     reached = set(used(templates, *sorted(files & known)))
-    found = [
+    problems = [
         InputError("no input script uses this file", file=study / name, limit=choices(name, known))
         for name in sorted(files - reached)
     ]
     for name in sorted(known):
         if (study / name).is_dir() or ((study / name).is_symlink() and not (study / name).exists()):
-            found.append(InputError("this is not a file", file=study / name))
+            problems.append(InputError("this is not a file", file=study / name))
     for name in sorted(files & reached):
-        found += _idle_parts(templates, name)
-    if found:
-        raise together(found)
+        problems += _idle_parts(templates, name)
+    if problems:
+        raise together(problems)
 
 
 def _idle_parts(templates: jinja2.Environment, name: str) -> Iterator[InputError]:

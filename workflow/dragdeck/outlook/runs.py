@@ -120,12 +120,12 @@ class StudyRun:
 
 def alike_but_for_seed(runs: Mapping[Path, Case]) -> list[dict[Path, Case]]:
     """Runs by their folders, those that differ in the seed alone together: they cost the same."""
-    found: dict[str, dict[Path, Case]] = {}
+    groups: dict[str, dict[Path, Case]] = {}
     for folder, case in runs.items():
         but_for_the_seed = case.study.model_copy(update={"seed": 0}).model_dump_json()
         covers = with_lead(case).stretch
-        found.setdefault(f"{but_for_the_seed} {covers.end - covers.begin:.6f}", {})[folder] = case
-    return list(found.values())
+        groups.setdefault(f"{but_for_the_seed} {covers.end - covers.begin:.6f}", {})[folder] = case
+    return list(groups.values())
 
 
 def written(kind: SceneType, scene: StudyScene) -> tuple[dict[str, OutputOfRun], int]:
@@ -199,7 +199,7 @@ def time_left(runs: Sequence[StudyRun], cores: int) -> float:
 def done_fraction(runs: Sequence[StudyRun]) -> float:
     """How much of the expected CPU time of runs is behind them."""
     work = [run.cost.wall_time_s * run.ranks for run in runs]
-    done = sum(run.fraction * one for run, one in zip(runs, work, strict=True))
+    done = sum(run.fraction * share for run, share in zip(runs, work, strict=True))
     return done / sum(work) if sum(work) else 1.0
 
 

@@ -311,12 +311,18 @@ def stability_number(
     if rigid is not None:
         of_bodies = np.append(1 / rigid.mass_kg, 0.0)
         inverse_mass = of_bodies[owner]
-    own = np.zeros(len(radius_m), dtype=np.int64) if classes is None else classes
+    number = np.zeros(len(radius_m), dtype=np.int64) if classes is None else classes
     laws = np.array(
-        [[(*astuple(one), damping_ratio(one.restitution)) for one in row] for row in constants]
+        [
+            [
+                (*astuple(pair_constants), damping_ratio(pair_constants.restitution))
+                for pair_constants in row
+            ]
+            for row in constants
+        ]
     )
-    partner = np.append(own, len(constants))[bodies[1]]  # the bowl comes after the classes
-    modulus, shear, _, friction, ratio = laws[own[bodies[0]], partner].T
+    partner = np.append(number, len(constants))[bodies[1]]  # the bowl comes after the classes
+    modulus, shear, _, friction, ratio = laws[number[bodies[0]], partner].T
     contact_radius = np.sqrt(overlap / curvature[bodies].sum(axis=0))
     stiffness = np.stack([2 * modulus, 8 * shear * (friction > 0)]) * contact_radius
     damping = 2 * math.sqrt(5 / 6) * ratio * np.sqrt(stiffness / inverse_mass[bodies].sum(axis=0))

@@ -150,13 +150,13 @@ def room_to_insert(reaches_m: Floats, bowl_radius_m: float) -> float:
 
 def primes(seed: int, count: int) -> list[int]:
     """Different primes above 10000, as LIGGGHTS wants its seeds."""
-    found: list[int] = []
+    numbers: list[int] = []
     candidate = int(np.random.default_rng(seed).integers(10_000, 10_000_000))
-    while len(found) < count:
+    while len(numbers) < count:
         candidate += 1
         if all(candidate % divisor for divisor in range(2, math.isqrt(candidate) + 1)):
-            found.append(candidate)
-    return found
+            numbers.append(candidate)
+    return numbers
 
 
 def _sites(count: int, bowl_radius_m: float, largest_m: float) -> Floats:

@@ -200,7 +200,7 @@ def _drum(study: Study, rig: Drum) -> _Placed:
     ring = (radius - size) * np.stack([np.cos(angle), np.sin(angle)])
     radii = np.random.default_rng(study.seed).permutation(bed_radii(study))
     step = 2.01 * float(radii.max())
-    x, z_free = (np.arange(step / 2 - one, one - step / 2, step) for one in (radius, half))
+    x, z_free = (np.arange(step / 2 - length, length - step / 2, step) for length in (radius, half))
     sites = np.stack(np.meshgrid(x, x, z_free)).reshape(3, -1).T
     sites = sites[np.hypot(*sites[:, :2].T) < radius - 2 * size - step / 2]
     if len(sites) < len(radii) or not len(rows):

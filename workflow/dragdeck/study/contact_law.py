@@ -256,16 +256,16 @@ def added_forces(law: Sequence[str]) -> list[str]:
     if not gran or "model" not in words[:-1]:
         return [" ".join(words)]
     normal, *models = words[words.index("model") + 1 :]
-    found = [] if normal in _PUSHING else [normal]
+    forces = [] if normal in _PUSHING else [normal]
     named = dict(pairwise(models))
     if named.get("cohesion", "off") != "off":
-        found.append(f"cohesion {named['cohesion']}")
+        forces.append(f"cohesion {named['cohesion']}")
     if named.get("tangential_reduce", "off") != "off":
-        found.append("tangential_reduce on")
+        forces.append("tangential_reduce on")
     rows = (row.model for row in coefficients().values() if row.attraction)
     law_words = f"{' '.join(words)} "
-    found += [model for model in rows if f"{model} " in law_words and model not in found]
-    return found
+    forces += [model for model in rows if f"{model} " in law_words and model not in forces]
+    return forces
 
 
 def modelled(law: Iterable[str]) -> set[str]:

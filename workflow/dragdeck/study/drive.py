@@ -295,8 +295,8 @@ class Rotation:
     @property
     def matrices(self) -> Floats:
         """The rotations as matrices, (N, 3, 3)."""
-        own = np.eye(3) if self.own is None else self.own
-        columns = np.moveaxis(np.broadcast_to(own, (len(self.turn_rad), 3, 3)), -1, 0)
+        matrix = np.eye(3) if self.own is None else self.own
+        columns = np.moveaxis(np.broadcast_to(matrix, (len(self.turn_rad), 3, 3)), -1, 0)
         return np.stack([rotated(column, self.turn_rad) for column in columns], axis=-1)
 
     @property
@@ -314,8 +314,8 @@ class Rotation:
 
     def into(self, vectors: Floats) -> Floats:
         """Vectors of the bowl's frame, (N, 3), in the workpiece's own."""
-        found = rotated(vectors, -self.turn_rad)
-        return found if self.own is None else np.einsum("nji,nj->ni", self.own, found)
+        turned = rotated(vectors, -self.turn_rad)
+        return turned if self.own is None else np.einsum("nji,nj->ni", self.own, turned)
 
 
 # --- a quantity in stages: one value after another, the last of which stays ----------------------

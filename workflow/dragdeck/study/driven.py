@@ -126,11 +126,11 @@ class DrivenMotion:
         point_m, ref_m : (N, 3) ndarray
             The points, and the reference point, after these steps, m.
         """
-        found = self.motion.path.velocity(self.drive, since, point_m, ref_m)
+        velocity = self.motion.path.velocity(self.drive, since, point_m, ref_m)
         before = self._by_path(since, self.directions(since, ref_m[:, :2]))
         for one in self.superposed.values():
-            found = found + one.velocity(self.drive, since, point_m - ref_m, before)
-        return found
+            velocity = velocity + one.velocity(self.drive, since, point_m - ref_m, before)
+        return velocity
 
     @property
     def bowl_rad_s(self) -> float:

@@ -84,8 +84,12 @@ class Superposed(Model):
 
     def superposed(self, speed_factor: float = 1.0) -> Mapping[str, SuperposedMotion]:
         """What is superposed on the path, by the name of its block, at this factor on speeds."""
-        found = {name: getattr(self, name) for name in Superposed.model_fields}
-        return {name: one.faster(speed_factor) for name, one in found.items() if one is not None}
+        motions = {name: getattr(self, name) for name in Superposed.model_fields}
+        return {
+            name: motion.faster(speed_factor)
+            for name, motion in motions.items()
+            if motion is not None
+        }
 
 
 AnyPath = CirclePath | FigureEightPath | LinePath | RestPath | WaypointsPath
@@ -168,11 +172,11 @@ class Motion(Superposed):
 
     def superposed(self, speed_factor: float = 1.0) -> Mapping[str, SuperposedMotion]:
         """What is superposed on the path, the rotation that it gives included."""
-        found = super().superposed(speed_factor)
+        motions = super().superposed(speed_factor)
         if not self.path.turning or self.inclined:
-            return found
+            return motions
         stages = [SpinStage(until_s=end, rpm=rpm) for end, rpm in self.path.turning]
-        return {**found, "spin": Spin(schedule=stages, ramp_s=0.0).faster(speed_factor)}
+        return {**motions, "spin": Spin(schedule=stages, ramp_s=0.0).faster(speed_factor)}
 
     @property
     def inclined(self) -> bool:
@@ -203,7 +207,7 @@ class Motion(Superposed):
     def uncounted_m(self) -> float:
         """Length of the drag before the statistics begin, m: what is superposed has started."""
         whole = (self.path.revolution_m or 0.0) * ((self.counted_from_revolution or 1) - 1)
-        starts = (self.passed_m(one.ramp_s) for one in self.superposed().values())
+        starts = (self.passed_m(motion.ramp_s) for motion in self.superposed().values())
         return max(self.transient_m, whole, self.passed_m(self.ramp_s), *starts)
 
     def passed_m(self, time_s: float) -> float:
@@ -584,21 +588,23 @@ class Study(Model):
             self.model_copy(
                 update={
                     "workpiece": self.workpiece.model_copy(
-                        update={"shape": one.shape or self.workpiece.shape}
+                        update={"shape": station.shape or self.workpiece.shape}
                     ),
-                    "motion": self.motion.turned(one.angle_deg),
+                    "motion": self.motion.turned(station.angle_deg),
                     "workpieces": None,
                 }
             )
-            for one in self._stations
+            for station in self._stations
         ]
 
     @property
     def _stations(self) -> Sequence[Station]:
         """The workpieces of the carousel; none where one stands as the study gives it."""
-        found = self.workpieces.stations if self.workpieces else ()
-        differ = len(found) > 1 or any(one.angle_deg or one.shape for one in found)
-        return found if differ else ()
+        stations = self.workpieces.stations if self.workpieces else ()
+        differ = len(stations) > 1 or any(
+            station.angle_deg or station.shape for station in stations
+        )
+        return stations if differ else ()
 
     def absent(self) -> set[str]:
         """The carousel, too, where it has one workpiece as the study gives it."""
@@ -615,7 +621,7 @@ class Study(Model):
         return {
             **without_fields(self.plain(), *OF_NO_RUN, "fidelities"),
             "materials": {
-                name: one.plain() for name, one in self.materials.items() if name in names
+                name: material.plain() for name, material in self.materials.items() if name in names
             },
             "pairs": {
                 "-".join(sorted(both)): self.pairs[name].plain()

@@ -110,7 +110,9 @@ def _composed(content: bytes) -> yaml.Node:
 
 
 def _studies_nearby(file: Path) -> str:
-    names = sorted(found.parent.name for found in file.parent.parent.glob(f"*/{STUDY_FILE}"))
+    names = sorted(
+        study_file.parent.name for study_file in file.parent.parent.glob(f"*/{STUDY_FILE}")
+    )
     return f"choose one of: {', '.join(names)}" if names else "check the path"
 
 
@@ -123,8 +125,8 @@ def read_study(file: Path) -> dict[str, JsonValue]:
         As of `read_yaml` and `lineage`.
     """
     data: dict[str, JsonValue] = {}
-    for _, own in reversed(lineage(file)):
-        data = _merged(data, own)
+    for _, content in reversed(lineage(file)):
+        data = _merged(data, content)
     data.pop("extends", None)
     return data
 
@@ -178,7 +180,7 @@ def mesh_beside(study: Path, name: str) -> Path:
     InputError
         No such file in any of these places.
     """
-    places = [place for one in study_folders(study) for place in (one, one / "meshes")]
+    places = [place for folder in study_folders(study) for place in (folder, folder / "meshes")]
     places.append(study.parent.parent.parent / "meshes")
     for place in places:
         if (place / name).is_file():
@@ -197,26 +199,26 @@ _WHOLE = ("fidelity", "sweep")
 """Blocks that a study takes or replaces as a whole."""
 
 
-def _merged(base: Json, own: Json, top: bool = True) -> dict[str, JsonValue]:
+def _merged(base: Json, changes: Json, top: bool = True) -> dict[str, JsonValue]:
     """A study's content with another's changes.
 
     A part of another `kind` is replaced, and ``null`` leaves out a part of the base. A ``null``
     with nothing to leave out stays: only fields that may be empty accept it. Alternatives of the
     media give way to each other.
     """
-    replaced = {name for key in own for name in INSTEAD_OF.get(key, ())}
-    found = {key: value for key, value in base.items() if key not in replaced}
-    for key, value in own.items():
-        there = found.get(key)
-        if value is None and key in found:
-            del found[key]
+    replaced = {name for key in changes for name in INSTEAD_OF.get(key, ())}
+    merged = {key: value for key, value in base.items() if key not in replaced}
+    for key, value in changes.items():
+        there = merged.get(key)
+        if value is None and key in merged:
+            del merged[key]
         elif isinstance(value, dict) and not (top and key in _WHOLE):
             if not isinstance(there, dict) or value.get("kind") not in (None, there.get("kind")):
                 there = {}
-            found[key] = _merged(there, value, top=False)
+            merged[key] = _merged(there, value, top=False)
         else:
-            found[key] = value
-    return found
+            merged[key] = value
+    return merged
 
 
 def located(error: InputError) -> InputError:
