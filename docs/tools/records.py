@@ -69,14 +69,14 @@ def _rows(part: Any, keys: Sequence[str] = ()) -> Iterator[dict[str, JsonValue]]
     if isinstance(part, list):
         for item in part:
             yield from _rows(item, keys)
-    elif part and all(isinstance(one, dict) for one in part.values()):
+    elif part and all(isinstance(entry, dict) for entry in part.values()):
         for name, item in part.items():
             yield from ({"name": name, **row} for row in _rows(item, keys))
     elif keys:
         above = {key: value for key, value in part.items() if key != keys[0]}
         for row in _rows(part[keys[0]], keys[1:]):
             yield {**_flat(above, lists=False), **row}
-    elif part and all(isinstance(one, list) for one in part.values()):
+    elif part and all(isinstance(entry, list) for entry in part.values()):
         yield from pd.DataFrame(part).to_dict("records")
     else:
         yield _flat(part)
@@ -85,11 +85,11 @@ def _rows(part: Any, keys: Sequence[str] = ()) -> Iterator[dict[str, JsonValue]]
 def _flat(part: Json, lists: bool = True) -> dict[str, JsonValue]:
     """The values of nested objects, their keys joined by ``_``."""
     flat: dict[str, JsonValue] = {}
-    for key, one in part.items():
-        if isinstance(one, dict):
-            flat |= {f"{key}_{inner}": value for inner, value in _flat(one, lists).items()}
-        elif lists or not isinstance(one, list):
-            flat[key] = one
+    for key, entry in part.items():
+        if isinstance(entry, dict):
+            flat |= {f"{key}_{inner}": value for inner, value in _flat(entry, lists).items()}
+        elif lists or not isinstance(entry, list):
+            flat[key] = entry
     return flat
 
 
@@ -173,8 +173,8 @@ LARGE = 2
 def change(value: float, low: float, high: float, form: str = "") -> str:
     """A relative change and its interval in per cent; n.s. if that includes zero."""
 
-    def percent(one: float) -> str:
-        text = f"{100 * one:+{form or ('.0f' if abs(one) >= 0.0995 else '.1f')}}"
+    def percent(fraction: float) -> str:
+        text = f"{100 * fraction:+{form or ('.0f' if abs(fraction) >= 0.0995 else '.1f')}}"
         return text if float(text) else text[1:]
 
     if pd.isna(low):

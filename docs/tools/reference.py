@@ -116,11 +116,11 @@ def columns() -> str:
             parts["In several tables"].append([*cells, listed])
         else:
             parts.setdefault(listed, []).append(cells)
-    found = (
+    made_tables = (
         (name, markdown_table(heads[: len(table_rows[0])], table_rows))
         for name, table_rows in parts.items()
     )
-    return "\n\n".join(f"### {name}\n\n{table}" for name, table in found)
+    return "\n\n".join(f"### {name}\n\n{table}" for name, table in made_tables)
 
 
 def _braced(names: Sequence[str]) -> str:

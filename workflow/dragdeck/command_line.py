@@ -111,8 +111,8 @@ def _once(value: Any) -> Any:
     if not isinstance(value, list) or not all(isinstance(item, Path) for item in value):
         return value
     first: dict[Path, Path] = {}
-    for one in value:
-        first.setdefault(one.resolve(), one)
+    for path in value:
+        first.setdefault(path.resolve(), path)
     return list(first.values())
 
 

@@ -179,8 +179,8 @@ class _Findings:
         if len(refused) == len(cases):
             self.errors += refused[:1]
             return
-        for one in refused:
-            text = f"{one.field}: {one.problem}; such a setting is not run, but infeasible"
+        for problem in refused:
+            text = f"{problem.field}: {problem.problem}; such a setting is not run, but infeasible"
             self.warnings[text] = ["search"]
 
     def show(self, verbose: bool) -> None:

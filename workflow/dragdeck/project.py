@@ -93,7 +93,7 @@ class Project:
         """
         file = Path(plan) if plan.endswith(".yaml") else self.plans / f"{plan}.yaml"
         if not NAME.fullmatch(file.stem) or not file.is_file():
-            known = sorted(found.stem for found in self.plans.glob("*.yaml"))
+            known = sorted(plan_path.stem for plan_path in self.plans.glob("*.yaml"))
             raise InputError(
                 f"no such plan: {plan!a}",
                 file=self.plans,

@@ -145,8 +145,8 @@ class Posterior:
         pairs = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
         misfit, log = dict[Rig, Floats](), dict[str, Floats]()
         for name, model in models.items():
-            (angle, own), (mean, std) = measured[name], model.at(pairs)
-            width = np.hypot(std, own).reshape(GRID, GRID)
+            (angle, reading_error), (mean, std) = measured[name], model.at(pairs)
+            width = np.hypot(std, reading_error).reshape(GRID, GRID)
             misfit[name] = (angle - mean.reshape(GRID, GRID)) / width
             log[name] = -(misfit[name] ** 2) / 2 - np.log(width)
         if len(log) > 1:

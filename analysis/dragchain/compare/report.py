@@ -180,13 +180,13 @@ def factors_of(cases: Sequence[ComparedCase]) -> dict[str, list[JsonValue]]:
     """
     inputs = [case.case.first.process.case.inputs for case in cases]
     names = {name for other in inputs[1:] for name in changed_inputs(other, inputs[0])} - {"seed"}
-    found = {
+    levels_by_name = {
         name: [inputs_of_case.get(name) for inputs_of_case in inputs] for name in sorted(names)
     }
-    levels = [{repr(level) for level in column} for column in found.values()]
-    combined = {tuple(map(repr, row)) for row in zip(*found.values(), strict=True)}
+    levels = [{repr(level) for level in column} for column in levels_by_name.values()]
+    combined = {tuple(map(repr, row)) for row in zip(*levels_by_name.values(), strict=True)}
     crossed = len(combined) == math.prod(map(len, levels)) == len(cases)
-    return found if len(found) > 1 and crossed else {}
+    return levels_by_name if len(levels_by_name) > 1 and crossed else {}
 
 
 def effects_of(

@@ -160,9 +160,11 @@ def band_actions(
         excess = means.cumsum(axis=-1)[..., :-1] - even
         return np.concatenate([means, excess, even], axis=-1) / seconds
 
-    found, count = estimates(sums, statistic), len(area_m2)
-    return found[:count], [
-        replace(one, ci95_low=one.ci95_low - error, ci95_high=one.ci95_high + error)
-        for one, of in zip(found[count:], found[2 * count - 1 :], strict=False)
+    sums_and_means, count = estimates(sums, statistic), len(area_m2)
+    return sums_and_means[:count], [
+        replace(estimate, ci95_low=estimate.ci95_low - error, ci95_high=estimate.ci95_high + error)
+        for estimate, of in zip(
+            sums_and_means[count:], sums_and_means[2 * count - 1 :], strict=False
+        )
         for error in [_AREA_ERROR * of.value]
     ]

@@ -174,7 +174,7 @@ def read_shown(series: FrameSeries) -> Shown:
         kept, chain = _near(network, data.workpiece[0]), membership.contacts
         place = np.where(kept, np.cumsum(kept) - 1, -1)
         bodies = BODIES + data.contacts["b_id"].to_numpy(np.int64)
-        found = data.contacts.assign(
+        shown = data.contacts.assign(
             frame=number,
             a=place[network.a],
             b=np.where(network.between_particles(), place[network.b], bodies),
@@ -183,7 +183,7 @@ def read_shown(series: FrameSeries) -> Shown:
             + DOMINANT * chain["dominant"],
         )
         particles.append(data.particles[kept].assign(frame=number))
-        contacts.append(found[(found["a"] >= 0) & (found["b"] >= 0)])
+        contacts.append(shown[(shown["a"] >= 0) & (shown["b"] >= 0)])
         turn = Quaternion.from_matrix(data.workpiece[1].matrices[0]).as_quat()
         poses.append([*data.workpiece[0], *turn])
         most = max(most, kept.size)

@@ -435,4 +435,4 @@ def _confirmation(findings: SearchFindings, number: int) -> list[SearchPoint]:
     values = {**soft.values, "fidelity": studied.search.confirm}
     full = soft.model_copy(update={"values": values, "refused": studied.refusal(values)})
     known = [known_point.values for known_point in findings.points]
-    return [one for one in (soft, full) if one.values not in known]
+    return [option for option in (soft, full) if option.values not in known]

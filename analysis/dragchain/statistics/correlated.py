@@ -276,11 +276,11 @@ def estimates(
     with np.errstate(divide="ignore", invalid="ignore"):
         values = statistic(means)
         series = centred @ _slopes(sums, means, statistic)
-        found = [
+        mean_estimates = [
             estimate_mean(column, confidence=confidence) if np.isfinite(column).all() else None
             for column in series.T
         ]
-        reach = [mean.ci95_high - mean.mean if mean else np.nan for mean in found]
+        reach = [mean.ci95_high - mean.mean if mean else np.nan for mean in mean_estimates]
         shares = np.nan_to_num(centred.T @ series / np.sum(series**2, axis=0))
         moves = (shares * reach).T
         low, high = (
@@ -289,7 +289,7 @@ def estimates(
         beyond = np.maximum(low - values, values - high) > _ROUNDING * np.abs(values)
     low, high = (np.where(beyond, np.nan, end) for end in (low, high))
     few = ((least == 0.0) & (np.abs(moves) > LARGEST_REACH * means)).any(axis=1)
-    reliable = [mean is not None and mean.reliable for mean in found] & ~few
+    reliable = [mean is not None and mean.reliable for mean in mean_estimates] & ~few
     ends = zip(values.tolist(), low.tolist(), high.tolist(), reliable.tolist(), strict=True)
     return [Estimate(*end, reliable=sure) for *end, sure in ends]
 

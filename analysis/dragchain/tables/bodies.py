@@ -118,7 +118,7 @@ def _moving(spheres: Frame, size: BodiesOfRun) -> Columns:
     )
     centre, turned = pose(np.array(size.offsets_m), places)
     arm, spin = places.mean(axis=1) - centre, spin[:, 0]
-    found = {
+    motion = {
         CENTRE: centre,
         VELOCITY: velocity.mean(axis=1) - np.cross(spin, arm),
         SPIN: spin,
@@ -128,7 +128,7 @@ def _moving(spheres: Frame, size: BodiesOfRun) -> Columns:
         "particle_id": size.first_id + np.arange(size.count),
         "radius_m": np.full(size.count, size.radius_m),
     }
-    for names, values in found.items():
+    for names, values in motion.items():
         columns |= dict(zip(names, values.T, strict=True))
     return columns
 

@@ -241,10 +241,10 @@ def _within_friction(
     overlap = np.asarray(contacts.columns["overlap_m"][loud], dtype=np.float64)
     on_bowl = _on(contacts)[loud] == bowl
     ids = contacts.ids("particle_id")[loud] % above
-    of_class = [one.at(ids, ids) for one in friction]
+    of_class = [class_limit.at(ids, ids) for class_limit in friction]
     limit = np.where(on_bowl, of_class[1].friction, of_class[0].friction)
     attraction = np.zeros(contacts.rows)
-    both = (one.attraction_n(radius, overlap) for one in of_class)
+    both = (class_limit.attraction_n(radius, overlap) for class_limit in of_class)
     attraction[loud] = np.where(~on_bowl, *both)
     forces[loud], _ = within_friction(forces[loud], normal[loud], limit, attraction[loud])
     added = (*FORCES, *_NORMAL, ATTRACTION)

@@ -66,9 +66,11 @@ def run_angles(case: Case, batch: Batch, report: Report, cores: int = 1) -> None
         raise InputError("no measured angle", file=case.file, field="calibration.angles")
     angles = calibration.angles
     runs = angle_runs(angles)
-    for run in {one.rig: one for one in runs.values()}.values():
+    for run in {scene.rig: scene for scene in runs.values()}.values():
         angle_scene(case, run)  # what cannot be simulated is refused before all runs
-    batch.each({name: partial(angle_scene, case, one) for name, one in runs.items()}, report, cores)
+    batch.each(
+        {name: partial(angle_scene, case, scene) for name, scene in runs.items()}, report, cores
+    )
     AnglesFile(
         study=case.study_name,
         title=case.study.title,

@@ -106,10 +106,8 @@ def body_sizes(study: Study) -> list[BodySize]:
     sizes: list[BodySize] = []
     body = sphere = 1
     for class_ in bed_classes(study) if study.media.clumped else ():
-        material, kind = (
-            study.materials[class_.material],
-            1 + study.type_names().index(class_.material),
-        )
+        material = study.materials[class_.material]
+        kind = 1 + study.type_names().index(class_.material)
         spheres = np.column_stack([class_.clump.offsets, class_.clump.radii])
         if len(spheres) == 1:
             spheres = np.vstack([spheres, _CORE * spheres])

@@ -184,14 +184,14 @@ def changed_scripts(text: str, scene: AnyScene, templates: jinja2.Environment) -
         except InputError:  # the rest needs it
             return True
 
-    found = []
+    changed = []
     for name in sorted(overriding(scene, templates)):
         if changes(without(templates, name)):
             blocks = own_blocks(templates, name)
             named = [block for block in blocks if changes(without_block(templates, name, block))]
-            found.append(f"{name} ({', '.join(named)})" if named else name)
+            changed.append(f"{name} ({', '.join(named)})" if named else name)
     names = _used(scene, templates)
-    return *found, *(f"templates/{name} of the project" for name in edited(templates, names))
+    return *changed, *(f"templates/{name} of the project" for name in edited(templates, names))
 
 
 def write_workpiece(

@@ -327,9 +327,9 @@ def _parsed(templates: jinja2.Environment, name: str) -> nodes.Template:
     assert templates.loader is not None
     file = name
     try:
-        source, found, _ = templates.loader.get_source(templates, name)
-        file = found or name
-        return _tree(templates, source, name, found)
+        source, name_of_file, _ = templates.loader.get_source(templates, name)
+        file = name_of_file or name
+        return _tree(templates, source, name, name_of_file)
     except (RecursionError, UnicodeDecodeError) as error:
         problem = "not UTF-8 text" if isinstance(error, ValueError) else "nested too deeply"
         raise InputError(problem, file=file, remedy="see docs/reference/templates.md") from None

@@ -143,8 +143,8 @@ def command(engine: Engine, deck: str, ranks: int, part: int, source: Path | Non
         words += ["-var", "resume", "1", "-var", "from", source.name]
     if ranks == 1:
         return words
-    if own := _own_launcher():
-        return [*own, "-n", str(ranks), *words]
+    if launcher_words := _own_launcher():
+        return [*launcher_words, "-n", str(ranks), *words]
     launcher = shutil.which("mpirun")
     if launcher is None:
         raise EngineError(

@@ -175,8 +175,8 @@ def fit_clump(corners: Floats, count: int) -> Clump:
     mesh = body(corners)
     samples = np.asarray(sample_surface(mesh, _SAMPLES, seed=1)[0])
     starts, deepest = _inscribed(mesh, count)
-    found = [_fitted(samples, *start, _LARGEST * deepest) for start in starts]
-    fits = [(part * offsets, radii) for offsets, radii in found for part in _DRAWN]
+    candidates = [_fitted(samples, *start, _LARGEST * deepest) for start in starts]
+    fits = [(part * offsets, radii) for offsets, radii in candidates for part in _DRAWN]
     joined = [fit for fit in fits if _pieces(fit[0], _MARGIN * fit[1]) == 1]
     offsets, radii = min(
         joined or fits, key=lambda fit: float((_outside(samples, *fit) ** 2).sum())

@@ -164,10 +164,10 @@ def timestep_notes(case: Case, kind: SceneType, scene: StudyScene) -> list[tuple
     pairs = [(pair.bodies, str(pair)) for pair in outlook(case, kind, step)]
     fraction, source = safe_fraction(case, kind)
     factor = stability_map().safety_factor
-    own = step / scene.case.rayleigh_time_s
-    verdict = "within" if own <= factor * fraction * (1 + 1e-9) else "ABOVE"
+    step_fraction = step / scene.case.rayleigh_time_s
+    verdict = "within" if step_fraction <= factor * fraction * (1 + 1e-9) else "ABOVE"
     text = (
-        f"{100 * own:.3g} % is {verdict} {100 * factor * fraction:.3g} %: "
+        f"{100 * step_fraction:.3g} % is {verdict} {100 * factor * fraction:.3g} %: "
         f"{factor:g} (safety factor) times the {100 * fraction:.3g} % measured to be "
         f"safe ({source})"
     )

@@ -376,10 +376,10 @@ def largest_eigenvalue(
         apart = moved[b] - moved[a] + np.cross(normal, turned[a] + turned[b])
         along = (apart * normal).sum(axis=1, keepdims=True) * normal
         force = ahead * along + across * (apart - along)
-        torque, found = np.cross(force, normal), np.zeros_like(scale)
-        np.add.at(found, a, np.hstack([-force, torque]))
-        np.add.at(found, b, np.hstack([force, torque]))
-        return np.asarray((found * scale).ravel())
+        torque, accelerations = np.cross(force, normal), np.zeros_like(scale)
+        np.add.at(accelerations, a, np.hstack([-force, torque]))
+        np.add.at(accelerations, b, np.hstack([force, torque]))
+        return np.asarray((accelerations * scale).ravel())
 
     def act_by_levers(levers: Levers, shape: Floats) -> Floats:
         moved, turned = np.hsplit(shape.reshape(scale.shape), 2)
@@ -388,11 +388,11 @@ def largest_eigenvalue(
         apart = moved[b] + np.cross(turned[b], arm_b) - moved[a] - np.cross(turned[a], arm_a)
         along = (apart * normal).sum(axis=1, keepdims=True) * normal
         force = ahead * along + across * (apart - along)
-        found = np.zeros_like(scale)
-        np.add.at(found, a, np.hstack([-force, -np.cross(arm_a, force)]))
-        np.add.at(found, b, np.hstack([force, np.cross(arm_b, force)]))
-        torque = np.einsum("nij,nj->ni", levers.roots, found[:, 3:])
-        return np.hstack([found[:, :3] * scale[:, :3], torque]).ravel()
+        accelerations = np.zeros_like(scale)
+        np.add.at(accelerations, a, np.hstack([-force, -np.cross(arm_a, force)]))
+        np.add.at(accelerations, b, np.hstack([force, np.cross(arm_b, force)]))
+        torque = np.einsum("nij,nj->ni", levers.roots, accelerations[:, 3:])
+        return np.hstack([accelerations[:, :3] * scale[:, :3], torque]).ravel()
 
     acts = act if levers is None else partial(act_by_levers, levers)
     operator = LinearOperator((scale.size, scale.size), matvec=acts, dtype=np.float64)

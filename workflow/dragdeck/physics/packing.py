@@ -106,7 +106,9 @@ def pour(classes_m: Sequence[Floats], bowl_radius_m: float, seed: int) -> Partic
     velocities[:, 2] = -np.abs(velocities[:, 2])  # none leaves through the top
     order = random.permutation(len(radii))
     positions = sites + random.uniform(-jitter, jitter, sites.shape)
-    of_class = np.repeat(np.arange(len(classes_m)), [len(one) for one in classes_m])[order]
+    of_class = np.repeat(
+        np.arange(len(classes_m)), [len(class_radii) for class_radii in classes_m]
+    )[order]
     by_class = np.argsort(of_class, kind="stable")
     return Particles(
         classes=of_class[by_class],

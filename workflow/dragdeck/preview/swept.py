@@ -58,8 +58,8 @@ def swept_volume(mesh: "Trimesh", poses: Floats) -> "Trimesh":
     grid = _grid(shape, origin, cell)
     grid["distance"] = least.ravel(order="F")
     level = max(0.0, cell - thickness / 2)
-    found = _as_mesh(grid.contour([level], "distance", method="flying_edges"))
-    return drawn(facing_out(found) or found)
+    contour = _as_mesh(grid.contour([level], "distance", method="flying_edges"))
+    return drawn(facing_out(contour) or contour)
 
 
 def drawn(mesh: "Trimesh") -> "Trimesh":

@@ -376,7 +376,7 @@ def bond_numbers(study: Study) -> dict[str, float]:
     ]
     pairs = [*combinations_with_replacement(particles, 2), *product(particles, walls)]
     displaced, numbers = buoyancy_density(study), {}
-    for (one, material, radius), (other, against, far) in pairs:
+    for (body, material, radius), (other, against, far) in pairs:
         kinds = [study.materials[name] for name in (material, against)]
         reduced = 1 / (1 / radius + 1 / far)
         limit = FrictionLimit(0.0, study.pair(material, against).attractive(), math.isinf(far))
@@ -386,7 +386,7 @@ def bond_numbers(study: Study) -> dict[str, float]:
             for size, kind in zip((radius, far), kinds, strict=True)
         )
         largest = pull_off_force(slope, effective_modulus(kinds[0], kinds[1]), reduced)
-        numbers[f"{one}-{other}"] = largest / (mass * study.gravity_m_s2)
+        numbers[f"{body}-{other}"] = largest / (mass * study.gravity_m_s2)
     return numbers
 
 

@@ -160,11 +160,13 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         entry_step=steps.entry,
     )
     number = max(case.number, 1) - 1
-    own = {WORKPIECE_MESH: partial(_stl, each[number])}
+    files = {WORKPIECE_MESH: partial(_stl, each[number])}
     fastest = max(map(_fastest, each, courses))
     limits = bed_limits(study, top, fastest)
     jam = any(may_jam(body, bed.surface_m) for body in each)
-    models = {body.mesh: partial(_stl, one) for one, body in zip(each, moved, strict=True)}
+    models = {
+        body.mesh: partial(_stl, body_case) for body_case, body in zip(each, moved, strict=True)
+    }
     return Scene(
         deck=deck,
         case=_process_case(
@@ -178,7 +180,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         ),
         steps=steps.end - steps.entry,
         facets=sum(counts),
-        files=own if number else {**models, **_bowl_files(study, top)},
+        files=files if number else {**models, **_bowl_files(study, top)},
         models=_models(study),
         leaves_out=_leaves_out(study),
         warnings=[*_cautions(each), *rank_warnings(parts)],

@@ -119,8 +119,8 @@ class SceneType:
         All workpieces share a run; what is made for each but the first is named by its number.
         """
         whole = case.all_workpieces
-        found = f"{slug(self.slug(whole))[:_LONGEST_SLUG]}-{digest(self.content(whole))}"
-        return f"{found}.{case.number}" if self.needs_bed and case.number > 1 else found
+        full_name = f"{slug(self.slug(whole))[:_LONGEST_SLUG]}-{digest(self.content(whole))}"
+        return f"{full_name}.{case.number}" if self.needs_bed and case.number > 1 else full_name
 
     def digest(self, case: Case) -> str:
         """Hash of all that the run's files say, remarks included.

@@ -139,16 +139,16 @@ def lineage(file: Path) -> list[tuple[Path, Json]]:
     InputError
         A file cannot be read, a study extends one that there is not, or itself.
     """
-    found: list[tuple[Path, Json]] = [(file, read_yaml(file))]
-    while (name := found[-1][1].get("extends")) is not None:
-        studies, place = file.parent.parent, found[-1][0]
+    family: list[tuple[Path, Json]] = [(file, read_yaml(file))]
+    while (name := family[-1][1].get("extends")) is not None:
+        studies, place = file.parent.parent, family[-1][0]
         base = studies / str(name) / STUDY_FILE
-        used = {other.parent.name for other, _ in found}
+        used = {other.parent.name for other, _ in family}
         known = {other.parent.name for other in studies.glob(f"*/{STUDY_FILE}")} - used
         problem = None
         if not isinstance(name, str) or not NAME.fullmatch(name) or not base.is_file():
             problem = "extends an unknown study"
-        elif any(base == other for other, _ in found):
+        elif any(base == other for other, _ in family):
             problem = "extends itself"
         if problem:
             raise InputError(
@@ -156,8 +156,8 @@ def lineage(file: Path) -> list[tuple[Path, Json]]:
                 limit=choices(str(name), filter(NAME.fullmatch, sorted(known))),
                 remedy="name another study, or remove the line",
             )  # fmt: skip
-        found.append((base, read_yaml(base)))
-    return found
+        family.append((base, read_yaml(base)))
+    return family
 
 
 def study_folders(file: Path) -> tuple[Path, ...]:

@@ -89,8 +89,8 @@ class Variation(Model):
             (field, {field: value}) for field, values in self.one_by_one.items() for value in values
         ]
         for values in combinations(self.vary):
-            for axis, own in alone or [("", {})]:
-                yield DesignPoint(axis, {**self.others, **values, **own})
+            for axis, fields in alone or [("", {})]:
+                yield DesignPoint(axis, {**self.others, **values, **fields})
 
 
 Block = TypeVar("Block", bound=Variation)
@@ -186,7 +186,9 @@ def load_cases(
         searched_bounds(file, study.search)
         if searched and searched.is_file():
             known = SearchRecord.read(searched).points
-            points = [one.values for one in known if not one.refused] or points
+            points = [
+                searched_point.values for searched_point in known if not searched_point.refused
+            ] or points
     for point, settings in itertools.product(points, combinations(study.sweep)):
         settings = {**point, **settings}
         try:
