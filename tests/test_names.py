@@ -1,4 +1,4 @@
-"""Names that say nothing: a loop variable is the singular of its collection, a result what it is."""
+"""Loop variables are the singular of their collection, results are named after what they are."""
 
 import ast
 from pathlib import Path
