@@ -367,4 +367,4 @@ def test_a_drag_at_another_pace_and_length(made: Made) -> None:
     own = made(points=[[0, 0, 0], [100, 0, 0], [101, 0.01, 0]], motion={"transient_m": 0.0})
     motion = own.study.motion.at(2.0, 0.004)
     assert motion.path_length_m == pytest.approx(0.004)
-    assert motion.axis_speed_m_s == pytest.approx(2 * own.study.motion.nominal_speed_m_s)
+    assert motion.nominal_speed_m_s == pytest.approx(2 * own.study.motion.nominal_speed_m_s)
