@@ -3,7 +3,6 @@
 import re
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -144,11 +143,12 @@ def test_the_named_case_is_drawn_and_the_first_by_default(
 ) -> None:
     drawn: list[str] = []
 
-    def draw(found: CaseLayout, title: str, refused: bool, folder: Path) -> list[Path]:
+    def draw(scene: CaseLayout, swept: object, title: str, refused: bool) -> bytes:
         drawn.append(title)
-        return []
+        return b""
 
-    monkeypatch.setattr("dragdeck.commands._drawn", draw)
+    monkeypatch.setattr("dragdeck.commands.picture", draw)
+    monkeypatch.setattr("dragdeck.commands.swept_volume", lambda *_: None)
     load({"sweep": {"motion.immersion_depth_m": [0.010, 0.016]}})
     assert main(["preview", "small"]) == 0
     assert "case quick_immersion_depth_m-0.01, one of 2 (--case)" in capsys.readouterr().out

@@ -138,7 +138,7 @@ STEPS = (
                   help="packing.json of the settled packing; required for a process"))),
     Command("set-up", "draw the set-up of a study for its report",
             "Draw the first case of a study obliquely from above, to results/STUDY/set_up.png.",
-            "commands:set_up", (STUDY, FIDELITY)),
+            "commands:draw_set_up", (STUDY, FIDELITY)),
     Command("drops", "run the drop tests of a calibration",
             "Run the drop tests that the calibration of the restitution requires, and write "
             "drops.json to the folder.",

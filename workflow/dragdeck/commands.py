@@ -324,7 +324,7 @@ def _swept(scene: CaseLayout) -> list["Trimesh"]:
     return [swept_volume(body.mesh, body.drag.poses) for body in scene.workpieces]
 
 
-def set_up(study: str, fidelity: str | None) -> None:
+def draw_set_up(study: str, fidelity: str | None) -> None:
     """Draw the first case of a study for its report."""
     project = find_project(Path.cwd())
     scene = layout(project.cases(study, fidelity)[0])

@@ -14,21 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dragdeck.arrays import Floats, Ints
+from dragdeck.physics.estimates import COORDINATION_ESTIMATE, SOLID_FRACTION_ESTIMATE
 from dragdeck.physics.rigid import Levers, RigidBodies
 
 Size = TypeVar("Size", float, NDArray[np.float64])
 
-COORDINATION_ESTIMATE = 5.0
-"""Contacts of a particle in a poured bed with friction, an estimate used only for expectations."""
 
-
-SOLID_FRACTION_ESTIMATE = 0.59
-"""Solid fraction of a poured bed of spheres of about one size, about twelve of them wide, an
-estimate used only for expectations before the bed exists (measured beds replace it)."""
-
-
-class Material(Protocol):
-    """An elastic material, as a study describes it."""
+class Solid(Protocol):
+    """An elastic material."""
 
     @property
     def youngs_modulus_pa(self) -> float:
@@ -43,12 +36,12 @@ class Material(Protocol):
         """Density of the solid, kg/m3."""
 
 
-def shear_modulus(material: Material, scale: float = 1.0) -> float:
+def shear_modulus(material: Solid, scale: float = 1.0) -> float:
     """Shear modulus G = E / (2 (1 + nu)), Pa, with E scaled by `scale`."""
     return scale * material.youngs_modulus_pa / (2 * (1 + material.poissons_ratio))
 
 
-def effective_modulus(first: Material, second: Material, scale: float = 1.0) -> float:
+def effective_modulus(first: Solid, second: Solid, scale: float = 1.0) -> float:
     """Effective modulus of a contact, Pa (Johnson 1985, Contact Mechanics, eq. 4.21 ff.)."""
     compliance = sum(
         (1 - material.poissons_ratio**2) / (scale * material.youngs_modulus_pa)
@@ -66,13 +59,13 @@ def pull_off_force(slope_n_m: float, modulus_pa: float, reduced_radius_m: float)
     return slope_n_m**3 / (12 * modulus_pa**2 * reduced_radius_m)
 
 
-def effective_shear(first: Material, second: Material, scale: float = 1.0) -> float:
+def effective_shear(first: Solid, second: Solid, scale: float = 1.0) -> float:
     """Effective shear modulus of a contact, Pa: 1 / G* sums (2 - nu) / G (Mindlin 1949)."""
     bodies = (first, second)
     return 1 / sum((2 - body.poissons_ratio) / shear_modulus(body, scale) for body in bodies)
 
 
-def rayleigh_time(material: Material, radius_m: float, scale: float = 1.0) -> float:
+def rayleigh_time(material: Solid, radius_m: float, scale: float = 1.0) -> float:
     """Travel time of a Rayleigh wave over half the circumference of a particle, s.
 
     ``pi R sqrt(rho / G) / (0.1631 nu + 0.8766)``, as in LIGGGHTS' ``fix check/timestep/gran``
@@ -83,7 +76,7 @@ def rayleigh_time(material: Material, radius_m: float, scale: float = 1.0) -> fl
     return math.pi * radius_m * wave / (0.1631 * material.poissons_ratio + 0.8766)
 
 
-def particle_mass(material: Material, radius_m: float) -> float:
+def particle_mass(material: Solid, radius_m: float) -> float:
     """Mass of a particle, kg."""
     return sphere_mass(radius_m, material.density_kg_m3)
 
@@ -181,7 +174,7 @@ def bed_overlap(modulus_pa: float, pressure_pa: float) -> float:
     return hertz_overlap(force, 0.25, modulus_pa)  # of particles with a diameter of 1
 
 
-def stiffness_number(material: Material, pressure_pa: float) -> float:
+def stiffness_number(material: Solid, pressure_pa: float) -> float:
     """How stiff particles are against the pressure on them: (E / ((1 - nu^2) p))^(2/3).
 
     Agnolin and Roux 2007, Physical Review E 76, 061302: its inverse goes as the

@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from dragdeck.physics.contact_mechanics import SOLID_FRACTION_ESTIMATE
+from dragdeck.physics.estimates import SOLID_FRACTION_ESTIMATE
 from dragdeck.study.base import Line, Model, Number, Positive, Whole
 
 NARROWEST = 5

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from dragdeck.physics.contact_mechanics import SOLID_FRACTION_ESTIMATE
+from dragdeck.physics.estimates import SOLID_FRACTION_ESTIMATE
 from dragdeck.study.base import Model, Number, Positive, Whole
 
 Corners = NDArray[np.float64]
