@@ -155,7 +155,7 @@ def test_tests_bring_their_packages(clone: Clone, arguments: list[str], called: 
     ended = clone.run("test", *arguments)
     assert ended.returncode == 0
     assert re.fullmatch(rf"{called} in .*\n", ended.stdout)
-    assert clone.extras() == ["cad", "compare", "crate", "docs", "notebook", "search", "test"]
+    assert clone.extras() == ["cad", "crate", "docs", "notebook", "search", "test"]
 
 
 def test_a_failed_check_fails_the_whole_and_still_tests(clone: Clone, tmp_path: Path) -> None:
@@ -235,7 +235,7 @@ chmod +x ../bin/df"""
         ("", ["compare", "--config", "study=a"], {}, ["no studies to compare", "studies=A,B"]),
         ("", ["compare", "--config", "studies=a b;c"], {}, ["not names of studies", "a b;c"]),
         ("", ["search", "--config", "study=a", "fidelity=full"], {}, ["fidelity=full"]),
-        ("", ["setup", "crates"], {}, ["crates", "cad, compare, crate, docs"]),
+        ("", ["setup", "crates"], {}, ["crates", "cad, crate, docs"]),
     ],
 )
 def test_what_is_missing_is_named_with_a_remedy(

@@ -333,7 +333,7 @@ _READERS: dict[str, tuple[str, ...]] = {
     "tables/clusters.parquet": ("figures", "report"),
     "tables/closure.json": ("figures", "report"),
     "tables/loading.json": ("report",),
-    "tables/figures.json": ("report",),
+    "tables/findings.json": ("report",),
 }
 """Results of the process, and who reads them, or might."""
 

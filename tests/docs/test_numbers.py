@@ -42,7 +42,7 @@ def test_the_numbers_of_the_papers_study_are_those_of_the_code() -> None:
         step, scale = bed_timestep(scaled, "timestep_fraction"), fidelity.youngs_modulus_scale
         stiffness = full_stiffness_number(scaled) * scale ** (2 / 3)
         unstable = law.largest_fraction(stiffness, own.restitution, spread / media.radius_mean_m)
-        steps = motion.path_length_m / motion.axis_speed_m_s / step
+        steps = motion.path_length_m / motion.nominal_speed_m_s / step
         times = 1e6 * bed_rayleigh_time(scaled), 1e6 * step, steps / 1e6
         found.append([name, scale, fidelity.timestep_fraction, *times, unstable])
     known = record_table("paper/presets")

@@ -54,8 +54,7 @@ COMMANDS = (
             "status:open_report", (STUDY,)),
     Command("preview", "draw the set-up of a study",
             "Draw bowl, packing, workpiece and path of one case, and print its clearances and "
-            "dimensionless numbers. It runs nothing and writes preview.png and set_up.png to "
-            "results/STUDY.",
+            "dimensionless numbers. It runs nothing and writes preview.png to results/STUDY.",
             "commands:preview", (
         STUDY, FIDELITY,
         Argument("--case", metavar="NAME",
@@ -147,6 +146,9 @@ STEPS = (
         Argument("run", metavar="RUN", help="run id, as ./run dragdeck cases lists it"),
         Argument("--packing", type=Path, metavar="FILE",
                   help="packing.json of the settled packing; required for a process"))),
+    Command("set-up", "draw the set-up of a study for its report",
+            "Draw the first case of a study obliquely from above, to results/STUDY/set_up.png.",
+            "commands:draw_set_up", (STUDY, FIDELITY)),
     Command("drops", "run the drop tests of a calibration",
             "Run the drop tests that the calibration of the restitution requires, and write "
             "drops.json to the folder.",

@@ -74,13 +74,13 @@ class Project:
         file = study_file(self.studies, study)
         try:
             found_by = partial(resolve, tradeoff=tradeoff)
-            found = load_cases(file, fidelity, found_by, self.results(study) / SEARCHED)
+            cases = load_cases(file, fidelity, found_by, self.results(study) / SEARCHED)
             check_search(file)
-            for case in found:
+            for case in cases:
                 _check_timesteps(case)
         except InputError as error:
             raise located(error) from None
-        return found
+        return cases
 
     def plan_file(self, plan: str) -> Path:
         """The file of a plan, which is known by its name or its path.
@@ -94,7 +94,7 @@ class Project:
         file = Path(plan) if plan.endswith(".yaml") else own_or_shipped(self.root, name)
         if not NAME.fullmatch(file.stem) or not file.is_file():
             folders = (self.root / _PLANS, SHIPPED / _PLANS)
-            known = sorted({file.stem for folder in folders for file in folder.glob("*.yaml")})
+            known = sorted({path.stem for folder in folders for path in folder.glob("*.yaml")})
             raise InputError(
                 f"no such plan: {plan!a}",
                 file=self.root / _PLANS,
@@ -255,14 +255,14 @@ def study_files(cases: Iterable[Case]) -> list[Path]:
 
     Hidden files are left out.
     """
-    found = set()
+    files = set()
     for case in cases:
         for folder in study_folders(case.file):
             inside = (file for file in folder.rglob("[!.]*") if file.is_file())
-            found |= {file for file in inside if "/." not in f"/{file.relative_to(folder)}"}
-        shapes = [one.study.workpiece.shape for one in of_each_workpiece(case)]
-        found |= {mesh_file(case, shape) for shape in shapes if isinstance(shape, MeshShape)}
-    return sorted(found)
+            files |= {file for file in inside if "/." not in f"/{file.relative_to(folder)}"}
+        shapes = [workpiece.study.workpiece.shape for workpiece in of_each_workpiece(case)]
+        files |= {mesh_file(case, shape) for shape in shapes if isinstance(shape, MeshShape)}
+    return sorted(files)
 
 
 def by_run(cases: Iterable[Case], scene: SceneType) -> dict[str, Case]:
@@ -287,4 +287,6 @@ def by_folder(cases: Iterable[Case], scene: SceneType) -> dict[str, Case]:
     runs = by_run(cases, scene)
     if not scene.needs_bed:
         return runs
-    return by_run([one for case in runs.values() for one in of_each_workpiece(case)], scene)
+    return by_run(
+        [workpiece for case in runs.values() for workpiece in of_each_workpiece(case)], scene
+    )

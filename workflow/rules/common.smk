@@ -1,4 +1,4 @@
-# What the rules share: the settings of the call, and the study with its runs as `WORK` (dragdeck.rules).
+# What the rules share: the call's settings, and the study with its runs as `WORK` (dragdeck.rules).
 import os
 import signal
 import sys

@@ -110,7 +110,7 @@ for PLACE, SCENE in SCENES.items():
                 )
                 for name in figures_of(SCENE.name)
             ],
-            of_run(PLACE, "tables/figures.json"),
+            of_run(PLACE, "tables/findings.json"),
         params:
             source=source_hash("dragchain.report.run_figures"),
         shell:
@@ -137,7 +137,7 @@ for PLACE, SCENE in SCENES.items():
 rule draw_for_journal:
     input:
         tables_of("process", [*SCENES["process"].tables, *SCENES["process"].network]),
-        of_run("process", "tables/figures.json"),
+        of_run("process", "tables/findings.json"),
         run=of_run("process", "run.json"),
     output:
         of_run("process", "figures/journal/workpiece.pdf"),

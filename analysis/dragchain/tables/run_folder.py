@@ -17,8 +17,8 @@ from dragchain.tables.by_step import read_table
 from dragchain.tables.workpiece_contacts import Meshes, WorkpieceFrames, join_workpiece_frames
 from dragdeck.decks.outputs import OutputOfRun, load_outputs
 from dragdeck.dumps.frame import Columns, Frame
-from dragdeck.physics.coulomb import FrictionLimit
 from dragdeck.records.case import CaseOfRun, load_case
+from dragdeck.study.contact_law import FrictionLimit
 from dragdeck.study.drive import Rotation
 
 ON_WORKPIECE = ("workpiece_particles", "workpiece_contacts")

@@ -71,12 +71,12 @@ class SearchedMeasure(Model):
 
     def lacks(self, removal: bool, target: bool, touches: bool) -> str:
         """The field without which no run has this quantity, empty if there is none."""
-        found = {
+        lacking = {
             "removal": self.quantity in _OF_REMOVAL and not removal,
             "removal.target_depth_m": self.quantity in _OF_TARGET and not target,
             "outputs.first_touch_fraction": self.quantity in _OF_TOUCH and not touches,
         }
-        return next((name for name, missing in found.items() if missing), "")
+        return next((name for name, missing in lacking.items() if missing), "")
 
 
 class Objective(SearchedMeasure):
@@ -161,7 +161,7 @@ class Search(Model):
     @property
     def measures(self) -> Mapping[str, SearchedMeasure]:
         """Objective and limits by their fields."""
-        limits = {f"limits.{number}": one for number, one in enumerate(self.limits)}
+        limits = {f"limits.{number}": limit for number, limit in enumerate(self.limits)}
         return {"objective": self.objective, **limits}
 
     def excluded(self) -> Iterator[tuple[str, str]]:

@@ -70,8 +70,8 @@ class Spin(SuperposedMotion):
     def faster(self, factor: float) -> Self:
         """The spin at that factor, its stages as much shorter."""
         stages = [
-            one.model_copy(update={"until_s": one.until_s / factor, "rpm": factor * one.rpm})
-            for one in self._stages()
+            stage.model_copy(update={"until_s": stage.until_s / factor, "rpm": factor * stage.rpm})
+            for stage in self._stages()
         ]
         spin = {"rpm": stages[0].rpm} if self.schedule is None else {"schedule": stages}
         return self.model_copy(update={**spin, "ramp_s": self.ramp_s / factor})
