@@ -12,10 +12,10 @@ import pandas as pd
 import pyarrow.parquet as pq
 
 from dragchain.errors import TableError, UnknownNameError
+from dragchain.quantities.basis import Basis, notes
 from dragchain.report.findings import FILE, ProcessFindings
 from dragchain.report.run_data import RunData, process_findings
 from dragchain.report.values import Values, read_optional, values_of
-from dragchain.run.basis import Basis, notes
 from dragchain.run.case import upstream_folders
 from dragchain.tables.by_step import intact, read_table
 from dragchain.tables.columns import descriptions, unit_of

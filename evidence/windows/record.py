@@ -20,7 +20,8 @@ from scipy.special import polygamma
 
 from dragchain.arrays import Floats
 from dragchain.errors import SeriesError
-from dragchain.tradeoff.measures import QUANTITIES, Measurand, Measures
+from dragchain.quantities.registry import COMPARED, Quantity
+from dragchain.tradeoff.measures import Measures
 from dragchain.windows.estimate import Known, WindowsRecord
 from dragdeck.physics.contact_mechanics import damping_ratio
 from dragdeck.records.stability import StableStepLaw, StableStepRecord
@@ -129,7 +130,7 @@ def windows_record(scenes: Scenes, archives: Sequence[str]) -> WindowsRecord:
     SeriesError
         There is none.
     """
-    rows = {quantity.name: _known(quantity, scenes) for quantity in QUANTITIES}
+    rows = {quantity.name: _known(quantity, scenes) for quantity in COMPARED}
     quantities = {name: known for name, known in rows.items() if known}
     if not quantities:
         raise SeriesError(f"no quantity has both moduli in {_FEWEST_SCENES} scenes or more")
@@ -140,7 +141,7 @@ def windows_record(scenes: Scenes, archives: Sequence[str]) -> WindowsRecord:
     )
 
 
-def _known(quantity: Measurand, scenes: Scenes) -> Known | None:
+def _known(quantity: Quantity, scenes: Scenes) -> Known | None:
     measured = [[*_runs_with(quantity, runs)] for runs in scenes]
     pairs = [
         (stiff, soft)
@@ -165,7 +166,7 @@ def _known(quantity: Measurand, scenes: Scenes) -> Known | None:
     )
 
 
-def _runs_with(quantity: Measurand, runs: Sequence[SceneRun]) -> list[QuantityOfRun]:
+def _runs_with(quantity: Quantity, runs: Sequence[SceneRun]) -> list[QuantityOfRun]:
     """The runs at the speed of their scene in which every block has the quantity."""
     plain = [run for run in runs if run.fidelity.speed_factor == 1]
     rows = [QuantityOfRun(run, quantity.rooted(run.of_blocks(quantity.name))) for run in plain]

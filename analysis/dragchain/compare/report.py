@@ -27,15 +27,16 @@ from dragchain.drag import circumference
 from dragchain.errors import TableError
 from dragchain.figures.panels import head, new_panels
 from dragchain.figures.style import MARKERS, SERIES, WIDE_IN, force_map
+from dragchain.quantities.along import MAP_AZIMUTHS, MAP_DEPTHS, loading_along
+from dragchain.quantities.basis import Standing
+from dragchain.quantities.registry import REPORTED, Quantity
 from dragchain.report.campaign import write_report
 from dragchain.report.cases import ReportedCase, StudyRuns, cases_of, read_study_runs
 from dragchain.report.page import NETWORK_PAGE, TIMES, render_page, with_interval, write_bundle
-from dragchain.run.basis import QUANTITIES, Quantity, Standing
 from dragchain.run.case import changed_inputs
 from dragchain.statistics.bed_effects import fit_effects
 from dragchain.statistics.estimate import Estimate, flattened, mean_of
 from dragchain.tables.by_step import read_table
-from dragchain.tradeoff.measure_run import MAP_AZIMUTHS, MAP_DEPTHS, loading_along
 
 _LARGEST_MODEL = 4
 """Factors whose interactions are estimated at most."""
@@ -103,7 +104,7 @@ class CaseDifference:
 def differences(first: ComparedCase, other: ComparedCase) -> list[CaseDifference]:
     """Every quantity that two cases have."""
     rows = []
-    for quantity in QUANTITIES:
+    for quantity in REPORTED:
         pair = [case.case.values.of(quantity.name) for case in (first, other)]
         if all(pair):
             rows.append(_difference(quantity, first, other))
@@ -435,11 +436,11 @@ def write_comparison(out_dir: Path, folders: Sequence[Path]) -> None:
     first, *others = cases
     rows = [row for other in others for row in differences(first, other)]
     by_quantity = {
-        quantity: [row for row in rows if row.quantity == quantity] for quantity in QUANTITIES
+        quantity: [row for row in rows if row.quantity == quantity] for quantity in REPORTED
     }
     notes = Counter(note for case in cases for note in case.case.values.notes)
     factors = factors_of(cases)
-    measured = [quantity for quantity in QUANTITIES if first.case.values.of(quantity.name)]
+    measured = [quantity for quantity in REPORTED if first.case.values.of(quantity.name)]
     effects = (
         [row for quantity in measured for row in effects_of(cases, factors, quantity)]
         if factors

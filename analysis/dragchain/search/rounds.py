@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from dragchain.arrays import Floats
+from dragchain.quantities.registry import REPORTED
 from dragchain.report.cases import ReportedCase, read_study_runs
 from dragchain.report.removal import depth_spread, removal_of
-from dragchain.run.basis import QUANTITIES
 from dragchain.run.workpiece import read_surface
 from dragchain.search.proposals import Trials, best_place, propose, spread_places
 from dragchain.statistics.estimate import (
@@ -59,7 +59,7 @@ _OWN: Mapping[str, tuple[str, str]] = {
 }
 """Label and unit of the quantities that are not in the registry of the report."""
 
-_LABELS = {**_OWN, **{quantity.name: (quantity.label, quantity.unit) for quantity in QUANTITIES}}
+_LABELS = {**_OWN, **{quantity.name: (quantity.label, quantity.unit) for quantity in REPORTED}}
 
 
 def label(measure: SearchedMeasure) -> str:
