@@ -19,7 +19,7 @@ from dragchain.tables.by_step import RisingSteps, read_steps
 from dragchain.tables.columns import CONTACTS, KINEMATICS, ORIENTATION
 from dragchain.tables.run_folder import Run, workpiece_places
 from dragdeck.records.case import CaseOfRun
-from dragdeck.study.drive import Rotation
+from dragdeck.study.drive import Orientations
 
 _BODY = {name: body for body, name in KINDS.items()}
 _PARTICLES = ("step", *KINEMATICS)
@@ -151,7 +151,7 @@ class FrameData:
     membership : Membership or None
         What is in a chain; None if there are no chain tables, or if they do not
         reach this frame.
-    workpiece : (3,) float and Rotation, or None
+    workpiece : (3,) float and Orientations, or None
         The workpiece's reference point in m and its orientation; None if there is no workpiece.
     """
 
@@ -161,7 +161,7 @@ class FrameData:
     contacts: pd.DataFrame | None
     network: NetworkFrame | None
     membership: Membership | None
-    workpiece: tuple[Floats, Rotation] | None
+    workpiece: tuple[Floats, Orientations] | None
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ import pandas as pd
 from matplotlib.colors import to_hex
 from numpy.typing import NDArray
 from pydantic import JsonValue
-from scipy.spatial.transform import Rotation as Quaternion
+from scipy.spatial.transform import Rotation
 
 from dragchain.arrays import Floats, Ints
 from dragchain.drag import drag_peaks, peak_separation_s, read_counted
@@ -184,7 +184,7 @@ def read_shown(series: FrameSeries) -> Shown:
         )
         particles.append(data.particles[kept].assign(frame=number))
         contacts.append(shown[(shown["a"] >= 0) & (shown["b"] >= 0)])
-        turn = Quaternion.from_matrix(data.workpiece[1].matrices[0]).as_quat()
+        turn = Rotation.from_matrix(data.workpiece[1].matrices[0]).as_quat()
         poses.append([*data.workpiece[0], *turn])
         most = max(most, kept.size)
     return Shown(pd.concat(particles), pd.concat(contacts), np.array(poses), most)

@@ -26,7 +26,8 @@ from dragdeck.mesh.files import stl_text
 from dragdeck.mesh.shapes import tube
 from dragdeck.mesh.surface import surface
 from dragdeck.physics.contact_mechanics import ENGINE_SOFTEST_PA, fall_time
-from dragdeck.physics.estimates import SOLID_FRACTION_ESTIMATE, pour
+from dragdeck.physics.estimates import SOLID_FRACTION_ESTIMATE
+from dragdeck.physics.packing import pour
 from dragdeck.physics.rounding import rounded
 from dragdeck.records.calibration import AngleRun
 from dragdeck.records.case import CaseOfRun

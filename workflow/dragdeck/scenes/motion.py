@@ -18,7 +18,7 @@ from dragdeck.cases.case import Case
 from dragdeck.decks.deck import Deck, Properties
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import round_to
-from dragdeck.study.drive import Drive, EngineMotion, Floats, Rotation, rotation_vector
+from dragdeck.study.drive import Drive, EngineMotion, Floats, Orientations, rotation_vector
 from dragdeck.study.driven import DrivenMotion
 from dragdeck.study.model import Motion, Study
 from dragdeck.study.paths.path import Point, Vector
@@ -204,7 +204,7 @@ class Course:
         """The drag in steps."""
         return self.driven.drive
 
-    def poses(self, leg: Leg, steps: Floats) -> tuple[Floats, Rotation]:
+    def poses(self, leg: Leg, steps: Floats) -> tuple[Floats, Orientations]:
         """Places, (N, 3), and orientations after (N,) steps from the beginning of a leg."""
         begun, single = np.array(self.start_m), np.ones(1)
         for before in self.legs[: self.legs.index(leg)]:
@@ -212,7 +212,7 @@ class Course:
         if leg.name == "drag":
             places = self.driven.places(steps, begun)
             return places, self.driven.rotation(steps, self.turn_rad)
-        return leg.straight_on(begun, steps), Rotation(np.full(len(steps), self.turn_rad))
+        return leg.straight_on(begun, steps), Orientations(np.full(len(steps), self.turn_rad))
 
 
 def driven(study: Study, start: int = 0) -> DrivenMotion:

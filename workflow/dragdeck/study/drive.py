@@ -265,20 +265,20 @@ def about_vertical(rate_rad_s: Floats | float, arm_m: Floats) -> Floats:
 
 def by_vector(vector_rad: Floats) -> Floats:
     """Matrices, (..., 3, 3), of rotation vectors, (..., 3): axis times angle."""
-    from scipy.spatial.transform import Rotation as Turn
+    from scipy.spatial.transform import Rotation
 
-    return np.asarray(Turn.from_rotvec(vector_rad).as_matrix())
+    return np.asarray(Rotation.from_rotvec(vector_rad).as_matrix())
 
 
 def rotation_vector(matrix: Floats) -> Floats:
     """Rotation vector, (3,), of a matrix, (3, 3), by less than half a turn."""
-    from scipy.spatial.transform import Rotation as Turn
+    from scipy.spatial.transform import Rotation
 
-    return np.asarray(Turn.from_matrix(matrix).as_rotvec())
+    return np.asarray(Rotation.from_matrix(matrix).as_rotvec())
 
 
 @dataclass(frozen=True)
-class Rotation:
+class Orientations:
     """N orientations of a workpiece: from its own frame, +x its front and z up, to the bowl's.
 
     Attributes

@@ -10,8 +10,8 @@ from dragdeck.study.drive import (
     Drive,
     EngineMotion,
     Floats,
+    Orientations,
     PathEntry,
-    Rotation,
     SmoothStart,
     StepCounts,
     SuperposedEntry,
@@ -92,23 +92,23 @@ class DrivenMotion:
             place = place + superposed.shift(self.drive, since)
         return place
 
-    def rotation(self, since: StepCounts, start_rad: float) -> Rotation:
+    def rotation(self, since: StepCounts, start_rad: float) -> Orientations:
         """Orientations after (N,) steps of a workpiece whose front begins in a direction."""
         path = self.motion.path
         turn = start_rad + path.turn(self.drive, since)
-        return self._rotated(since, Rotation(turn, path.own(self.drive, since)))
+        return self._rotated(since, Orientations(turn, path.own(self.drive, since)))
 
-    def rotation_along(self, since: StepCounts, direction_rad: Floats) -> Rotation:
+    def rotation_along(self, since: StepCounts, direction_rad: Floats) -> Orientations:
         """Orientations after (N,) steps, at (N,) directions of motion."""
         return self._rotated(since, self._by_path(since, direction_rad))
 
-    def _by_path(self, since: StepCounts, direction_rad: Floats) -> Rotation:
+    def _by_path(self, since: StepCounts, direction_rad: Floats) -> Orientations:
         path = self.motion.path
         first = np.full_like(direction_rad, path.direction_rad)
         turn = direction_rad if path.turns(self.drive.orientation) else first
-        return Rotation(turn, path.own(self.drive, since))
+        return Orientations(turn, path.own(self.drive, since))
 
-    def _rotated(self, since: StepCounts, rotation: Rotation) -> Rotation:
+    def _rotated(self, since: StepCounts, rotation: Orientations) -> Orientations:
         for superposed in self.superposed.values():
             rotation = superposed.rotated(self.drive, since, rotation)
         return rotation

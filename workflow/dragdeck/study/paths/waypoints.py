@@ -360,7 +360,7 @@ def _chains(
 
 def _by_angles(point: Waypoint, first: Waypoint) -> Floats:
     """Orientation at a waypoint relative to the first one: roll, then pitch, then turn, (3, 3)."""
-    from scipy.spatial.transform import Rotation as Turn
+    from scipy.spatial.transform import Rotation
 
     angles = [point.turn_deg - first.turn_deg, point.pitch_deg, point.roll_deg]
-    return np.asarray(Turn.from_euler("ZYX", angles, degrees=True).as_matrix())
+    return np.asarray(Rotation.from_euler("ZYX", angles, degrees=True).as_matrix())

@@ -13,7 +13,7 @@ from dragdeck.study.drive import (
     Drive,
     EngineMotion,
     Floats,
-    Rotation,
+    Orientations,
     StepCounts,
     about_vertical,
     by_vector,
@@ -105,14 +105,16 @@ class Spin(SuperposedMotion):
         within = begin.advance(np.clip(done, begun, ends)) - begin.advance(begun)
         return np.asarray(within @ np.array([rate for _, rate in stages]) * drive.timestep_s)
 
-    def rotated(self, drive: Drive, since: StepCounts, before: Rotation) -> Rotation:
+    def rotated(self, drive: Drive, since: StepCounts, before: Orientations) -> Orientations:
         """About the vertical, or the axis of a tilted workpiece."""
         angle = self.turn(drive, since)
         if not drive.tilt_deg:
-            return Rotation(before.turn_rad + angle, before.own)
-        return Rotation(before.turn_rad, by_vector(angle[:, None] * drive.own_axis))
+            return Orientations(before.turn_rad + angle, before.own)
+        return Orientations(before.turn_rad, by_vector(angle[:, None] * drive.own_axis))
 
-    def velocity(self, drive: Drive, since: StepCounts, arm_m: Floats, before: Rotation) -> Floats:
+    def velocity(
+        self, drive: Drive, since: StepCounts, arm_m: Floats, before: Orientations
+    ) -> Floats:
         """The rate of the stage that a step belongs to, cross the arm."""
         stages = self.stages(drive)
         rates = np.array([rate for _, rate in stages])
