@@ -1,9 +1,13 @@
 """What the tests of both packages share."""
 
 import copy
+import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
+
+# Before numpy is imported: threads that wait for work of small matrices take the cores of others.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import pytest
 import yaml
