@@ -1,9 +1,13 @@
 """What the tests of both packages share."""
 
 import copy
+import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
+
+# Before numpy is imported: threads that wait for work of small matrices take the cores of others.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import pytest
 import yaml
@@ -33,7 +37,6 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         parser.addoption(f"--{name}", action="store_true", help=f"run the tests that {what} too")
     parser.addoption("--long-commands", action="store_true", help="run the pages' long commands")
     parser.addoption("--attacks", action="store_true", help="all attacks instead of a sample")
-    parser.addoption("--attack-seed", type=int, default=13, help="of their random choices")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

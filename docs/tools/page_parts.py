@@ -112,12 +112,6 @@ def values() -> pd.DataFrame:
     return pd.read_csv(VALUES, dtype=str, keep_default_na=False)
 
 
-def typed(page: str) -> str:
-    """A page without what is made."""
-    old = dict(values()[["name", "value"]].to_numpy())
-    return Parts(old, dict.fromkeys(old, ""), lambda _: "", lambda _: "").renewed(page)
-
-
 def _value(row: Mapping[str, str]) -> str:
     try:
         shown = set(texts(chosen(row["record"], row["rows"]), row["format"]))

@@ -77,7 +77,8 @@ _TEMPLATES: dict[str, Template] = {
 }  # fmt: skip
 
 
-@pytest.mark.attack(rows=_TEMPLATES, sample=2)
+@pytest.mark.attack(sample=2)
+@pytest.mark.parametrize("attack", _TEMPLATES.values(), ids=_TEMPLATES)
 def test_a_hostile_template_is_refused(attack: Template, tmp_path: Path) -> None:
     name, content, named = attack
     project = new_project(tmp_path / "project")

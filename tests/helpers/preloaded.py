@@ -11,6 +11,7 @@ import functools
 import gc
 import json
 import os
+import re
 import resource
 import select
 import shutil
@@ -99,10 +100,18 @@ def environment() -> dict[str, str]:
 # --- the process that forks ----------------------------------------------------------------------
 
 
+def _hashed() -> set[str]:
+    """The modules whose hashes are parameters of rules."""
+    rules = [file.read_text() for file in (ROOT / "workflow/rules").glob("*.smk")]
+    return set(re.findall(r'"((?:dragdeck|dragchain|evidence)\.[\w.]+)"', "".join(rules)))
+
+
 def _serve(place: str) -> None:
     """Make calls until the standard input ends, with the process that started this one."""
     for name in PRELOADED:
         import_module(name)
+    import_module("snakemake.cli").get_argument_parser()  # which imports the plug-ins
+    import_module("dragdeck.source_hash").source_files(*_hashed())  # which parses each file once
     gc.freeze()
     with socket.socket(socket.AF_UNIX) as server:
         server.bind(place)

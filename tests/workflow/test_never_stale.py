@@ -19,6 +19,9 @@ from made_study import put
 from paths import DATA, ROOT
 from snakemake_calls import copy_of_project, jobs, snakemake, succeed
 
+from dragdeck.project import Project
+from dragdeck.scenes.process import SCENES
+
 pytestmark = pytest.mark.slow
 
 STUDY = ("--config", "study=small")
@@ -41,18 +44,15 @@ def restore(file: Path, text: str) -> None:
     os.utime(file, (1e9, 1e9))
 
 
-def results_of(folder: Path, *targets: str) -> list[str]:
-    """Names of the files in the results that targets stand on."""
-    lines = succeed(folder, *targets, *STUDY, "--summary").stdout.splitlines()
-    return [name for line in lines if (name := line.partition("\t")[0]).startswith("results/")]
-
-
-def let_be_made(folder: Path, *targets: str) -> None:
-    """Let all outputs of targets be there, as if they had been made."""
-    for name in results_of(folder, *targets):
+def let_be_made(folder: Path, target: str) -> list[str]:
+    """Let all outputs of a target be there, as if they had been made; their names."""
+    lines = succeed(folder, target, *STUDY, "--summary").stdout.splitlines()
+    names = [name for line in lines if (name := line.partition("\t")[0]).startswith("results/")]
+    for name in names:
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).touch()
-    succeed(folder, *targets, *STUDY, "--touch")
+    succeed(folder, target, *STUDY, "--touch")
+    return names
 
 
 WAY = "time_s,x_m,y_m\n0,-0.01,0\n1,0.01,0\n"
@@ -128,33 +128,34 @@ def test_what_an_edit_concerns_is_made_again(reported: Path, tmp_path: Path, nam
 
 
 STATES = {
-    "a filling is rendered": "filling/.*/in.liggghts",
-    "it is run": "filling/.*/run.json",
-    "a process is rendered": "process/.*/in.liggghts",
-    "it is run, too": "process/.*/run.json",
-    "it is tabulated": "process/.*/tables/workpiece_force.parquet",
+    "a process is tabulated": "process/.*/tables/workpiece_force.parquet",
+    "it is run": "process/.*/run.json",
+    "it is rendered": "process/.*/in.liggghts",
+    "a filling is run": "filling/.*/run.json",
+    "it is rendered, too": "filling/.*/in.liggghts",
 }
+"""From the last to the first, with the file that is there from then on."""
 
 
 def test_an_edit_in_any_state_before_the_report_runs_all(tmp_path: Path) -> None:
     folder = copy_of_project(tmp_path)
-    names = results_of(folder, "report")
-    planned = jobs(folder, "report", *STUDY)
-    assert planned >= FILLING
+    made = let_be_made(folder, "report")
+    shutil.rmtree(folder / "results/small/report")
+    assert not jobs(folder, "report", *STUDY) & FILLING - {"write_report"}
+    edit(folder, {"seed": 2})
     for state, pattern in STATES.items():
-        let_be_made(folder, *(name for name in names if re.search(pattern, name)))
-        edit(folder, {"seed": 2})
         assert jobs(folder, "report", *STUDY) >= FILLING, state
-        edit(folder, {"seed": 1})
-    assert not jobs(folder, "report", *STUDY) & FILLING - {"write_report"}  # found again
+        (name,) = (name for name in made if re.search(pattern, name))
+        (folder / name).unlink()
 
 
 def test_runs_of_another_engine_are_named(tmp_path: Path) -> None:
     folder = copy_of_project(tmp_path)
-    names = results_of(folder, "process")
-    (name,) = (name for name in names if re.fullmatch("results/small/process/[^/]*/run.json", name))
-    (folder / name).parent.mkdir(parents=True)
-    (folder / name).write_text(json.dumps(run_json() | {"engine_version": "3.8.9"}))
+    project = Project(folder)
+    (case,) = project.cases("small")
+    run = project.run_folder(case, SCENES["process"])
+    run.mkdir(parents=True)
+    (run / "run.json").write_text(json.dumps(run_json() | {"engine_version": "3.8.9"}))
     done = succeed(folder, "process", *STUDY, "--dry-run")
     assert "LIGGGHTS 3.8.9 made 1 run(s)" in done.stdout + done.stderr
 

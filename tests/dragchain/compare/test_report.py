@@ -195,9 +195,3 @@ def test_a_study_is_not_compared_with_itself(tmp_path: Path) -> None:
     packings = [one for one in study(tmp_path) if "deep-0_fast-0" in one.name]
     with pytest.raises(TableError, match="at least two cases"):
         read_compared(packings * 2)
-
-
-def test_one_case_is_refused(tmp_path: Path) -> None:
-    packings = [one for one in study(tmp_path) if "deep-0_fast-0" in one.name]
-    with pytest.raises(TableError, match="at least two cases"):
-        read_compared(packings)

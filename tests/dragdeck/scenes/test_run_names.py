@@ -3,7 +3,7 @@
 import copy
 import re
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,12 +14,15 @@ from made_scenes import BED
 from made_study import put
 from paths import ROOT
 
+from dragdeck.cases import bed
 from dragdeck.cases.case import Case
 from dragdeck.decks.deck import AnyScene
 from dragdeck.decks.render import deck_text
 from dragdeck.decks.templates import environment
 from dragdeck.errors import InputError
+from dragdeck.mesh import clump
 from dragdeck.project import Project
+from dragdeck.scenes import filling, lead, workpiece
 from dragdeck.scenes.lead import with_leads
 from dragdeck.scenes.process import PROCESS, SCENES
 from dragdeck.scenes.scene import SceneType
@@ -262,7 +265,42 @@ def written(project: Project, small: dict[str, Any]) -> tuple[Path, dict[str, An
     return project.studies / "rich/study.yaml", small
 
 
+def remembered(function: Callable[..., Any]) -> Callable[..., Any]:
+    """A function of what never changes, called once for the same objects."""
+    known: dict[tuple[Any, ...], tuple[Any, Any]] = {}
+
+    def call(*arguments: Any) -> Any:
+        key = tuple(a if isinstance(a, str | int) else id(a) for a in arguments)
+        if key not in known:  # the arguments are kept, so that no other object gets their identity
+            known[key] = function(*arguments), arguments
+        return known[key][0]
+
+    return call
+
+
+OF_STUDIES = (
+    (Study, "of_runs"),
+    (Study, "plain"),
+    (bed, "bed_classes"),
+    (bed, "bed_density"),
+    (bed, "expected_surface"),
+    (filling, "primes"),
+    (lead, "_marks"),
+)
+"""What is computed many times of the same study, or of the same seed."""
+
+
+@pytest.fixture
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let scenes be built quickly, of all the same fields: with fewer fits and postures."""
+    for place, name in OF_STUDIES:
+        monkeypatch.setattr(place, name, remembered(getattr(place, name)))
+    monkeypatch.setattr(clump, "_STARTS", 1)
+    monkeypatch.setattr(workpiece, "_LOOKS", 10)
+
+
 @pytest.mark.slow
+@pytest.mark.usefixtures("quick")
 @pytest.mark.parametrize("name", RICH)
 def test_a_run_has_another_name_if_its_script_differs(
     written: tuple[Path, dict[str, Any]], name: str

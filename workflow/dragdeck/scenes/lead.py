@@ -272,10 +272,11 @@ def _marks(study: Study) -> tuple[float, ...]:
     stiff, windows = _window_study(study), study.chosen_fidelity().windows
     assert windows is not None
     drag, frame, sample = driven(stiff).drive.duration_s, _frame(stiff), _sample_s(stiff)
-    first = max(_until_counted(stiff), _before_s(stiff) + frame * drag)
+    before = _before_s(stiff)
+    first = max(_until_counted(stiff), before + frame * drag)
     places = math.floor((drag - first) / sample + 1e-9)
     chosen = sorted(_spread_out(places)[: windows.most])
-    starts = ((first + number * sample - _before_s(stiff)) / drag for number in chosen)
+    starts = ((first + number * sample - before) / drag for number in chosen)
     return tuple(frame * math.floor(start / frame + 1e-9) for start in starts)
 
 

@@ -65,6 +65,7 @@ def _ranges() -> Sequence[PlausibleRange]:
     ]
 
 
+@cache
 def plausible_range(field: str) -> PlausibleRange | None:
     """The range of a dotted field; None if it has none."""
     return next((row for row in _ranges() if fnmatch(field, row.field)), None)
