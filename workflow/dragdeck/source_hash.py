@@ -13,7 +13,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 _PACKAGES = ("dragdeck", "dragchain")
-"""The packages that others of this project import."""
+"""The packages that others of this project may import."""
 
 
 def source_hash(*modules: str) -> str:
