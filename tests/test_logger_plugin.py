@@ -202,6 +202,7 @@ def test_of_a_failed_job_its_own_message_is_shown(tmp_path: Path, interrupted: b
     with subprocess.Popen(
         [*words, "--show-failed-logs", "run_process"], cwd=tmp_path, env=seen, text=True,
         stderr=subprocess.PIPE, start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # ignored in background
     ) as process:  # fmt: skip
         if interrupted:
             while not (tmp_path / "begun").exists() and process.poll() is None:
