@@ -66,12 +66,12 @@ class Option(Variation):
 
     def named(self) -> Mapping[str, tuple["Option", Settings]]:
         """Each point by its name: itself with its words filled in, and the fields that it sets."""
-        found = {}
+        named_values = {}
         for _, values in self.points():
             shown = [values[field] for field in self.vary]
-            own = {"name": self.name.format(*shown), "what": self.what.format(*shown)}
-            found[own["name"]] = (self.model_copy(update=own), values)
-        return found
+            words = {"name": self.name.format(*shown), "what": self.what.format(*shown)}
+            named_values[words["name"]] = (self.model_copy(update=words), values)
+        return named_values
 
 
 def options(only: Sequence[str] = ()) -> Mapping[str, tuple[Option, Settings]]:
@@ -83,12 +83,12 @@ def options(only: Sequence[str] = ()) -> Mapping[str, tuple[Option, Settings]]:
         There is no such option.
     """
     design = Design[Option].read(DESIGN)
-    known = {name: one for block in design.points for name, one in block.named().items()}
+    known = {name: option for block in design.points for name, option in block.named().items()}
     for name in only:
         if name not in known:
             limit = choices(name, known)
             raise InputError("no such option", field="--only", value=name, limit=limit)
-    chosen = {name: one for name, one in known.items() if name in only or not only}
+    chosen = {name: option for name, option in known.items() if name in only or not only}
     return {
         name: (option, {**design.base, **values})
         for name, (option, values) in {**design.reference.named(), **chosen}.items()
@@ -109,50 +109,50 @@ def option_case(case: Case, values: Settings, seconds: float) -> Case:
     data["fidelity"] = case.study.chosen_fidelity().model_dump(
         mode="json", exclude_unset=True, exclude={"soft_start", "windows"}
     )
-    own = {field: _value(value, case.study) for field, value in values.items()}
-    study = settle_case(case.file, data, own).study
+    changes = {field: _value(value, case.study) for field, value in values.items()}
+    study = settle_case(case.file, data, changes).study
     path, name = study.motion.path, study.motion.path.length_field
-    fraction = min(1.0, seconds * study.motion.axis_speed_m_s / study.motion.path_length_m)
+    fraction = min(1.0, seconds * study.motion.nominal_speed_m_s / study.motion.path_length_m)
     length: Json = {
         f"motion.path.{name}": fraction * getattr(path, name),
         "motion.transient_m": 0.0,
         "motion.counted_from_revolution": None,
     }
-    return settle_case(case.file, data, {**own, **length}, {})
+    return settle_case(case.file, data, {**changes, **length}, {})
 
 
 def _value(value: Any, study: Study) -> Any:
     """A value, or a number times a field of the study; also within an object of fields."""
     if isinstance(value, Mapping):
-        return {name: _value(own, study) for name, own in value.items()}
+        return {name: _value(entry, study) for name, entry in value.items()}
     factor, times, field = value.partition(" * ") if isinstance(value, str) else ("", "", "")
     if not times:
         return value
     try:
-        own = attrgetter(field)(study)
+        current = attrgetter(field)(study)
     except AttributeError:
         raise InputError("the study has no such field", file=DESIGN, field=field) from None
-    return type(own)(float(factor) * own)
+    return type(current)(float(factor) * current)
 
 
 def option_cases(
     case: Case, values: Mapping[str, Settings], seconds: float, report: Report
 ) -> dict[str, Case]:
     """The case of every option that the study can have and does not have itself."""
-    found: dict[str, Case] = {}
+    cases: dict[str, Case] = {}
     standard: Study | None = None
-    for name, own in values.items():
+    for name, changes in values.items():
         try:
-            one = option_case(case, own, seconds)
+            case_of_option = option_case(case, changes, seconds)
         except InputError as error:
             if standard is None:
                 raise
             report(f"{name} is left out: {error}")
             continue
-        if one.study != standard:
-            found[name] = one
-        standard = standard or one.study
-    return found
+        if case_of_option.study != standard:
+            cases[name] = case_of_option
+        standard = standard or case_of_option.study
+    return cases
 
 
 # --- the result ------------------------------------------------------------------------------
@@ -284,13 +284,15 @@ def time_options(
     load, chosen = os.getloadavg()[0], options(only)
     if load > _QUIET:
         report(f"warning: the machine is busy (load average {load:.2f}); CPU times will scatter")
-    cases = option_cases(case, {name: own for name, (_, own) in chosen.items()}, seconds, report)
+    cases = option_cases(
+        case, {name: changes for name, (_, changes) in chosen.items()}, seconds, report
+    )
     first, *others = cases
     folder = out.resolve().parent / "costs"
     own_templates = environment(templates, study_templates(case))
-    beds = {name: _bed(Batch(folder / "filling", own_templates), one, report)
-            for name, one in cases.items()}  # fmt: skip
-    scenes = {name: partial(process_scene, one, beds[name]) for name, one in cases.items()}
+    beds = {name: _bed(Batch(folder / "filling", own_templates), option, report)
+            for name, option in cases.items()}  # fmt: skip
+    scenes = {name: partial(process_scene, option, beds[name]) for name, option in cases.items()}
     records: dict[str, list[RunRecord]] = {name: [] for name in cases}
     for number in range(1, rounds + 1):
         batch = Batch(folder / f"round-{number}", own_templates)
@@ -302,7 +304,7 @@ def time_options(
                 records[name].append(RunRecord.read(batch.folder / name / "state.json"))
     steps_s = {name: make().deck.timestep_s for name, make in scenes.items() if records[name]}
     base = records[first]
-    found = [
+    timed = [
         cost(chosen[name][0], _own(chosen, name, first), pairs, (steps_s[name], steps_s[first]),
              chosen[first][0].what)
         for name in others
@@ -324,10 +326,10 @@ def time_options(
             what=chosen[first][0].what,
             timestep_s=steps_s[first],
             steps=base[0].steps,
-            cpu_us_per_step=1e6 * geometric([one.cpu_time_s / one.steps for one in base]).value,
-            steps_per_s=geometric([one.steps / one.wall_time_s for one in base]).value,
+            cpu_us_per_step=1e6 * geometric([run.cpu_time_s / run.steps for run in base]).value,
+            steps_per_s=geometric([run.steps / run.wall_time_s for run in base]).value,
         ),
-        costs=tuple(found),
+        costs=tuple(timed),
     ).write(out)
 
 

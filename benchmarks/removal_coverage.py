@@ -53,7 +53,7 @@ def weighed(
     sd = part * lost * np.where(unequal & (np.arange(number) % 2 == 1), 3.0, 1.0)
     mass = lost + scatter * sd * random.normal(size=number)
     rows = zip(mass.tolist(), sd.tolist(), strict=True)
-    return [{"mass_loss_kg": one, "time_s": TIME_S, "sd_kg": own} for one, own in rows]
+    return [{"mass_loss_kg": loss, "time_s": TIME_S, "sd_kg": std} for loss, std in rows]
 
 
 def rates(random: Random, number: int, scatter: float, unequal: bool) -> Hits:
@@ -78,7 +78,7 @@ def volume(random: Random, packings: int, trials: int) -> Hits:
         given = {"calibrate": weighed(random, lost, trials, 0.05, 1.0, unequal=False)}
     between = packings - 1 if packings > 1 else np.inf
     coefficient, rate = predict(Removal.model_validate(given), action, DENSITY, between)
-    errors = np.array([[slow_error(one)[0] for one in each] for each in series])
+    errors = np.array([[slow_error(row)[0] for row in each] for each in series])
     mean, error, degrees = patch_means(series.mean(axis=2), errors)
     halves = student_quantile(degrees) * error, mean * rate.coefficient
     half = joined_half_width(*halves, degrees, rate.coefficient_degrees)
@@ -114,12 +114,12 @@ def percentiles(random: Random, packings: int, kind: str, events: int) -> Hits:
         squares = [np.bincount(at, size * wave[frame], 120) ** 2 for wave in waves]
         values.append(np.bincount(at, size, 120) * unit / area)
         errors.append(np.sqrt(frames * np.mean(squares, axis=0)) * unit / area)
-    found = map_spread(np.array(values), np.array(errors), area, np.arange(120))
+    spread = map_spread(np.array(values), np.array(errors), area, np.arange(120))
     true = level[0] if packings == 1 else loads
     true = true / np.average(true, weights=area)
     ends = np.quantile(true, (0.05, 0.95), weights=area, method="inverted_cdf")
     hits = dict[str, bool | None]()
-    for name, estimate, end in zip(("5th", "95th"), found.percentiles, ends, strict=True):
+    for name, estimate, end in zip(("5th", "95th"), spread.percentiles, ends, strict=True):
         hits[f"{name} percentile"] = estimate.contains(float(end)) if estimate.known else None
     return hits
 

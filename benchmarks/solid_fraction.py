@@ -96,9 +96,9 @@ def media() -> Iterator[tuple[str, dict[str, Any], dict[str, Any]]]:
 
 def cases() -> Iterator[tuple[str, Case]]:
     """Shape and case of each packing."""
-    for name, own, others in media():
+    for name, media_of_case, others in media():
         values = {"seed": 1, **others}
-        yield name, settle_case(Path("study.yaml"), {**_STUDY, "media": own}, values)
+        yield name, settle_case(Path("study.yaml"), {**_STUDY, "media": media_of_case}, values)
 
 
 def row(shape: str, case: Case, bed: Packing) -> dict[str, Any]:

@@ -37,7 +37,6 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         parser.addoption(f"--{name}", action="store_true", help=f"run the tests that {what} too")
     parser.addoption("--long-commands", action="store_true", help="run the pages' long commands")
     parser.addoption("--attacks", action="store_true", help="all attacks instead of a sample")
-    parser.addoption("--attack-seed", type=int, default=13, help="of their random choices")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

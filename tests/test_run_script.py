@@ -37,6 +37,8 @@ PACKAGES = ["snakemake", "dragdeck", "dragchain", "pytest", "ruff", "mypy", "lin
 
 SNAKEMAKE = "snakemake [--logger] [dragdeck] [--show-failed-logs]"
 
+EVIDENCE = "[--snakefile] [evidence/Snakefile]"
+
 
 class Clone:
     """A clone of the project's entry that is set up, and the programs on its PATH."""
@@ -118,6 +120,12 @@ def test_usage_needs_nothing(clone: Clone, arguments: list[str]) -> None:
     ("arguments", "called"),
     [
         (["all", "--config", "study=two words"], f"{SNAKEMAKE} [all] [--config] [study=two words]"),
+        (["verify"], f"{SNAKEMAKE} [verify] {EVIDENCE}"),
+        (
+            ["-n", "results/a/validation/report.html"],
+            f"{SNAKEMAKE} [-n] [results/a/validation/report.html] {EVIDENCE}",
+        ),
+        (["status", "verify"], "dragdeck [status] [verify]"),
         (["dragchain", "tables", "a b"], "dragchain [tables] [a b]"),
         (["status", "small"], "dragdeck [status] [small]"),
     ],
@@ -139,6 +147,7 @@ def test_arguments_arrive_whole_from_anywhere(
         (["--quick", "-x"], r"ruff .*\npytest .*\[-m\] \[not engine and not slow\] \[-x\]"),
         (["--attacks", "-k", "kill"], r"pytest .*\[--attacks\] \[-m\] \[attack\] \[-k\] \[kill\]"),
         (["-k", "mesh or run"], r"pytest \[-k\] \[mesh or run\]"),
+        (["--checks"], r"ruff \[check\] .*\n(.*\n)*lint-imports .*"),
         ([], r"pytest \[-n\] [^k]* in .*\nrun: ruff check .*\n(.*\n)*lint-imports .*"),
     ],
 )
@@ -146,7 +155,7 @@ def test_tests_bring_their_packages(clone: Clone, arguments: list[str], called: 
     ended = clone.run("test", *arguments)
     assert ended.returncode == 0
     assert re.fullmatch(rf"{called} in .*\n", ended.stdout)
-    assert clone.extras() == ["cad", "compare", "crate", "docs", "notebook", "search", "test"]
+    assert clone.extras() == ["cad", "crate", "docs", "notebook", "search", "test"]
 
 
 def test_a_failed_check_fails_the_whole_and_still_tests(clone: Clone, tmp_path: Path) -> None:
@@ -226,7 +235,7 @@ chmod +x ../bin/df"""
         ("", ["compare", "--config", "study=a"], {}, ["no studies to compare", "studies=A,B"]),
         ("", ["compare", "--config", "studies=a b;c"], {}, ["not names of studies", "a b;c"]),
         ("", ["search", "--config", "study=a", "fidelity=full"], {}, ["fidelity=full"]),
-        ("", ["setup", "crates"], {}, ["crates", "cad, compare, crate, docs"]),
+        ("", ["setup", "crates"], {}, ["crates", "cad, crate, docs"]),
     ],
 )
 def test_what_is_missing_is_named_with_a_remedy(

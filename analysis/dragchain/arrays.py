@@ -7,8 +7,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from dragdeck.arrays import Floats as Floats
+from dragdeck.arrays import Ints as Ints
+
 Columns = Mapping[str, NDArray[Any]]
 """Columns of a table by their names, (n,) each."""
 

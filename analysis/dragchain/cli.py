@@ -44,7 +44,7 @@ COMMANDS = (
             "loading.write:write_loading", (RUN_DIR,)),
     Command("figures", "draw the figures of a run",
             "Draw the figures of a run. It reads the tables and writes PNG files to "
-            "RUN_DIR/figures and their values to RUN_DIR/tables/figures.json.",
+            "RUN_DIR/figures and their values to RUN_DIR/tables/findings.json.",
             "report.run_figures:write_figures", (RUN_DIR,)),
     Command("network", "write the interactive page on the contact network",
             "Write network.html, an interactive page on the contact network of a process run, to "
@@ -52,7 +52,7 @@ COMMANDS = (
             "network_page.page:write_page", (RUN_DIR,)),
     Command("journal", "draw the figures of a run for a publication",
             "Draw the figures of a process run for a journal, as SVG, PDF and PNG in "
-            "RUN_DIR/figures/journal. It reads the tables and figures.json of the run.",
+            "RUN_DIR/figures/journal. It reads the tables and findings.json of the run.",
             "report.journal:write_journal_figures", (
         RUN_DIR,
         Argument("--paper-colours", action="store_true",
@@ -102,7 +102,7 @@ COMMANDS = (
         Argument("--advice", type=Path, metavar="FILE",
                   help="advice.json of ./run dragdeck advise, to compare costs with it"),
         Argument("--preview", type=Path, metavar="FILE",
-                  help="picture of the set-up: set_up.png of ./run dragdeck preview"),
+                  help="picture of the set-up: results/STUDY/set_up.png"),
         Argument("--signal", type=Path, metavar="FILE",
                   help="measured force signal: reference.signal.file of the study"))),
     Command("compare", "compare cases of one study or of several",

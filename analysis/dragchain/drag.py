@@ -193,8 +193,8 @@ def parts(azimuth_rad: Floats, bins: int) -> tuple[Ints, Ints]:
     width = 2.0 * np.pi / bins
 
     def part(angle: Floats) -> Ints:
-        found: Ints = np.floor((angle + np.pi) / width).astype(np.int64) % bins
-        return found
+        number: Ints = np.floor((angle + np.pi) / width).astype(np.int64) % bins
+        return number
 
     return part(azimuth_rad - _ON_LIMIT_RAD), part(azimuth_rad + _ON_LIMIT_RAD)
 
@@ -234,8 +234,8 @@ def ahead_behind(
         front, back = sums[..., 0], sums[..., 1]
         return np.stack([front, back, front / back, front / (front + back)], axis=-1)
 
-    found = estimates(frame_sums(frame, frames, weights), statistic)
-    return dict(zip(("ahead_n", "behind_n", "ratio", "fraction_ahead"), found, strict=True))
+    ratios = estimates(frame_sums(frame, frames, weights), statistic)
+    return dict(zip(("ahead_n", "behind_n", "ratio", "fraction_ahead"), ratios, strict=True))
 
 
 def azimuth_profile(
@@ -287,8 +287,8 @@ def depth_profile(
 
 def depth_slope(frame: Ints, frames: int, depth_m: Floats, normal_force_n: Floats) -> Estimate:
     """The least-squares slope of a contact's normal force against its depth, in N/m."""
-    one = np.ones_like(depth_m)
-    products = [one, depth_m, normal_force_n, depth_m**2, depth_m * normal_force_n]
+    ones = np.ones_like(depth_m)
+    products = [ones, depth_m, normal_force_n, depth_m**2, depth_m * normal_force_n]
 
     def statistic(sums: Floats) -> Floats:
         n, x, y, xx, xy = np.moveaxis(sums, -1, 0)

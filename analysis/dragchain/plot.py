@@ -36,11 +36,11 @@ def drag(run: FinishedRun, ax: Axes | None = None, *, peaks: bool = True) -> Axe
     -------
     Axes
     """
-    found, ax = run.findings, _axes(ax)
-    run_figures.forces_panel(ax, run, found)
+    findings, ax = run.findings, _axes(ax)
+    run_figures.forces_panel(ax, run, findings)
     if peaks:
-        times_s, label = found.peaks.process_time_s, f"{found.peaks.count} peaks"
-        ax.plot(times_s, found.peaks.drag_n, "v", color=COLOURS["peak"], label=label)
+        times_s, label = findings.peaks.process_time_s, f"{findings.peaks.count} peaks"
+        ax.plot(times_s, findings.peaks.drag_n, "v", color=COLOURS["peak"], label=label)
     ax.legend(loc="upper left", bbox_to_anchor=(0.0, -0.15), frameon=False, fontsize="small")
     true_minus(ax)
     return ax
@@ -64,10 +64,10 @@ def bottleneck(run: FinishedRun, ax: Axes | None = None, *, peaks: bool = True) 
     -------
     Axes
     """
-    found, ax = run.findings, _axes(ax)
-    run_figures.bottlenecks_panel(ax, run, found)
+    findings, ax = run.findings, _axes(ax)
+    run_figures.bottlenecks_panel(ax, run, findings)
     if peaks:
-        run_figures.peak_times(ax, found)
+        run_figures.peak_times(ax, findings)
     return ax
 
 
@@ -115,9 +115,9 @@ def force_over_depth(run: FinishedRun, ax: Axes | None = None, *, total: bool = 
     -------
     Axes
     """
-    found, ax = run.findings, _axes(ax)
+    findings, ax = run.findings, _axes(ax)
     draw = run_figures.load_depth_panel if total else run_figures.force_depth_panel
-    draw(ax, found)
+    draw(ax, findings)
     return ax
 
 
@@ -141,9 +141,9 @@ def chain_lengths(run: FinishedRun, ax: Axes | None = None) -> Axes:
     for name, colour in (("peters", COLOURS["chain"]), ("widest_path", COLOURS["dominant_path"])):
         of_name = chains[chains["definition"] == name]
         whole = of_name[of_name["reaches_bowl"]] if name == "widest_path" else of_name
-        found = whole["n_particles"].value_counts(normalize=True).sort_index()
+        counts = whole["n_particles"].value_counts(normalize=True).sort_index()
         label = f"{name} (mean {whole['n_particles'].mean():.1f})"
-        ax.plot(found.index, found, "o-", color=colour, label=label)
+        ax.plot(counts.index, counts, "o-", color=colour, label=label)
     ax.locator_params(axis="x", integer=True)
     ax.set(xlabel="particles per chain", ylabel="fraction of the chains", yscale="log")
     ax.legend()

@@ -12,10 +12,10 @@ import pandas as pd
 import pyarrow.parquet as pq
 
 from dragchain.errors import TableError, UnknownNameError
+from dragchain.quantities.basis import Basis, notes
 from dragchain.report.findings import FILE, ProcessFindings
 from dragchain.report.run_data import RunData, process_findings
 from dragchain.report.values import Values, read_optional, values_of
-from dragchain.run.basis import Basis, notes
 from dragchain.run.case import upstream_folders
 from dragchain.tables.by_step import intact, read_table
 from dragchain.tables.columns import descriptions, unit_of
@@ -194,7 +194,7 @@ class FinishedRun(RunData):
     def findings(self) -> ProcessFindings:
         """Means, profiles and peaks of a process run, as its report shows them.
 
-        They are read from ``figures.json``, or computed if it does not exist; errors as in
+        They are read from ``findings.json``, or computed if it does not exist; errors as in
         `write_findings`.
         """
         if self.case.scene != "process":
@@ -306,13 +306,15 @@ class Study:
         RejectedRunError
             If the run is not complete, or did not pass an acceptance check.
         """
-        found = [run for run in self.runs if name in (None, run.case.case, run.case.run)]
-        if len(found) == 1:
-            return found[0]
-        if found:
+        matching = [run for run in self.runs if name in (None, run.case.case, run.case.run)]
+        if len(matching) == 1:
+            return matching[0]
+        if matching:
             which = "runs" if name is None else f"runs of case {name!r}"
-            known = [run.case.run if name else run.name for run in found]
-            raise UnknownNameError(f"{self.folder} has {len(found)} {which}: name one", "", known)
+            known = [run.case.run if name else run.name for run in matching]
+            raise UnknownNameError(
+                f"{self.folder} has {len(matching)} {which}: name one", "", known
+            )
         for run in _runs(self.folder, "case.json"):
             if name in (run.case.case, run.case.run):
                 read_accepted(run.folder)

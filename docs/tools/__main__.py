@@ -6,6 +6,9 @@ says which files would change.
 
 import argparse
 import sys
+from pathlib import Path
+
+sys.path.append(str(Path(__file__).parents[2]))  # evidence is not installed
 
 import nbformat
 from figures import draw_all

@@ -94,9 +94,9 @@ class Parts:
             raise PageError(f"no value {name!r}")
         for value in (self.new[name], self.old.get(name, "")):
             words = r"\s+".join(map(re.escape, value.split()))
-            if found := value and re.search(rf"(?<![\w.+-]){words}$", before[-400:]):
-                shown = found[0] if value == self.new[name] else self.new[name]
-                return before.removesuffix(found[0]) + shown
+            if match := value and re.search(rf"(?<![\w.+-]){words}$", before[-400:]):
+                shown = match[0] if value == self.new[name] else self.new[name]
+                return before.removesuffix(match[0]) + shown
         if before[-1:] not in (" ", "\n", "("):
             wanted = f"{self.new[name]!r} or nothing"
             raise PageError(f"put {wanted} before <!--{name}-->: ...{before[-60:]!r}")
@@ -110,12 +110,6 @@ class Parts:
 def values() -> pd.DataFrame:
     """The values as committed: name, value, record, rows, format."""
     return pd.read_csv(VALUES, dtype=str, keep_default_na=False)
-
-
-def typed(page: str) -> str:
-    """A page without what is made."""
-    old = dict(values()[["name", "value"]].to_numpy())
-    return Parts(old, dict.fromkeys(old, ""), lambda _: "", lambda _: "").renewed(page)
 
 
 def _value(row: Mapping[str, str]) -> str:
@@ -152,10 +146,10 @@ def table_recipes() -> dict[str, Recipe]:
 
 def made_table(recipe: Recipe) -> str:
     """A table in Markdown from its recipe."""
-    found = chosen(recipe["record"], recipe.get("rows", ""), recipe.get("join"))
+    table = chosen(recipe["record"], recipe.get("rows", ""), recipe.get("join"))
     if "pivot" in recipe:
-        found = pivoted(found, **recipe["pivot"])
-    cells = [texts(found, form) for form in recipe["columns"].values()]
+        table = pivoted(table, **recipe["pivot"])
+    cells = [texts(table, form) for form in recipe["columns"].values()]
     return markdown_table(list(recipe["columns"]), list(zip(*cells, strict=True)))
 
 

@@ -51,7 +51,7 @@ def record_table(name: str) -> pd.DataFrame:
     if name.startswith("study/"):
         study = Project(ROOT).cases(name.removeprefix("study/"))[0].study
         return pd.DataFrame(_rows(study.model_dump(mode="json")))
-    record = max((one for one in RECORDS if f"{name}/".startswith(f"{one}/")), key=len)
+    record = max((known for known in RECORDS if f"{name}/".startswith(f"{known}/")), key=len)
     if RECORDS[record].suffix == ".csv":
         return pd.read_csv(RECORDS[record])
     keys = name.removeprefix(record).strip("/")
@@ -67,16 +67,16 @@ def document(name: str) -> Any:
 def _rows(part: Any, keys: Sequence[str] = ()) -> Iterator[dict[str, JsonValue]]:
     """One row per object of a list or mapping (column ``name``), with what stands above it."""
     if isinstance(part, list):
-        for one in part:
-            yield from _rows(one, keys)
-    elif part and all(isinstance(one, dict) for one in part.values()):
-        for name, one in part.items():
-            yield from ({"name": name, **row} for row in _rows(one, keys))
+        for item in part:
+            yield from _rows(item, keys)
+    elif part and all(isinstance(entry, dict) for entry in part.values()):
+        for name, item in part.items():
+            yield from ({"name": name, **row} for row in _rows(item, keys))
     elif keys:
-        above = {key: one for key, one in part.items() if key != keys[0]}
+        above = {key: value for key, value in part.items() if key != keys[0]}
         for row in _rows(part[keys[0]], keys[1:]):
             yield {**_flat(above, lists=False), **row}
-    elif part and all(isinstance(one, list) for one in part.values()):
+    elif part and all(isinstance(entry, list) for entry in part.values()):
         yield from pd.DataFrame(part).to_dict("records")
     else:
         yield _flat(part)
@@ -85,11 +85,11 @@ def _rows(part: Any, keys: Sequence[str] = ()) -> Iterator[dict[str, JsonValue]]
 def _flat(part: Json, lists: bool = True) -> dict[str, JsonValue]:
     """The values of nested objects, their keys joined by ``_``."""
     flat: dict[str, JsonValue] = {}
-    for key, one in part.items():
-        if isinstance(one, dict):
-            flat |= {f"{key}_{inner}": value for inner, value in _flat(one, lists).items()}
-        elif lists or not isinstance(one, list):
-            flat[key] = one
+    for key, entry in part.items():
+        if isinstance(entry, dict):
+            flat |= {f"{key}_{inner}": value for inner, value in _flat(entry, lists).items()}
+        elif lists or not isinstance(entry, list):
+            flat[key] = entry
     return flat
 
 
@@ -103,23 +103,23 @@ class Join(TypedDict):
 def chosen(records: str | Sequence[str], rows: str = "", join: Join | None = None) -> pd.DataFrame:
     """Rows of a record, or of several below each other; ValueError if there is none."""
     several = [records] if isinstance(records, str) else records
-    found = pd.concat([record_table(one) for one in several], ignore_index=True)
+    table = pd.concat([record_table(name) for name in several], ignore_index=True)
     if join is not None:
         other = chosen(join["record"])
-        found = found.merge(other, on=join["by"], suffixes=("", "_joined"))
-    if re.fullmatch(r"[\w.-]+", rows) and rows not in found:
-        names = found["name"] if "name" in found else found.iloc[:, 0]
-        found = found[names.astype(str) == rows]
+        table = table.merge(other, on=join["by"], suffixes=("", "_joined"))
+    if re.fullmatch(r"[\w.-]+", rows) and rows not in table:
+        names = table["name"] if "name" in table else table.iloc[:, 0]
+        table = table[names.astype(str) == rows]
     elif rows:
-        found = found.query(rows, engine="python")
-    if found.empty:
+        table = table.query(rows, engine="python")
+    if table.empty:
         raise ValueError(f"no row {rows!r}")
-    return found.reset_index(drop=True)
+    return table.reset_index(drop=True)
 
 
-def pivoted(found: pd.DataFrame, index: list[str], by: list[str]) -> pd.DataFrame:
+def pivoted(table: pd.DataFrame, index: list[str], by: list[str]) -> pd.DataFrame:
     """Values of the columns `by` side by side: ``value_0_01`` for ``value`` where it is 0.01."""
-    wide = found.set_index([*index, *by]).unstack(by, sort=False)
+    wide = table.set_index([*index, *by]).unstack(by, sort=False)
     wide.columns = pd.Index(["_".join(map(str, names)).replace(".", "_") for names in wide])
     return wide.reset_index()
 
@@ -127,23 +127,23 @@ def pivoted(found: pd.DataFrame, index: list[str], by: list[str]) -> pd.DataFram
 # --- texts -------------------------------------------------------------------------------
 
 
-def texts(found: pd.DataFrame, form: str) -> list[str]:
+def texts(table: pd.DataFrame, form: str) -> list[str]:
     """What a format shows of each row; every field is an expression over the columns."""
-    shown = [""] * len(found)
+    shown = [""] * len(table)
     for literal, field, spec, _ in Formatter().parse(form):
-        values = [""] * len(found) if field is None else _field(found, field, spec or "")
+        values = [""] * len(table) if field is None else _field(table, field, spec or "")
         shown = [f"{text}{literal}{value}" for text, value in zip(shown, values, strict=True)]
     return shown
 
 
-def _field(found: pd.DataFrame, field: str, spec: str) -> list[str]:
+def _field(table: pd.DataFrame, field: str, spec: str) -> list[str]:
     if spec.startswith("change"):
-        ends = [found[field.replace("value", end)] for end in ("ci95_low", "ci95_high")]
+        ends = [table[field.replace("value", end)] for end in ("ci95_low", "ci95_high")]
         form = spec.removeprefix("change")
-        return [change(*numbers, form) for numbers in zip(found[field], *ends, strict=True)]
-    values = found[field] if field in found else found.eval(field, engine="python")
+        return [change(*numbers, form) for numbers in zip(table[field], *ends, strict=True)]
+    values = table[field] if field in table else table.eval(field, engine="python")
     if not isinstance(values, pd.Series):
-        values = pd.Series([values] * len(found))
+        values = pd.Series([values] * len(table))
     return [shown_value(value, spec) for value in values.tolist()]
 
 
@@ -173,8 +173,8 @@ LARGE = 2
 def change(value: float, low: float, high: float, form: str = "") -> str:
     """A relative change and its interval in per cent; n.s. if that includes zero."""
 
-    def percent(one: float) -> str:
-        text = f"{100 * one:+{form or ('.0f' if abs(one) >= 0.0995 else '.1f')}}"
+    def percent(fraction: float) -> str:
+        text = f"{100 * fraction:+{form or ('.0f' if abs(fraction) >= 0.0995 else '.1f')}}"
         return text if float(text) else text[1:]
 
     if pd.isna(low):

@@ -100,7 +100,7 @@ def columns() -> str:
     for tables, name, end in zip(rows["tables"], rows["column"], ends, strict=True):
         if isinstance(end, str):
             stems = {ENDS.sub(part, name).replace("**", "*") for part in ("", "_mean")}
-            base = next(one for one in marks if tables in one and one.split()[-1] in stems)
+            base = next(mark for mark in marks if tables in mark and mark.split()[-1] in stems)
             where = "" if base.startswith(f"{tables} {base.split()[-1]}") else f" in `{tables}`"
             marks[base] = f", with {'SE' if end == 'se' else 'CI'}{where}"
     rows["key"] = rows["description"].str.replace(PARTS, "", regex=True)
@@ -116,8 +116,11 @@ def columns() -> str:
             parts["In several tables"].append([*cells, listed])
         else:
             parts.setdefault(listed, []).append(cells)
-    found = ((name, markdown_table(heads[: len(own[0])], own)) for name, own in parts.items())
-    return "\n\n".join(f"### {name}\n\n{table}" for name, table in found)
+    made_tables = (
+        (name, markdown_table(heads[: len(table_rows[0])], table_rows))
+        for name, table_rows in parts.items()
+    )
+    return "\n\n".join(f"### {name}\n\n{table}" for name, table in made_tables)
 
 
 def _braced(names: Sequence[str]) -> str:
@@ -131,7 +134,7 @@ def _braced(names: Sequence[str]) -> str:
 
 def _common(names: Sequence[str]) -> int:
     """Number of characters with which all names start."""
-    return len(list(takewhile(lambda found: len(set(found)) == 1, zip(*names, strict=False))))
+    return len(list(takewhile(lambda letters: len(set(letters)) == 1, zip(*names, strict=False))))
 
 
 # --- study file --------------------------------------------------------------------------
@@ -159,7 +162,9 @@ def _named(names: Sequence[str]) -> str:
     for name in names:
         stem, kind, leaf = re.fullmatch(r"(.*?)(?:\[(.*)\](.*))?", name).groups("")
         kinds.setdefault(stem + (f"[%s]{leaf}" if kind else ""), []).append(kind)
-    several = {stem: ",".join(found) if len(found) < 4 else "any" for stem, found in kinds.items()}
+    several = {
+        stem: ",".join(suffixes) if len(suffixes) < 4 else "any" for stem, suffixes in kinds.items()
+    }
     return ", ".join(f"`{stem.replace('%s', kind)}`" for stem, kind in several.items())
 
 
@@ -227,8 +232,10 @@ def _limits(field: FieldInfo) -> str:
     parts = [part for part in _parts(field.annotation) if part is not types.NoneType]
     if parts and all(get_origin(part) is Annotated for part in parts):
         plain = [part for part in parts if not list(_models(get_args(part)[0]))]
-        return " or ".join(filter(None, (_limits(FieldInfo.from_annotation(one)) for one in plain)))
-    found = [
+        return " or ".join(
+            filter(None, (_limits(FieldInfo.from_annotation(part)) for part in plain))
+        )
+    limits = [
         f"{words} {getattr(item, name):.10g}"
         for item in field.metadata
         for words, name in [_SIGNS.get(type(item), ("", ""))]
@@ -238,8 +245,8 @@ def _limits(field: FieldInfo) -> str:
     high = [item.max_length for item in field.metadata if isinstance(item, MaxLen)]
     if low or high:
         least = f"{low[0]} to {high[0]}" if low and high else f"up to {high[0]}" if high else ""
-        found.append(f"{least or f'{low[0]} or more'} entries")
-    return ", ".join(found)
+        limits.append(f"{least or f'{low[0]} or more'} entries")
+    return ", ".join(limits)
 
 
 _BOUND = re.compile(r"(above|at least|below|at most) ([^ ,]+),? ?")
@@ -255,17 +262,17 @@ def _usual(path: str, limits: str) -> tuple[str, str]:
     if not first or ("`" in rest and not bounds):
         return limits, ""
     accepted, usual = [], []
-    for one in first:
+    for limit in first:
         low = max(
-            one.refused_below, bounds.get("above", -math.inf), bounds.get("at least", -math.inf)
+            limit.refused_below, bounds.get("above", -math.inf), bounds.get("at least", -math.inf)
         )
         high = min(
-            one.refused_above, bounds.get("below", math.inf), bounds.get("at most", math.inf)
+            limit.refused_above, bounds.get("below", math.inf), bounds.get("at most", math.inf)
         )
         above = "above " if low == bounds.get("above") else ""
         below = "below " if high == bounds.get("below") else ""
         accepted.append(f"{above}{low:.10g} to {below}{high:.10g}")
-        usual.append(f"{max(low, one.warned_below):.10g} to {min(high, one.warned_above):.10g}")
+        usual.append(f"{max(low, limit.warned_below):.10g} to {min(high, limit.warned_above):.10g}")
     if usual == [re.sub("above |below ", "", one) for one in accepted]:
         usual = []
     text = "; ".join([*filter(None, [rest.strip()]), *accepted])
@@ -282,10 +289,12 @@ def _default(field: FieldInfo) -> str:
 
 def fidelities() -> str:
     """The built-in fidelities and the settings in which they differ."""
-    found = {name: fidelity.model_dump() for name, fidelity in BUILT_IN_FIDELITIES.items()}
+    fields = {name: fidelity.model_dump() for name, fidelity in BUILT_IN_FIDELITIES.items()}
     names = [name for name in Fidelity.model_fields
-             if len({str(one.get(name)) for one in found.values()}) > 1]  # fmt: skip
-    rows = [[f"`{name}`", *(f"{one[field]:g}" for field in names)] for name, one in found.items()]
+             if len({str(values.get(name)) for values in fields.values()}) > 1]  # fmt: skip
+    rows = [
+        [f"`{name}`", *(f"{values[field]:g}" for field in names)] for name, values in fields.items()
+    ]
     return markdown_table(["name", *names], rows)
 
 
@@ -297,8 +306,8 @@ def bibliography() -> str:
     entries = parse_file(str(ROOT / "docs/references.bib"))
     style = find_plugin("pybtex.style.formatting", "plain")()
     backend = find_plugin("pybtex.backends", "markdown")()
-    formatted = sorted(style.format_entries(entries.entries.values()), key=lambda one: one.key)
-    return "\n\n".join(f"## {one.key}\n\n{one.text.render(backend)}" for one in formatted)
+    formatted = sorted(style.format_entries(entries.entries.values()), key=lambda entry: entry.key)
+    return "\n\n".join(f"## {entry.key}\n\n{entry.text.render(backend)}" for entry in formatted)
 
 
 TEXTS: dict[str, Callable[[], str]] = {

@@ -84,8 +84,8 @@ class Seen:
         self, code: CheckCode, reason: CheckReason | None = None
     ) -> AcceptanceCheck | None:
         """The check of this code, if it did not pass for this reason; any reason if None."""
-        found = (check for check in self.failed if check.code == code)
-        return next((check for check in found if reason in (None, check.reason)), None)
+        matching = (check for check in self.failed if check.code == code)
+        return next((check for check in matching if reason in (None, check.reason)), None)
 
 
 class Verdict(NamedTuple):
@@ -174,9 +174,9 @@ def judge_points(runs: Sequence[PointRun]) -> tuple[pd.DataFrame, list[Verdict]]
         conditions.setdefault(run.point.condition, []).append(run)
     bases = {run.point.regime: run.point.settings for run in runs if run.point.axis == "base"}
     judged = [
-        one
+        condition
         for group in conditions.values()
-        for one in _condition(group, bases.get(group[0].point.regime, {}))
+        for condition in _condition(group, bases.get(group[0].point.regime, {}))
     ]
     return pd.DataFrame([row for row, _ in judged]), [verdict for _, verdict in judged]
 
@@ -227,8 +227,8 @@ def _condition(
         yield row, verdict
 
 
-def _columns(names: Sequence[str], found: Mapping[str, object]) -> dict[str, object]:
-    return {name: found.get(name, math.nan) for name in names}
+def _columns(names: Sequence[str], estimates: Mapping[str, object]) -> dict[str, object]:
+    return {name: estimates.get(name, math.nan) for name in names}
 
 
 def _measured(run: PointRun) -> Row | None:
@@ -239,14 +239,14 @@ def _measured(run: PointRun) -> Row | None:
 def _height_scatter(runs: Sequence[PointRun], measured: Sequence[Row | None]) -> float:
     """Relative standard deviation of bed heights that differ by chance, from the small steps."""
     heights = [
-        own["height_m"]
-        for run, own in zip(runs, measured, strict=True)
-        if own and run.point.fraction <= _SMALL_STEP
+        row["height_m"]
+        for run, row in zip(runs, measured, strict=True)
+        if row and run.point.fraction <= _SMALL_STEP
     ]
     return float(np.std(heights, ddof=1) / np.mean(heights)) if len(heights) > 2 else math.inf
 
 
-def _seen(run: PointRun, own: Row | None, fine: Row | None) -> Seen:
+def _seen(run: PointRun, row: Row | None, fine: Row | None) -> Seen:
     """What classifies a point."""
     record, measure = run.record, MEASURES[run.point.regime]
     return Seen(
@@ -255,9 +255,9 @@ def _seen(run: PointRun, own: Row | None, fine: Row | None) -> Seen:
         steps=record.last_step if record else 0,
         failed=record.failed_checks if record else (),
         refused=run.point.refused,
-        energy_ratio=measure.energy_ratio(own, fine) if own else None,
-        overlap_ratio=own["overlap_ratio"] if own else None,
-        errors=measure.errors(own, fine) if own and fine else {},
+        energy_ratio=measure.energy_ratio(row, fine) if row else None,
+        overlap_ratio=row["overlap_ratio"] if row else None,
+        errors=measure.errors(row, fine) if row and fine else {},
     )
 
 
@@ -337,15 +337,15 @@ def _safe_steps(points: pd.DataFrame) -> dict[str, object]:
     }
 
 
-def regimes(found: pd.DataFrame) -> dict[str, SafeSteps]:
+def regimes(conditions: pd.DataFrame) -> dict[str, SafeSteps]:
     """The largest safe step of each regime that has one.
 
     Parameters
     ----------
-    found : DataFrame
+    conditions : DataFrame
         As `conditions` makes it.
     """
-    groups = {name: found[found["regime"] == name] for name in REGIMES}
+    groups = {name: conditions[conditions["regime"] == name] for name in REGIMES}
     return {
         name: _regime(group)
         for name, group in groups.items()
@@ -353,8 +353,8 @@ def regimes(found: pd.DataFrame) -> dict[str, SafeSteps]:
     }
 
 
-def _regime(found: pd.DataFrame) -> SafeSteps:
-    usable = found[found["usable"]]
+def _regime(conditions: pd.DataFrame) -> SafeSteps:
+    usable = conditions[conditions["usable"]]
     base = usable[usable["axis"] == "base"]
     ordinary = usable[usable["restitution"] >= _ORDINARY_RESTITUTION]
     worst = usable.sort_values("safe_fraction", kind="stable").iloc[0]
@@ -371,7 +371,7 @@ def _regime(found: pd.DataFrame) -> SafeSteps:
     return SafeSteps.model_validate(
         {
             **least,
-            "conditions": len(found),
+            "conditions": len(conditions),
             "usable": len(usable),
             "limited_by": str(worst["label"]),
             "over_rule": least["safe_fraction"] / RULE,
@@ -416,13 +416,13 @@ def _envelope(largest: pd.Series) -> tuple[float, ...]:
 
 
 def summarise_map(
-    points: pd.DataFrame, found: pd.DataFrame, runs: Sequence[PointRun]
+    points: pd.DataFrame, conditions: pd.DataFrame, runs: Sequence[PointRun]
 ) -> StabilityFile:
     """What ``./run dragdeck check`` uses: safe steps, errors of impacts, and where they come from.
 
     Parameters
     ----------
-    points, found : DataFrame
+    points, conditions : DataFrame
         As `judge` and `conditions` make them.
     runs : sequence of PointRun
     """
@@ -443,6 +443,6 @@ def summarise_map(
             energy_limits=ENERGY_LIMITS,
             rest_floor=REST_FLOOR,
         ),
-        regimes=regimes(found),
+        regimes=regimes(conditions),
         restitution_error=restitution_errors(points),
     )

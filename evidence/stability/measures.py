@@ -282,20 +282,20 @@ def _bed_energy(run: Run) -> Floats:
     )
 
 
-def _bed_errors(own: Row, fine: Row) -> dict[str, Estimate]:
+def _bed_errors(row: Row, fine: Row) -> dict[str, Estimate]:
     """The relative error of the height; a settled bed's reference knows how heights scatter."""
     half_width = NORMAL_QUANTILE * math.sqrt(2.0) * fine.get("height_scatter", 0.0)
-    return {"height": Estimate.around(own["height_m"] / fine["height_m"] - 1.0, half_width)}
+    return {"height": Estimate.around(row["height_m"] / fine["height_m"] - 1.0, half_width)}
 
 
-def _settled_energy(own: Row, fine: Row | None) -> float | None:
-    return None if fine is None else own["peak_energy_j"] / fine["peak_energy_j"]
+def _settled_energy(row: Row, fine: Row | None) -> float | None:
+    return None if fine is None else row["peak_energy_j"] / fine["peak_energy_j"]
 
 
-def _resting_energy(own: Row, fine: Row | None) -> float | None:
+def _resting_energy(row: Row, fine: Row | None) -> float | None:
     if fine is None:
         return None
-    return own["rest_energy_ratio"] / max(fine["rest_energy_ratio"], REST_FLOOR)
+    return row["rest_energy_ratio"] / max(fine["rest_energy_ratio"], REST_FLOOR)
 
 
 # --- impacts, met at different moments within a step -------------------------------------------
@@ -360,11 +360,11 @@ def _energy(frame: Frame, density_kg_m3: float) -> Floats:
     return np.asarray(0.5 * mass * (speed + 0.4 * radius**2 * spin))
 
 
-def _impact_errors(own: Row, fine: Row) -> dict[str, Estimate]:
+def _impact_errors(row: Row, fine: Row) -> dict[str, Estimate]:
     """Of all impacts the worst counts."""
 
     def worst(name: str, scale: float = 1.0) -> Estimate:
-        ends = [(own[f"{name}_{end}"] - fine[f"{name}_mean"]) / scale for end in ("low", "high")]
+        ends = [(row[f"{name}_{end}"] - fine[f"{name}_mean"]) / scale for end in ("low", "high")]
         return Estimate.around(max(ends, key=abs), 0.0)
 
     return {
@@ -374,10 +374,10 @@ def _impact_errors(own: Row, fine: Row) -> dict[str, Estimate]:
     }
 
 
-def _impact_energy(own: Row, fine: Row | None) -> float:
+def _impact_energy(row: Row, fine: Row | None) -> float:
     """Energy after over before, over what the reference has where its law itself gains."""
     gained = fine["energy_after_over_before"] if fine else 1.0
-    return own["energy_after_over_before"] / max(1.0, gained)
+    return row["energy_after_over_before"] / max(1.0, gained)
 
 
 # --- a workpiece that is dragged through a bed -------------------------------------------------
@@ -439,8 +439,8 @@ def _drag_contacts(point: PointRun, run: Run) -> Row:
         contacts = _engine_contacts(frame, pairs[on_workpiece.step], workpiece, run.case)
         largest = max(largest, contacts.overlap_ratio(frame.radii))
         if on_workpiece.step in some:
-            own = network_frequency(run.case, point.sticks, frame.radii, contacts)
-            frequency = max(frequency, own)
+            own_frequency = network_frequency(run.case, point.sticks, frame.radii, contacts)
+            frequency = max(frequency, own_frequency)
     return {"overlap_ratio": largest, "frequency_rad_s": frequency}
 
 
@@ -461,16 +461,16 @@ def _engine_contacts(
     return Contacts(bodies, normal[hit], rows.overlap_m[hit], partner)
 
 
-def _drag_errors(own: Row, fine: Row) -> dict[str, Estimate]:
+def _drag_errors(row: Row, fine: Row) -> dict[str, Estimate]:
     """The relative error of the mean drag, positive where it is stronger."""
     size = abs(fine["drag_mean_n"])
-    error = (own["drag_mean_n"] - fine["drag_mean_n"]) / -size
-    half_width = math.hypot(own["drag_half_width_n"], fine["drag_half_width_n"])
+    error = (row["drag_mean_n"] - fine["drag_mean_n"]) / -size
+    half_width = math.hypot(row["drag_half_width_n"], fine["drag_half_width_n"])
     return {"mean drag": Estimate.around(error, half_width / size)}
 
 
-def _drag_energy(own: Row, _: Row | None) -> float:
-    return own["motion_ratio"]
+def _drag_energy(row: Row, _: Row | None) -> float:
+    return row["motion_ratio"]
 
 
 # --- by regime ---------------------------------------------------------------------------------

@@ -185,5 +185,7 @@ def bed_name(settings: Settings) -> str:
 
 def _bed(settings: Settings) -> dict[str, float]:
     """What a bed depends on; one of elastic particles would never rest, so it is damped."""
-    own = {key: float(settings[key]) for key in ("youngs_modulus_pa", "restitution", "friction")}
-    return {**own, "restitution": min(own["restitution"], _MOST_ELASTIC_BED)}
+    numbers = {
+        key: float(settings[key]) for key in ("youngs_modulus_pa", "restitution", "friction")
+    }
+    return {**numbers, "restitution": min(numbers["restitution"], _MOST_ELASTIC_BED)}

@@ -55,23 +55,23 @@ def write_stability(out_dir: Path, lists: Sequence[Path]) -> None:
     """
     runs = read_points(lists)
     points, verdicts = judge_points(runs)
-    found = conditions(points)
-    summary = summarise_map(points, found, runs)
+    found_conditions = conditions(points)
+    summary = summarise_map(points, found_conditions, runs)
     tested = points[~points["reference"]]
     axes = points.groupby(["regime", "axis"], sort=False)["label"]
     write_report(
         out_dir,
         "stability/stability.html.j2",
-        draw=lambda: draw_map(points, found, summary.restitution_error),
-        tables={"points": points, "conditions": found},
+        draw=lambda: draw_map(points, found_conditions, summary.restitution_error),
+        tables={"points": points, "conditions": found_conditions},
         documents={"stability": summary},
         package="evidence",
         summary=summary,
         phases=PHASES,
         class_names=CLASSES,
         classes=[
-            {"regime": regime, **Counter(dict.fromkeys(CLASSES, 0)), **Counter(own["class"])}
-            for regime, own in tested.groupby("regime", sort=False)
+            {"regime": regime, **Counter(dict.fromkeys(CLASSES, 0)), **Counter(group["class"])}
+            for regime, group in tested.groupby("regime", sort=False)
         ],
         axes=[
             {
@@ -83,7 +83,7 @@ def write_stability(out_dir: Path, lists: Sequence[Path]) -> None:
             for names, group in axes
         ],
         errors=pd.DataFrame(dict(summary.restitution_error)).to_dict("records"),
-        conditions=[_with_reference(row) for row in found.to_dict("records")],
+        conditions=[_with_reference(row) for row in found_conditions.to_dict("records")],
         refusals=list(dict.fromkeys(points.loc[points["class"] == REFUSED, "why"])),
         past_limits=sum(verdict.check == "within_limits" for verdict in verdicts),
         rule=RULE,
@@ -133,9 +133,9 @@ def draw_map(
     """
     tested = points[~points["reference"]]
     drawn = {}
-    for regime in (one for one in REGIMES if (points["regime"] == one).any()):
-        own, rows = (table[table["regime"] == regime] for table in (tested, conditions))
-        drawn[f"map_{regime}"] = draw_regime(own, rows, _TITLES[regime])
+    for regime in (name for name in REGIMES if (points["regime"] == name).any()):
+        finished, rows = (table[table["regime"] == regime] for table in (tested, conditions))
+        drawn[f"map_{regime}"] = draw_regime(finished, rows, _TITLES[regime])
     if errors.steps_per_contact:
         drawn["restitution_error"] = _errors(head_on_impacts(points), errors)
     return drawn
@@ -188,9 +188,12 @@ def _mark(axes: Axes, line: int, at: float, steps: Floats, style: str) -> None:
 
 def _errors(impacts: pd.DataFrame, table: RestitutionErrors) -> Figure:
     figure, (axes,) = new_panels(3.6)
-    own = impacts[impacts["restitution_error"].notna()]
-    error, shades = own["restitution_error"].abs().clip(lower=1e-6), own["setting_restitution"]
-    dots = axes.scatter(own["steps_per_contact"], error, 16, shades, vmin=0.0, vmax=1.0)
+    broken = impacts[impacts["restitution_error"].notna()]
+    error, shades = (
+        broken["restitution_error"].abs().clip(lower=1e-6),
+        broken["setting_restitution"],
+    )
+    dots = axes.scatter(broken["steps_per_contact"], error, 16, shades, vmin=0.0, vmax=1.0)
     for label, values, colour in (
         ("largest, any restitution", table.worst, RED),
         ("largest, e ≥ 0.5", table.ordinary_worst, BLUE),

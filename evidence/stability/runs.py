@@ -53,9 +53,12 @@ def point_case(base: Case, settings: Settings, fraction: float) -> Case:
     """
     study = base.study
     pair = {"restitution": settings["restitution"], "friction": settings["friction"]}
-    modulus, own = float(settings["youngs_modulus_pa"]), particle_material(study).youngs_modulus_pa
+    modulus, media = (
+        float(settings["youngs_modulus_pa"]),
+        particle_material(study).youngs_modulus_pa,
+    )
     fidelity = {
-        "youngs_modulus_scale": modulus / own,
+        "youngs_modulus_scale": modulus / media,
         "timestep_fraction": fraction,
         "filling_timestep_fraction": fraction,
         "speed_factor": 1.0,
@@ -75,7 +78,7 @@ def _motion(study: Study, speed: float) -> Motion:
     if around is None:
         raise InputError("the map's study drags on a circle", field="motion.path")
     length = min(max(_DRAG_S * speed, _SHORTEST_DRAG_M), _LONGEST_DRAG_REVOLUTIONS * around)
-    motion = study.motion.at(speed / study.motion.axis_speed_m_s, length)
+    motion = study.motion.at(speed / study.motion.nominal_speed_m_s, length)
     return motion.model_copy(update={"transient_m": _TRANSIENT_FRACTION * length})
 
 
@@ -112,8 +115,8 @@ class MapRuns:
             A bed did not come to rest.
         """
         batch = Batch(self.results / "filling", self.templates)
-        for name, own in bed_settings(map_file).items():
-            case = point_case(self.base, own, _SAFE_FILLING_FRACTION)
+        for name, settings in bed_settings(map_file).items():
+            case = point_case(self.base, settings, _SAFE_FILLING_FRACTION)
             filling = case.study.filling.model_copy(update={"energy_ratio": _BED_ENERGY_RATIO})
             study = case.study.model_copy(update={"filling": filling})
             batch.result(name, filling_scene(replace(case, study=study)))
@@ -132,7 +135,7 @@ class MapRuns:
         points = load_points(map_file, regime)
         batch = Batch(self.results / regime, self.templates)
         refused = batch.each({point.name: self._scene(point) for point in points}, self.report)
-        rows = [one.model_copy(update={"refused": refused.get(one.name)}) for one in points]
+        rows = [point.model_copy(update={"refused": refused.get(point.name)}) for point in points]
         file = self.results / "points" / f"{regime}.json"
         PointsFile(points=rows).write(file)
         return file

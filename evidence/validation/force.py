@@ -104,15 +104,17 @@ def force_of_packings(packings: Sequence[MeasuredRun]) -> Force:
 
 
 def _packing_force(run: MeasuredRun) -> PackingForce:
-    forces, own = summarise_forces(read_counted(run.folder, FORCES)), run.measures
-    numbers = {"seed": run.seed, "bed_height_m": own.single["bed_height"]}
-    return PackingForce.model_validate({**dict(own), **dict(own.cost), **numbers, **forces})
+    forces, measures = summarise_forces(read_counted(run.folder, FORCES)), run.measures
+    numbers = {"seed": run.seed, "bed_height_m": measures.single["bed_height"]}
+    return PackingForce.model_validate(
+        {**dict(measures), **dict(measures.cost), **numbers, **forces}
+    )
 
 
 def _together(means: Sequence[MeanEstimate]) -> Together:
     return Together(
-        mean=packing_mean([one.mean for one in means]),
-        std=packing_mean([one.std for one in means], ratio=True),
+        mean=packing_mean([mean.mean for mean in means]),
+        std=packing_mean([mean.std for mean in means], ratio=True),
     )
 
 
@@ -149,7 +151,7 @@ def _peaks(packings: Sequence[MeasuredRun]) -> dict[str, Estimate]:
                 min_prominence_n=factor * float(np.std(drag, ddof=1)),
             )
             counts[f"{factor:g}"].append(len(peaks.index) / run.measures.arc_m)
-    return {factor: packing_mean(found) for factor, found in counts.items()}
+    return {factor: packing_mean(count) for factor, count in counts.items()}
 
 
 def compare_drag(drag: Together, case: CaseOfRun) -> tuple[Compared, ...]:
@@ -236,7 +238,7 @@ def effect_table(rows: Sequence[Effect]) -> pd.DataFrame:
 
 def _base(runs: RunsByBed, run: MeasuredRun) -> MeasuredRun:
     """What a run is to be compared with."""
-    alike = (one for one in runs.all if one.settings == run.settings and not one.changed)
+    alike = (other for other in runs.all if other.settings == run.settings and not other.changed)
     return next(alike, runs.all[0]) if run.changed else runs.all[0]
 
 
@@ -248,8 +250,8 @@ def _of_quantity(runs: RunsByBed, quantity: str, sizes: Sequence[float]) -> Iter
     weights /= weights.max()
     fit = fit_effects(weights[:, None] * design, weights * np.log(sizes), range(len(weights)))
     for setting in settings[1:]:
-        own = [run for run in runs.all if run.but_for_bed == setting]
-        run, base = own[0], _base(runs, own[0])
+        same = [run for run in runs.all if run.but_for_bed == setting]
+        run, base = same[0], _base(runs, same[0])
         field, value = next(iter(run.changed.items()), ("", None))
         before = base.measures.inputs.get(field)
         logarithm = fit.estimate(units[run.but_for_bed] - units[base.but_for_bed])
@@ -258,7 +260,7 @@ def _of_quantity(runs: RunsByBed, quantity: str, sizes: Sequence[float]) -> Iter
         yield Effect(
             quantity=quantity,
             **run.settings.parameters(),
-            runs=len(own),
+            runs=len(same),
             field=field,
             value=value,
             reference_value=before,
@@ -331,14 +333,14 @@ def load_of_packings(packings: Sequence[MeasuredRun]) -> LoadingOverPackings:
         If a packing has no ``loading.json``.
     """
     every = [Loading.read(run.folder / FILE) for run in packings]
-    first, numbers = every[0], [_numbers(one) for one in every]
+    first, numbers = every[0], [_numbers(packing) for packing in every]
     return LoadingOverPackings(
         rows=tuple(
             LoadingRow(label=key[0], unit=key[1], **vars(packing_mean([n[key] for n in numbers])))
             for key in numbers[0]
         ),
-        types={kind: _shares([one.types[kind] for one in every]) for kind in first.types},
-        closure=max(one.closure.facets_relative_error for one in every),
+        types={kind: _shares([packing.types[kind] for packing in every]) for kind in first.types},
+        closure=max(packing.closure.facets_relative_error for packing in every),
         limits=first.limits,
         sample_interval_s=first.sample_interval_s,
     )
@@ -356,12 +358,12 @@ def _numbers(loading: Loading) -> dict[tuple[str, str], float]:
     return {
         ("mean_contacts", ""): loading.mean_contacts.value,
         **{(name, unit): loading.per_metre[name].value for name, unit in _PER_METRE.items()},
-        **{(name, "%"): 100.0 * one.value for name, one in fractions.items()},
+        **{(name, "%"): 100.0 * fraction.value for name, fraction in fractions.items()},
     }
 
 
 def _shares(types: Sequence[ContactType]) -> dict[str, Estimate]:
     return {
-        name: packing_mean([100.0 * one.fraction_of[name].value for one in types])
+        name: packing_mean([100.0 * kinds.fraction_of[name].value for kinds in types])
         for name in _SHARES
     }

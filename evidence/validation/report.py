@@ -86,18 +86,18 @@ def write_validation(out_dir: Path, run_dirs: Sequence[Path], command: str) -> N
         There are too few runs to compare settings.
     """
     runs = read_validation_runs(run_dirs)
-    first, found = runs.packings[0], validation_of(runs, command)
+    first, validation = runs.packings[0], validation_of(runs, command)
     write_report(
         out_dir,
         "validation/validation.html.j2",
-        draw=lambda: _draw(runs, found),
+        draw=lambda: _draw(runs, validation),
         pictures={"workpiece": (first.folder / "figures" / "workpiece.png").read_bytes()},
-        tables=_tables(found),
-        documents={"validation": found},
+        tables=_tables(validation),
+        documents={"validation": validation},
         package="evidence",
-        found=json.loads(found.as_text()),
+        found=json.loads(validation.as_text()),
         assumptions=first.case.assumptions,
-        varied={row.field for row in found.effects},
+        varied={row.field for row in validation.effects},
         runs=runs,
     )
 
@@ -121,20 +121,20 @@ def validation_of(runs: RunsByBed, command: str) -> Validation:
     )
 
 
-def _tables(found: Validation) -> dict[str, pd.DataFrame]:
+def _tables(validation: Validation) -> dict[str, pd.DataFrame]:
     """The numbers of the page as tables, by name."""
-    force, statements = found.force, found.statements
+    force, statements = validation.force, validation.statements
     network = statements.network
     compared = [
         row.model_dump(exclude={"std_ratio"} if row.std_ratio is None else None)
-        for row in found.comparison
+        for row in validation.comparison
     ]
     return {
         "packings": pd.json_normalize([row.model_dump() for row in force.packings], sep="_"),
-        "effects": effect_table(found.effects),
-        "load": pd.DataFrame([dict(row) for row in found.load.rows]),
+        "effects": effect_table(validation.effects),
+        "load": pd.DataFrame([dict(row) for row in validation.load.rows]),
         "comparison": pd.json_normalize(compared, sep="_"),
-        "statements": claim_table(found.claims),
+        "statements": claim_table(validation.claims),
         "corridor": pd.DataFrame(
             {
                 **_bins(network.edges_diameters, "diameters"),
@@ -163,13 +163,13 @@ def _profile(profile: PackingProfile, unit: str) -> pd.DataFrame:
 # --- figures -----------------------------------------------------------------------------------
 
 
-def _draw(runs: RunsByBed, found: Validation) -> dict[str, Figure]:
+def _draw(runs: RunsByBed, validation: Validation) -> dict[str, Figure]:
     """The figures of the page, by name."""
     return {
-        "comparison": _comparison(found.force, found.comparison, found.effects),
-        "traces": _traces(runs.packings, found.comparison),
-        "around": _around(found.statements),
-        "corridor": _corridor(found.statements),
+        "comparison": _comparison(validation.force, validation.comparison, validation.effects),
+        "traces": _traces(runs.packings, validation.comparison),
+        "around": _around(validation.statements),
+        "corridor": _corridor(validation.statements),
     }
 
 
@@ -198,11 +198,13 @@ def _trace(axes: Axes, run: MeasuredRun) -> None:
 
 
 def _bands(axes: Axes, compared: Sequence[Compared]) -> None:
-    for one in compared:
-        colour = COLOURS[one.label]
-        axes.axhline(one.mean_n, color=colour, linestyle="--", label=f"{one.label} mean")
-        if one.std_n and one.label == "experiment":
-            low, high = one.mean_n - one.std_n, one.mean_n + one.std_n
+    for reference in compared:
+        colour = COLOURS[reference.label]
+        axes.axhline(
+            reference.mean_n, color=colour, linestyle="--", label=f"{reference.label} mean"
+        )
+        if reference.std_n and reference.label == "experiment":
+            low, high = reference.mean_n - reference.std_n, reference.mean_n + reference.std_n
             label = "experiment, ± one standard deviation"
             axes.axhspan(low, high, color=colour, alpha=0.12, linewidth=0, label=label)
 
@@ -215,14 +217,16 @@ def _comparison(force: Force, compared: Sequence[Compared], effects: Sequence[Ef
     """Mean drags: the source's, each packing's with its own interval, and all together."""
     together = force.together["drag_n"].mean
     rows: list[_Row] = [
-        (one.label, Estimate.around(one.mean_n, 0.0), COLOURS[one.label]) for one in compared
+        (mean.label, Estimate.around(mean.mean_n, 0.0), COLOURS[mean.label]) for mean in compared
     ]
-    rows += [(f"packing {one.seed}", one.drag_n.estimate, BLUE) for one in force.packings]
+    rows += [
+        (f"packing {packing.seed}", packing.drag_n.estimate, BLUE) for packing in force.packings
+    ]
     rows.append(("all packings", together, "black"))
-    for one in effects:
-        if one.quantity == "drag_mean" and not one.field:
-            changed = _change(one).mapped(lambda change: together.value * (1.0 + change))
-            rows.append((_fidelity(one), changed, GREY))
+    for effect in effects:
+        if effect.quantity == "drag_mean" and not effect.field:
+            changed = _change(effect).mapped(lambda change: together.value * (1.0 + change))
+            rows.append((_fidelity(effect), changed, GREY))
     return _rows(rows, "mean drag (N); bars: 95 % CI")
 
 
@@ -238,28 +242,28 @@ def _fidelity(effect: Effect) -> str:
 def _rows(rows: Sequence[_Row], label: str) -> Figure:
     """Values with their intervals, one below the other."""
     figure, (axes,) = new_panels(0.9 + 0.27 * len(rows))
-    for place, (_, one, colour) in enumerate(rows):
-        row(axes, place, one.value, one, colour)
+    for place, (_, estimate, colour) in enumerate(rows):
+        row(axes, place, estimate.value, estimate, colour)
     row_names(axes, [name for name, *_ in rows])
     axes.set(xlabel=label)
     return figure
 
 
-def _around(found: Statements) -> Figure:
+def _around(statements: Statements) -> Figure:
     """Normal force on the workpiece by azimuth, and that of a contact by depth."""
     figure = new_figure(3.9)
     left, right = compass(figure, 1, 2, 1), figure.add_subplot(1, 2, 2)
-    edges = found.azimuth.edges
-    compass_bars(left, edges, found.azimuth.columns, 100.0, "%")
-    depth_bars(right, found.depth.edges, found.depth.columns)
+    edges = statements.azimuth.edges
+    compass_bars(left, edges, statements.azimuth.columns, 100.0, "%")
+    depth_bars(right, statements.depth.edges, statements.depth.columns)
     right.set(xlabel="mean normal force per contact (N)", ylabel="depth (mm)")
     right.set_title("bars: 95 % CI over packings")
     return figure
 
 
-def _corridor(found: Statements) -> Figure:
+def _corridor(statements: Statements) -> Figure:
     """Mean contact force of the network ahead of the workpiece and behind it."""
-    network, far = found.network, found.numbers["far_n"]
+    network, far = statements.network, statements.numbers["far_n"]
     figure, (axes,) = new_panels(3.2)
     edges = np.array(network.edges_diameters)
     middle = (edges[1:] + edges[:-1]) / 2

@@ -94,9 +94,9 @@ def read_validation_runs(folders: Sequence[Path]) -> RunsByBed:
     if not standard.complete:
         raise TableError(f"{folders[0]}: the reference run is not complete, so nothing is known")
     first, *runs = (
-        MeasuredRun(folder, load_case(folder), own, differing_inputs(own, standard))
-        for folder, own in measures.items()
-        if own.complete
+        MeasuredRun(folder, load_case(folder), measure, differing_inputs(measure, standard))
+        for folder, measure in measures.items()
+        if measure.complete
     )
     packings = [first, *(run for run in runs if run.but_for_bed == first.but_for_bed)]
     if len(packings) < _FEWEST:

@@ -89,13 +89,13 @@ class Network(Part):
     behind_n: EstimateColumns
 
 
-def network_numbers(one: Corridor) -> dict[str, float | None]:
+def network_numbers(corridor: Corridor) -> dict[str, float | None]:
     """Numbers of a corridor, as of `Statements`."""
     return {
-        "network_ratio": float(one.ahead.mean() / one.behind.mean()),
-        "network_at_wall": float(one.ahead[-1]) / one.far,
-        "far_n": one.far,
-        "half_reach_diameters": one.half_reach,
+        "network_ratio": float(corridor.ahead.mean() / corridor.behind.mean()),
+        "network_at_wall": float(corridor.ahead[-1]) / corridor.far,
+        "far_n": corridor.far,
+        "half_reach_diameters": corridor.half_reach,
     }
 
 
@@ -251,19 +251,23 @@ _NO_RATIOS = (
 def of_packings(packings: Sequence[MeasuredRun]) -> Statements:
     """Every number over the packings."""
     around, corridors = [contacts_of(run) for run in packings], [corridor(run) for run in packings]
-    found = [
-        {**one.numbers, **network_numbers(own)} for one, own in zip(around, corridors, strict=True)
+    numbers_of_each = [
+        {**packing.numbers, **network_numbers(corridor)}
+        for packing, corridor in zip(around, corridors, strict=True)
     ]
     return Statements(
         packings=len(packings),
-        numbers={name: _together(name, [one[name] for one in found]) for name in found[0]},
-        azimuth=_profile([one.azimuth for one in around], circumference(AZIMUTH_BINS)),
-        depth=_profile([one.depth for one in around], around[0].depth_edges_m),
+        numbers={
+            name: _together(name, [numbers[name] for numbers in numbers_of_each])
+            for name in numbers_of_each[0]
+        },
+        azimuth=_profile([packing.azimuth for packing in around], circumference(AZIMUTH_BINS)),
+        depth=_profile([packing.depth for packing in around], around[0].depth_edges_m),
         network=Network(
             edges_diameters=tuple(corridors[0].edges.tolist()),
             wall_diameters=corridors[0].wall,
-            ahead_n=bin_by_bin(np.array([one.ahead for one in corridors])),
-            behind_n=bin_by_bin(np.array([one.behind for one in corridors])),
+            ahead_n=bin_by_bin(np.array([corridor.ahead for corridor in corridors])),
+            behind_n=bin_by_bin(np.array([corridor.behind for corridor in corridors])),
         ),
     )
 
@@ -327,8 +331,8 @@ def _mean(values: Floats) -> float:
     return float(values.mean()) if values.size else float("nan")
 
 
-def _ratio(one: float, other: float) -> float:
-    return one / other if other else float("nan")
+def _ratio(first: float, other: float) -> float:
+    return first / other if other else float("nan")
 
 
 def _around(azimuth: Floats, force: Floats) -> Floats:
@@ -385,7 +389,7 @@ _CLAIMS = (
 """Statements of Uhlmann et al. (2015): name, number that tests it, no effect, unit."""
 
 
-def claims(found: Statements) -> tuple[Claim, ...]:
+def claims(statements: Statements) -> tuple[Claim, ...]:
     """The statements that have a number here."""
     return tuple(
         Claim(
@@ -397,7 +401,7 @@ def claims(found: Statements) -> tuple[Claim, ...]:
             estimate=estimate,
         )
         for statement, number, null, unit in _CLAIMS
-        if (estimate := found.numbers[number]) is not None
+        if (estimate := statements.numbers[number]) is not None
     )
 
 

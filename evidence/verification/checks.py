@@ -103,7 +103,7 @@ def _curve(x: Floats | Ints, reference: Floats | float, engine: Floats) -> Float
 # --- tables ---------------------------------------------------------------------------------
 
 
-def check_rows(run: Recording, one: QuantityCheck) -> pd.DataFrame:
+def check_rows(run: Recording, check: QuantityCheck) -> pd.DataFrame:
     """The rows of a comparison with their verdicts.
 
     Returns
@@ -113,25 +113,25 @@ def check_rows(run: Recording, one: QuantityCheck) -> pd.DataFrame:
         nothing does), ``scale`` is the largest absolute reference of the series, or 1 for a
         ratio, and ``error`` is that of the engine divided by it.
     """
-    x, reference, engine = np.array(one.rows, dtype=np.float64).reshape(-1, 3).T
-    size = one.scale or float(np.abs(reference).max(initial=0.0)) or 1.0
+    x, reference, engine = np.array(check.rows, dtype=np.float64).reshape(-1, 3).T
+    size = check.scale or float(np.abs(reference).max(initial=0.0)) or 1.0
     error = np.abs(engine - reference) / size
-    verdicts = ("pass", "fail") if one.against in JUDGED else ("agrees", "differs")
+    verdicts = ("pass", "fail") if check.against in JUDGED else ("agrees", "differs")
     return pd.DataFrame(
         {
             "number": run.case.number,
             "test": run.case.test,
-            "series": one.series or series_name(run),
-            "quantity": one.quantity,
+            "series": check.series or series_name(run),
+            "quantity": check.quantity,
             "x_name": run.case.vary,
             "x": x,
-            "against": one.against,
+            "against": check.against,
             "reference": reference,
             "engine": engine,
             "scale": size,
             "error": error,
-            "tolerance": one.tolerance,
-            "verdict": np.where(error <= one.tolerance, *verdicts),
+            "tolerance": check.tolerance,
+            "verdict": np.where(error <= check.tolerance, *verdicts),
         }
     )
 
@@ -165,13 +165,13 @@ def checks_by_test(runs: Sequence[Recording]) -> Mapping[str, Compared]:
     for run in runs:
         if run.case.test not in CHECKS:
             raise TableError(f"{run.case.run}: the suite has no test {run.case.test!r}")
-    found = {}
+    checks = {}
     for test, check in CHECKS.items():
-        own = [run for run in runs if run.case.test == test]
-        found[test] = [(run, one) for run in own for one in check(run)]
+        of_test = [run for run in runs if run.case.test == test]
+        checks[test] = [(run, row) for run in of_test for row in check(run)]
         if test == "time_step":
-            found[test] += _order_of_convergence(own)
-    return {test: compared for test, compared in found.items() if compared}
+            checks[test] += _order_of_convergence(of_test)
+    return {test: compared for test, compared in checks.items() if compared}
 
 
 # --- single impacts -------------------------------------------------------------------------
@@ -191,8 +191,8 @@ def published_curve(test: str, series: str, quantity: str) -> Floats:
     they are shown and never judged.
     """
     table = _published()
-    own = (table[["test", "series", "quantity"]] == [test, series, quantity]).all(axis=1)
-    return table[own].sort_values("x")[["x", "y"]].to_numpy(np.float64).T
+    chosen = (table[["test", "series", "quantity"]] == [test, series, quantity]).all(axis=1)
+    return table[chosen].sort_values("x")[["x", "y"]].to_numpy(np.float64).T
 
 
 def _elastic(run: Recording) -> Iterator[QuantityCheck]:
@@ -317,8 +317,8 @@ def _oblique(run: Recording) -> Iterator[QuantityCheck]:
                 rows[against].append((impact.value, reference, engine))
                 drawn[against].append((at, reference, engine))
         scale = max(abs(reference) for _, reference, _ in rows[INTEGRATED])
-        for against, own in rows.items():
-            yield QuantityCheck(quantity, against, own, allowed[against], scale, drawn[against])
+        for against, row in rows.items():
+            yield QuantityCheck(quantity, against, row, allowed[against], scale, drawn[against])
 
 
 def _derived(impact: RecordedContact, quantity: str) -> tuple[float, float, dict[str, float]]:
@@ -349,22 +349,22 @@ def _time_step(run: Recording) -> Iterator[QuantityCheck]:
 def _order_of_convergence(runs: Sequence[Recording]) -> Iterator[tuple[Recording, QuantityCheck]]:
     """The order at which the rebound approaches its exact value; judged with limited force."""
     for limit in (False, True):
-        own = [run for run in runs if run.case.limit_force == limit]
-        if len(own) < 3:
+        alike = [run for run in runs if run.case.limit_force == limit]
+        if len(alike) < 3:
             continue
         errors = sorted(
             (run.case.steps_per_contact, abs(run.contact.rebound - run.contact.constants.rebound))
-            for run in own
+            for run in alike
         )
-        name = f"{own[-1].case.series}, limitForce {'on' if limit else 'off'}, all steps"
+        name = f"{alike[-1].case.series}, limitForce {'on' if limit else 'off'}, all steps"
         if limit:
             order = [(math.nan, 1.0, fitted_order(errors))]
             yield (
-                own[-1],
+                alike[-1],
                 QuantityCheck("order_of_convergence", EXACT, order, _ORDER, 1.0, series=name),
             )
         drawn = [(steps, _NORMAL / steps, error) for steps, error in errors]
-        yield own[-1], QuantityCheck("rebound_error", TOLERANCE, drawn=drawn, series=name)
+        yield alike[-1], QuantityCheck("rebound_error", TOLERANCE, drawn=drawn, series=name)
 
 
 def fitted_order(rows: Sequence[tuple[int, float]]) -> float:

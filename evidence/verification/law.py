@@ -210,9 +210,9 @@ def integrated_impacts(
     # the engine damps with the tangential stiffness where the normal force has
     # S_n = 2 E* sqrt(R* d), of which the normal constant is 2/3
     tangential_damping = alpha * np.sqrt(2 / 3 * mass * tangential)
-    speed, along, *spins = np.array([astuple(one) for one in before]).T
+    speed, along, *spins = np.array([astuple(motion) for motion in before]).T
     spin, overlap, spring = np.array(spins), np.zeros(len(mass)), np.zeros(len(mass))
-    dt = np.array([elastic_time(*one) for one in zip(contacts, speed, strict=True)]) / _STEPS
+    dt = np.array([elastic_time(*pair) for pair in zip(contacts, speed, strict=True)]) / _STEPS
     for _ in range(_LONGEST * _STEPS):
         overlap = overlap + dt * speed
         dt[overlap <= 0.0] = 0.0  # it has ended
@@ -235,4 +235,4 @@ def integrated_impacts(
         along = along - dt * pull / mass
         spin = spin - dt * pull * turn * arm
     ends = np.where(dt == 0.0, np.stack([-speed, along, *spin]), math.nan)
-    return [RelativeMotion(*map(float, one)) for one in ends.T]
+    return [RelativeMotion(*map(float, column)) for column in ends.T]

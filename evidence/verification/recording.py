@@ -68,7 +68,7 @@ class Recording:
         """Motions after the impacts by the integrated law."""
         impacts = self.contacts
         return integrated_impacts(
-            [one.constants for one in impacts], [one.before for one in impacts]
+            [impact.constants for impact in impacts], [impact.before for impact in impacts]
         )
 
     @property
@@ -113,13 +113,13 @@ class RecordedContact:
         """What the law knows of the contact, from its two materials."""
         case, partner = self.run.case, self.partner_at
         kinds = [case.type_of(body) for body in (self.meeting.particle, self.meeting.partner)]
-        own, other = (case.types[kind - 1] for kind in kinds)
+        kind_of_body, other = (case.types[kind - 1] for kind in kinds)
         pair = next(pair for pair in case.pairs if list(pair.types) == sorted(kinds))
         return ContactPair(
             particle=self.run.particle(self.meeting.particle),
             partner=None if partner is None else self.run.particle(partner + 1),
-            modulus_pa=effective_modulus(own, other),
-            shear_pa=effective_shear(own, other),
+            modulus_pa=effective_modulus(kind_of_body, other),
+            shear_pa=effective_shear(kind_of_body, other),
             restitution=pair.restitution,
             friction=pair.friction,
             limit_force=case.limit_force,

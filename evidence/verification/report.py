@@ -65,7 +65,9 @@ def verify(study: str, fidelity: str | None, out_dir: Path, cores: int) -> None:
     case = project.cases(study, fidelity)[0]
     folder = project.root / run_path("verification", "collide", "")
     batch = Batch(folder, environment(project.templates, study_templates(case)))
-    suite = {name: partial(collide_scene, one) for name, one in suite_of(case.study).items()}
+    suite = {
+        name: partial(collide_scene, collision) for name, collision in suite_of(case.study).items()
+    }
     batch.each(suite, say, cores)
     write_verification(out_dir, [folder / name for name in suite])
 
@@ -92,7 +94,7 @@ def write_verification(out_dir: Path, run_dirs: Sequence[Path]) -> None:
         An impact is not whole.
     """
     compared = checks_by_test([read_recording(folder) for folder in run_dirs])
-    each = [check_rows(run, one) for rows in compared.values() for run, one in rows]
+    each = [check_rows(run, check) for rows in compared.values() for run, check in rows]
     checks = pd.concat([rows for rows in each if len(rows)]).sort_values("number", kind="stable")
     checks = checks.reset_index(drop=True)
     summary = worst_rows(checks)
@@ -218,16 +220,18 @@ _OTHERS: Mapping[str, tuple[str, ...]] = {
 
 def draw_test(test: str, compared: Compared) -> Figure:
     """The figure of a test: a panel for each quantity, the engine's points over the references."""
-    drawn = [(one.series or series_name(run), one) for run, one in compared if len(one.drawn)]
+    drawn = [
+        (check.series or series_name(run), check) for run, check in compared if len(check.drawn)
+    ]
     names = list(dict.fromkeys(name for name, _ in drawn))
-    quantities = list(dict.fromkeys(one.quantity for _, one in drawn))
+    quantities = list(dict.fromkeys(check.quantity for _, check in drawn))
     axes_of, count = suite_file().axes, len(quantities)
     figure, panels = new_panels(3.7, count, 3.7 * max(count, 2))
     for axes, quantity in zip(panels, quantities, strict=True):
         shown: set[str] = set()
-        for name, one in drawn:
-            if one.quantity == quantity:
-                _draw_comparison(axes, one, names.index(name), "" if name in shown else name)
+        for name, check in drawn:
+            if check.quantity == quantity:
+                _draw_comparison(axes, check, names.index(name), "" if name in shown else name)
                 shown.add(name)
         materials = list(dict.fromkeys(run.case.series for run, _ in compared))
         _draw_published(axes, test, materials, quantity)
@@ -236,16 +240,16 @@ def draw_test(test: str, compared: Compared) -> Figure:
     return legend_below(figure)
 
 
-def _draw_comparison(axes: Axes, one: QuantityCheck, at: int, name: str) -> None:
+def _draw_comparison(axes: Axes, check: QuantityCheck, at: int, name: str) -> None:
     """Draw a reference, and the engine's points if they have a name."""
     colour = SERIES[at % len(SERIES)]
-    x, reference, engine = np.array(sorted(map(tuple, one.drawn)), dtype=np.float64).T
+    x, reference, engine = np.array(sorted(map(tuple, check.drawn)), dtype=np.float64).T
     if name:
         mark, size = (MARKERS[at % len(MARKERS)], 5) if len(x) < 100 else (".", 2)
         label = f"{name}: LIGGGHTS"
         axes.plot(x, engine, mark, color=colour, ms=size, mfc="none", label=label)
     if np.isfinite(reference).any():
-        axes.plot(x, reference, **{"color": colour, "lw": 0.9, **_LINES.get(one.against, {})})
+        axes.plot(x, reference, **{"color": colour, "lw": 0.9, **_LINES.get(check.against, {})})
 
 
 def _draw_published(axes: Axes, test: str, series: Sequence[str], quantity: str) -> None:

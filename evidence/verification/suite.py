@@ -92,12 +92,12 @@ class Lab:
 
     def stiffened(self, name: str) -> Material:
         """A rigid partner of a material."""
-        own = self.material(name)
+        material = self.material(name)
         stiff = {
-            "youngs_modulus_pa": _RIGID_FACTOR * own.youngs_modulus_pa,
-            "density_kg_m3": 1e3 * own.density_kg_m3,
+            "youngs_modulus_pa": _RIGID_FACTOR * material.youngs_modulus_pa,
+            "density_kg_m3": 1e3 * material.density_kg_m3,
         }
-        return own.model_copy(update=stiff)
+        return material.model_copy(update=stiff)
 
     def pair(self, first: str, second: str) -> Pair:
         """What two of the study's materials do to each other."""
@@ -185,8 +185,10 @@ class Impacts(Test):
         types = [(series.material, particle)] * len(distinct)
         types += [] if same else [(struck, partner)]
         times = [
-            hertz_time(particle, self.radius_m, partner, self.struck_radius_m, one.closing_m_s)
-            for one in impacts
+            hertz_time(
+                particle, self.radius_m, partner, self.struck_radius_m, collision.closing_m_s
+            )
+            for collision in impacts
         ]
         dt = round_to(min(times) / steps, 4)
         bodies: list[PlacedSphere] = []
@@ -226,12 +228,12 @@ class Impacts(Test):
         """What the two do to each other."""
         known = {"restitution": self.restitution, "friction": self.friction}
         if None in known.values():
-            own = lab.pair(series.material, series.against or series.material).model_dump()
-            known = {key: own[key] if known[key] is None else known[key] for key in known}
+            coefficients = lab.pair(series.material, series.against or series.material).model_dump()
+            known = {key: coefficients[key] if known[key] is None else known[key] for key in known}
         return Pair.model_validate(known)
 
     def bodies(
-        self, at: int, own: int, struck_type: int, timestep_s: float
+        self, at: int, own_type: int, struck_type: int, timestep_s: float
     ) -> Iterator[PlacedSphere]:
         """The particle above its partner, moving down and along +x, and the partner.
 
@@ -244,7 +246,7 @@ class Impacts(Test):
         along = self.tangential_m_s + self.speed_m_s * math.sin(angle)
         velocity = (along, 0.0, -self.speed_m_s * math.cos(angle))
         spin = 0.0 - self.spin_m_s / self.radius_m
-        yield PlacedSphere(own, self.radius_m, place, velocity, (0.0, spin, 0.0))
+        yield PlacedSphere(own_type, self.radius_m, place, velocity, (0.0, spin, 0.0))
         if struck is not None:
             velocity, spin = (0.0, 0.0, self.partner_speed_m_s), spin * self.partner_spin
             yield PlacedSphere(struck_type, struck, (0.0, y, 0.0), velocity, (0.0, spin, 0.0))
@@ -415,8 +417,10 @@ def suite_file() -> SuiteFile:
 def suite_of(study: Study) -> Mapping[str, Experiment]:
     """The experiments of the suite for a study, by run id."""
     file = suite_file()
-    lab, found = file.lab(study), list[Experiment]()
+    lab, experiments = file.lab(study), list[Experiment]()
     for name, test in file.tests().items():
         made = partial(experiment, name, test.number, test.title)
-        found += test.racks(lab, made) if isinstance(test, Impacts) else _OTHERS[name](lab, made)
-    return {experiment.case.run: experiment for experiment in found}
+        experiments += (
+            test.racks(lab, made) if isinstance(test, Impacts) else _OTHERS[name](lab, made)
+        )
+    return {experiment.case.run: experiment for experiment in experiments}

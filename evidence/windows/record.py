@@ -20,7 +20,8 @@ from scipy.special import polygamma
 
 from dragchain.arrays import Floats
 from dragchain.errors import SeriesError
-from dragchain.tradeoff.measures import QUANTITIES, Measurand, Measures
+from dragchain.quantities.registry import COMPARED, Quantity
+from dragchain.tradeoff.measures import Measures
 from dragchain.windows.estimate import Known, WindowsRecord
 from dragdeck.physics.contact_mechanics import damping_ratio
 from dragdeck.records.stability import StableStepLaw, StableStepRecord
@@ -129,7 +130,7 @@ def windows_record(scenes: Scenes, archives: Sequence[str]) -> WindowsRecord:
     SeriesError
         There is none.
     """
-    rows = {quantity.name: _known(quantity, scenes) for quantity in QUANTITIES}
+    rows = {quantity.name: _known(quantity, scenes) for quantity in COMPARED}
     quantities = {name: known for name, known in rows.items() if known}
     if not quantities:
         raise SeriesError(f"no quantity has both moduli in {_FEWEST_SCENES} scenes or more")
@@ -140,13 +141,13 @@ def windows_record(scenes: Scenes, archives: Sequence[str]) -> WindowsRecord:
     )
 
 
-def _known(quantity: Measurand, scenes: Scenes) -> Known | None:
+def _known(quantity: Quantity, scenes: Scenes) -> Known | None:
     measured = [[*_runs_with(quantity, runs)] for runs in scenes]
     pairs = [
         (stiff, soft)
         for runs in measured
-        if (stiff := [one for one in runs if one.run.fidelity.youngs_modulus_scale == 1.0])
-        and (soft := [one for one in runs if _is_soft(one.run)])
+        if (stiff := [run for run in runs if run.run.fidelity.youngs_modulus_scale == 1.0])
+        and (soft := [run for run in runs if _is_soft(run.run)])
     ]
     if len(pairs) < _FEWEST_SCENES:
         return None
@@ -165,7 +166,7 @@ def _known(quantity: Measurand, scenes: Scenes) -> Known | None:
     )
 
 
-def _runs_with(quantity: Measurand, runs: Sequence[SceneRun]) -> list[QuantityOfRun]:
+def _runs_with(quantity: Quantity, runs: Sequence[SceneRun]) -> list[QuantityOfRun]:
     """The runs at the speed of their scene in which every block has the quantity."""
     plain = [run for run in runs if run.fidelity.speed_factor == 1]
     rows = [QuantityOfRun(run, quantity.rooted(run.of_blocks(quantity.name))) for run in plain]
@@ -177,7 +178,7 @@ def _is_soft(run: SceneRun) -> bool:
 
 
 def _mean(runs: Sequence[QuantityOfRun], name: str) -> float:
-    return float(np.mean([getattr(one, name) for one in runs]))
+    return float(np.mean([getattr(run, name) for run in runs]))
 
 
 def _variance_of_mean(runs: Sequence[QuantityOfRun]) -> float:
@@ -186,7 +187,7 @@ def _variance_of_mean(runs: Sequence[QuantityOfRun]) -> float:
 
 def _log_variance(runs: Sequence[QuantityOfRun]) -> float:
     """Variance of the logarithm of a variance with so many degrees of freedom."""
-    return float(polygamma(1, sum(len(one.blocks) - 1 for one in runs) / 2))
+    return float(polygamma(1, sum(len(run.blocks) - 1 for run in runs) / 2))
 
 
 def _degrees(excess: float) -> float:
@@ -201,9 +202,9 @@ def _between_packings(measured: Sequence[Sequence[QuantityOfRun]]) -> float:
     squares, degrees = 0.0, 0
     for runs in measured:
         groups = defaultdict[object, list[QuantityOfRun]](list)
-        for one in runs:
-            fidelity = one.run.fidelity
-            groups[fidelity.youngs_modulus_scale, fidelity.timestep_fraction].append(one)
+        for run in runs:
+            fidelity = run.run.fidelity
+            groups[fidelity.youngs_modulus_scale, fidelity.timestep_fraction].append(run)
         for group in groups.values():
             values = np.array([one.value for one in group]) / _mean(group, "value")
             if len(group) > 1:
@@ -253,7 +254,7 @@ def stable_step_record(scenes: Scenes) -> MeasuredStepRecord:
     rows = np.array([_step_row(run) for run in runs])
     number, kappa, restitution, fraction, spread = rows.T
     reach = fraction * kappa**-0.25
-    damping = np.array([damping_ratio(one) for one in restitution]) * reach
+    damping = np.array([damping_ratio(coefficient) for coefficient in restitution]) * reach
 
     def misfit(constants: Floats) -> Floats:
         stiffness, of_damping = np.exp(constants[:2])

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from dragchain.calibration.simulated_drops import DropRun, read_drops
-from dragdeck.campaigns.restitution_drops import Drop, full, run_drops, settings
+from dragdeck.calibration_batches.restitution_drops import Drop, full, run_drops, settings
 from dragdeck.cases.case import Case
 from dragdeck.decks.templates import environment
 from dragdeck.engine.batch import Batch

@@ -1,20 +1,12 @@
-"""What the attacks share: their parameters, the sample of them, and the study that is attacked."""
+"""What the attacks share: the sample of them, the study that is attacked, and a small disk."""
 
 import random
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from attack.arena import Arena
-from attack.ground import CleanRuns, Ground, shared_ground
-
-
-def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """Parametrise a test by the rows of its marker, which may be made from the seed."""
-    if marker := metafunc.definition.get_closest_marker("attack"):
-        rows = marker.kwargs["rows"]
-        if callable(rows):
-            rows = rows(metafunc.config.getoption("--attack-seed"))
-        metafunc.parametrize("attack", rows.values(), ids=rows.keys())
+from attack.disk import Disk, small_disk
+from attack.ground import SEED, Undisturbed, undisturbed
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
@@ -25,7 +17,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             tests.setdefault(item.function, []).append(item)  # type: ignore[attr-defined]
     if config.getoption("--attacks") or sum(map(len, tests.values())) < 2:
         return
-    chance = random.Random(config.getoption("--attack-seed"))
+    chance = random.Random(SEED)
     gone = set()
     for found in tests.values():
         kept = min(len(found), found[0].get_closest_marker("attack").kwargs["sample"])
@@ -35,25 +27,22 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 @pytest.fixture(scope="session")
-def seed(request: pytest.FixtureRequest) -> int:
-    """The seed of every random choice."""
-    return request.config.getoption("--attack-seed")
-
-
-@pytest.fixture(scope="session")
-def ground(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Ground:
+def study(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Undisturbed:
     """The study that is attacked, made undisturbed."""
-    return shared_ground(tmp_path_factory.getbasetemp(), worker_id)
-
-
-@pytest.fixture(scope="session")
-def clean(ground: Ground) -> CleanRuns:
-    """What resumed runs must give."""
-    cache = ground.root.parent / "clean"
-    cache.mkdir(exist_ok=True)
-    return CleanRuns(ground, cache)
+    base = tmp_path_factory.getbasetemp()
+    folder = (base if worker_id == "master" else base.parent) / "attacked"
+    folder.mkdir(exist_ok=True)
+    return undisturbed(folder)
 
 
 @pytest.fixture
-def arena(tmp_path: Path, ground: Ground, clean: CleanRuns) -> Arena:
-    return Arena(tmp_path, ground, clean)
+def disk(tmp_path: Path) -> Iterator[Disk | None]:
+    """A small disk; None where none can be mounted."""
+    with small_disk(tmp_path) as mounted:
+        yield mounted
+
+
+@pytest.fixture
+def target(tmp_path: Path, disk: Disk | None) -> Path:
+    """A folder to be, for a project, on a small disk where one can be mounted."""
+    return (disk.folder if disk else tmp_path) / "project"

@@ -6,8 +6,7 @@ import random
 import re
 import shutil
 import signal
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -15,9 +14,9 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from attack.arena import MOST_TRIES, Arena, assert_bounded, assert_no_engine
 from attack.calls import Call, Said, call, engines, kill, main_of, refused
-from attack.ground import STUDY, Phase, differences, locked
+from attack.ground import SEED, STUDY, Phase, Undisturbed, differences, made_once
+from attack.judge import MOST_TRIES, assert_bounded, assert_no_engine, assert_same_tables, finish
 
 pytestmark = [pytest.mark.engine, pytest.mark.slow]
 
@@ -68,7 +67,7 @@ _CHECKPOINT_DAMAGE: dict[str, Damage] = {
     "missing": _missing,
 }
 _WHICH = {"newest": slice(-1, None), "older": slice(0, -1), "both": slice(None)}
-Spoil = Callable[[Path, int], None]
+Spoil = Callable[[Path], None]
 
 
 def checkpoints(folder: Path) -> list[Path]:
@@ -78,35 +77,35 @@ def checkpoints(folder: Path) -> list[Path]:
 
 
 def _damaged(damage: Damage, chosen: slice) -> Spoil:
-    def spoil(folder: Path, seed: int) -> None:
-        chance = random.Random(f"checkpoints {seed} {folder.parent.name}")
+    def spoil(folder: Path) -> None:
+        chance = random.Random(f"checkpoints {SEED} {folder.parent.name}")
         for file in checkpoints(folder)[chosen]:
             damage(file, chance)
 
     return spoil
 
 
-def _clock_back(folder: Path, seed: int) -> None:
+def _clock_back(folder: Path) -> None:
     for file in folder.iterdir():
         os.utime(file, (1, 1))
 
 
-def _newest_looks_old(folder: Path, seed: int) -> None:
+def _newest_looks_old(folder: Path) -> None:
     os.utime(checkpoints(folder)[-1], (1, 1))
 
 
-def _newest_looks_last(folder: Path, seed: int) -> None:
+def _newest_looks_last(folder: Path) -> None:
     os.utime(checkpoints(folder)[-1], (4e9, 4e9))
 
 
-def _one_of_the_future(folder: Path, seed: int) -> None:
+def _one_of_the_future(folder: Path) -> None:
     """What an engine that was killed while it wrote may leave, later than any other."""
     last = checkpoints(folder)[-1]
     step = 2 * int(last.name.split(".")[1])
     (folder / f"checkpoint.{step}.restart").write_bytes(last.read_bytes()[:1000])
 
 
-def _half_a_state(folder: Path, seed: int) -> None:
+def _half_a_state(folder: Path) -> None:
     for file in folder.glob("*checkpoint*"):
         if file.suffix != ".restart" and file.is_file():
             os.truncate(file, file.stat().st_size // 2)
@@ -131,44 +130,35 @@ _CHECKPOINTS = {
 }
 
 
-@pytest.mark.attack(rows=_CHECKPOINTS, sample=1)
+@pytest.mark.attack(sample=1)
+@pytest.mark.parametrize(("place", "spoil"), _CHECKPOINTS.values(), ids=_CHECKPOINTS)
 def test_a_damaged_checkpoint_costs_nothing_but_time(
-    attack: tuple[str, Spoil], arena: Arena, seed: int
+    place: str, spoil: Spoil, study: Undisturbed, target: Path
 ) -> None:
-    place, spoil = attack
-    with stopped(arena, place) as (phase, project):
-        spoil(project / phase.run, seed)
-        arena.finish(phase, project)
+    phase = study.phase(place)
+    copy_stopped(study, place, target)
+    spoil(target / phase.run)
+    finish(study, phase, target)
 
 
-@contextmanager
-def stopped(arena: Arena, place: str) -> Iterator[tuple[Phase, Path]]:
-    """A copy of a run that was stopped half-way, on a small disk where one can be mounted."""
-    phase = arena.phase(place)
-    source = _stopped_once(arena, place, phase)
-    with arena.bounded() as project:
-        shutil.copytree(source, project, symlinks=True)
-        yield phase, project
-
-
-def _stopped_once(arena: Arena, place: str, phase: Phase) -> Path:
-    source = arena.clean.cache / f"{place}-stopped"
-    with locked(arena.clean.cache / f"{place}-stopped.lock"):
-        if not (source / "done").is_file():
-            said = [_stop(source, arena, phase, 0.6)]
+def copy_stopped(study: Undisturbed, place: str, target: Path) -> None:
+    """Copy a project in which a run was stopped half-way."""
+    phase, source = study.phase(place), study.cache / f"{place}-stopped"
+    with made_once(source) as project:
+        if project is not None:
+            said = [_stop(project, study, phase, 0.6)]
             while said[-1].status == 0:  # it was quicker than it was undisturbed: earlier, then
                 assert len(said) < MOST_TRIES, said[-1].text
-                said.append(_stop(source, arena, phase, 0.6 * 0.5 ** len(said)))
+                said.append(_stop(project, study, phase, 0.6 * 0.5 ** len(said)))
             assert said[-1].status is not None, said[-1].text
-            assert len(checkpoints(source / phase.run)) > 1
-            (source / "done").touch()
-    return source
+            assert len(checkpoints(project / phase.run)) > 1
+    shutil.copytree(source, target, symlinks=True)
 
 
-def _stop(source: Path, arena: Arena, phase: Phase, share: float) -> Said:
+def _stop(source: Path, study: Undisturbed, phase: Phase, share: float) -> Said:
     """What a run said that was asked to stop after a share of its time."""
     shutil.rmtree(source, ignore_errors=True)
-    project = arena.ground.copy_before(phase, source)
+    project = study.copy_before(phase, source)
     running = Call(phase.words, project, source.with_suffix(".log"))
     folder = project / phase.run
     running.wait_until(
@@ -198,30 +188,25 @@ _INPUTS = {
 }
 
 
-@pytest.mark.attack(rows=_INPUTS, sample=1)
+@pytest.mark.attack(sample=1)
+@pytest.mark.parametrize(("place", "name", "damage", "when"), _INPUTS.values(), ids=_INPUTS)
 def test_an_input_that_changed_is_refused(
-    attack: tuple[str, str, Damage, str], arena: Arena, seed: int
+    place: str, name: str, damage: Damage, when: str, study: Undisturbed, target: Path
 ) -> None:
-    place, name, damage, when = attack
-    with _rendered(arena, place) if when == "start" else stopped(arena, place) as (phase, project):
-        file = project / phase.run / name
-        if name == "packing.restart":  # it stays in the folder of the filling
-            (folder,) = (project / "results" / STUDY / "filling").iterdir()
-            file = folder / name
-        damage(file, random.Random(f"inputs {seed} {name}"))
-        said = call(phase.words, project, arena.folder / "run.log", 60.0)
-        assert_no_engine(project, 1.0)
-        assert_bounded(project)
-        script = r"in\.liggghts|input script"
-        named = script if name == "in.liggghts" else re.escape(name)
-        assert refused(said, named), f"a complete run: {said.tail}"
-
-
-@contextmanager
-def _rendered(arena: Arena, place: str) -> Iterator[tuple[Phase, Path]]:
-    phase = arena.phase(place)
-    with arena.bounded() as project:
-        yield phase, arena.ground.copy_before(phase, project)
+    phase = study.phase(place)
+    if when == "start":
+        study.copy_before(phase, target)
+    else:
+        copy_stopped(study, place, target)
+    # the settled packing stays in the folder of the filling
+    owner = study.run("filling") if name == "packing.restart" else phase.run
+    damage(target / owner / name, random.Random(f"inputs {SEED} {name}"))
+    said = call(phase.words, target, target.with_suffix(".log"), 60.0)
+    assert_no_engine(target, 1.0)
+    assert_bounded(target)
+    script = r"in\.liggghts|input script"
+    named = script if name == "in.liggghts" else re.escape(name)
+    assert refused(said, named), f"a complete run: {said.tail}"
 
 
 # --- results --------------------------------------------------------------------------
@@ -333,7 +318,7 @@ _READERS: dict[str, tuple[str, ...]] = {
     "tables/clusters.parquet": ("figures", "report"),
     "tables/closure.json": ("figures", "report"),
     "tables/loading.json": ("report",),
-    "tables/figures.json": ("report",),
+    "tables/findings.json": ("report",),
 }
 """Results of the process, and who reads them, or might."""
 
@@ -357,9 +342,9 @@ def _is_damage(name: str, what: str) -> bool:
 Result = tuple[str, str, Damage, str]
 
 
-def results(seed: int) -> dict[str, Result]:
+def results() -> dict[str, Result]:
     """Every damage to every result, each read by one of its readers."""
-    chance = random.Random(f"results {seed}")
+    chance = random.Random(f"results {SEED}")
     made: list[tuple[str, str, str, Damage, str]] = []
     for name, readers in _READERS.items():
         kinds = _JSON if name.endswith(".json") else _PARQUET
@@ -378,32 +363,39 @@ def results(seed: int) -> dict[str, Result]:
     }
 
 
-@pytest.mark.attack(rows=results, sample=3)
-def test_a_damaged_result_is_refused_or_harmless(attack: Result, arena: Arena, seed: int) -> None:
-    place, name, damage, reader = attack
-    project = arena.ground.copy(arena.folder / "project")
-    run = arena.ground.run(place)
-    damage(project / run / name, random.Random(f"results {seed} {name}"))
-    said = _call_reader(arena, reader, place, project)
+_RESULTS = results()
+
+
+@pytest.mark.attack(sample=3)
+@pytest.mark.parametrize(("place", "name", "damage", "reader"), _RESULTS.values(), ids=_RESULTS)
+def test_a_damaged_result_is_refused_or_harmless(
+    place: str, name: str, damage: Damage, reader: str, study: Undisturbed, tmp_path: Path
+) -> None:
+    project = study.copy(tmp_path / "project")
+    run = study.run(place)
+    damage(project / run / name, random.Random(f"results {SEED} {name}"))
+    said = _call_reader(study, reader, place, project)
     kill(engines(project))
     assert_bounded(project)
     named = re.escape(Path(name).name).replace(r"\.1\.", r"\.(1|\{part\})\.")
     if refused(said, named):
         return
     if reader == "run":
-        arena.assert_same_tables(arena.phase(place), project)
+        assert_same_tables(study, study.phase(place), project)
     else:
-        problems = differences(project / run, arena.ground.root / run, but=name)
+        there = study.root / run
+        names = {str(file.relative_to(there)) for file in there.rglob("*")} - {name}
+        problems = differences(project / run, there, names)
         assert not problems, f"accepted: {problems}"
 
 
-def _call_reader(arena: Arena, reader: str, place: str, project: Path) -> Said:
-    run = arena.ground.run(place)
+def _call_reader(study: Undisturbed, reader: str, place: str, project: Path) -> Said:
+    run = study.run(place)
     if reader == "run":
-        return call(arena.phase(place).words, project, arena.folder / "run.log", 60.0)
+        return call(study.phase(place).words, project, project.with_suffix(".log"), 60.0)
     if reader == "render":
         packing = f"{run}/tables/packing.json"
-        process = Path(arena.ground.run("process")).name
+        process = Path(study.run("process")).name
         words = ["step", "render", STUDY, "process", process, "--packing", packing]
         return main_of("dragdeck", words, project)
     if reader == "report":

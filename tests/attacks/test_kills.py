@@ -2,10 +2,12 @@
 
 import random
 from functools import partial
+from pathlib import Path
 
 import pytest
-from attack.arena import ENDS_WITHIN_S, ENGINE_PHASES, MOST_TRIES, PHASES, Arena, assert_no_engine
 from attack.calls import Call, is_engine, kill
+from attack.ground import SEED, Undisturbed
+from attack.judge import ENDS_WITHIN_S, ENGINE_PHASES, MOST_TRIES, PHASES, assert_no_engine, finish
 
 pytestmark = [pytest.mark.engine, pytest.mark.slow]
 
@@ -13,9 +15,9 @@ VICTIMS = ("runner", "engine", "everything")
 Kill = tuple[str, str, float, bool]
 
 
-def kills(seed: int) -> dict[str, Kill]:
+def kills() -> dict[str, Kill]:
     """Kills at seeded random times: a fraction of the processor time that a phase takes."""
-    chance = random.Random(f"kills {seed}")
+    chance = random.Random(f"kills {SEED}")
     made = {}
     for phase in PHASES:
         for number in range(15 if phase in ENGINE_PHASES else 5):
@@ -27,13 +29,18 @@ def kills(seed: int) -> dict[str, Kill]:
     return made
 
 
-@pytest.mark.attack(rows=kills, sample=2)
-def test_a_kill_costs_nothing_but_time(attack: Kill, arena: Arena) -> None:
-    name, victim, fraction, at_once = attack
-    phase = arena.ground.phases[name]
+_KILLS = kills()
+
+
+@pytest.mark.attack(sample=2)
+@pytest.mark.parametrize(("name", "victim", "fraction", "at_once"), _KILLS.values(), ids=_KILLS)
+def test_a_kill_costs_nothing_but_time(
+    name: str, victim: str, fraction: float, at_once: bool, study: Undisturbed, tmp_path: Path
+) -> None:
+    phase = study.phases[name]
     for number in range(MOST_TRIES):
-        project = arena.ground.copy_before(phase, arena.folder / f"project-{number}")
-        running = Call(phase.words, project, arena.folder / "first.log")
+        project = study.copy_before(phase, tmp_path / f"project-{number}")
+        running = Call(phase.words, project, tmp_path / "first.log")
         moment = fraction * 0.8**number * phase.cpu_s
         if running.wait_until(partial(_is_due, running, moment, victim)):
             break
@@ -46,7 +53,7 @@ def test_a_kill_costs_nothing_but_time(attack: Kill, arena: Arena) -> None:
     first = running.wait()
     if not at_once:
         assert_no_engine(project, ENDS_WITHIN_S)
-    arena.finish(phase, project, said_before=first.tail)
+    finish(study, phase, project, said_before=first.tail)
 
 
 def _is_due(running: Call, moment_s: float, victim: str) -> bool:

@@ -89,7 +89,8 @@ _HOSTILE: dict[str, Mesh] = {
 _HARMLESS = _HOSTILE["a material from /etc/passwd"]
 
 
-@pytest.mark.attack(rows=_HOSTILE, sample=2)
+@pytest.mark.attack(sample=2)
+@pytest.mark.parametrize("attack", _HOSTILE.values(), ids=_HOSTILE)
 def test_a_hostile_mesh_is_refused(attack: Mesh, tmp_path: Path) -> None:
     suffix, content, named = attack
     project = _project(suffix, content(), tmp_path)

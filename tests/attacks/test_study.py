@@ -113,7 +113,8 @@ _CHANGED: dict[str, Study] = {
 }  # fmt: skip
 
 
-@pytest.mark.attack(rows=_CHANGED, sample=2)
+@pytest.mark.attack(sample=2)
+@pytest.mark.parametrize("attack", _CHANGED.values(), ids=_CHANGED)
 def test_a_hostile_study_is_refused(attack: Study, tmp_path: Path) -> None:
     change, named, wanted, name = attack
     project = new_project(tmp_path / "project")

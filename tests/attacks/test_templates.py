@@ -37,9 +37,6 @@ _EXPRESSIONS = {
     "a sum of text and number": "{{ 'a' + 1 }}",
     "a loop of loops": "{% for i in range(90000) %}{% for j in range(90000) %}{% endfor %}"
     "{% endfor %}",
-    "text that doubles": "{% set n = namespace(x='aaaaaaaaaa') %}{% for i in range(40) %}"
-    "{% set n.x = n.x ~ n.x %}{% endfor %}{{ n.x }}",
-    "padding of 1e11": "{{ 'a'.rjust(100000000000) }}",
     "lorem ipsum for ever": "{{ lipsum(n=100000000) }}",
     "a macro that calls itself": "{% macro m() %}{{ m() }}{% endmacro %}{{ m() }}",
     "it includes itself": '{% include "process.in.j2" %}',
@@ -80,7 +77,8 @@ _TEMPLATES: dict[str, Template] = {
 }  # fmt: skip
 
 
-@pytest.mark.attack(rows=_TEMPLATES, sample=2)
+@pytest.mark.attack(sample=2)
+@pytest.mark.parametrize("attack", _TEMPLATES.values(), ids=_TEMPLATES)
 def test_a_hostile_template_is_refused(attack: Template, tmp_path: Path) -> None:
     name, content, named = attack
     project = new_project(tmp_path / "project")

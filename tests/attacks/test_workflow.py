@@ -11,17 +11,19 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from attack.arena import ENDS_WITHIN_S, Arena, assert_no_engine
 from attack.calls import Call, Said, call, kill, main_of, refused
 from attack.ground import (
     PLACES,
+    SEED,
     STUDY,
+    Undisturbed,
     differences,
     new_project,
     resumed_at,
     tiny_study,
     write_study,
 )
+from attack.judge import ENDS_WITHIN_S, assert_no_engine
 from entry import write_entry
 from preloaded import PACKAGES
 
@@ -61,9 +63,9 @@ def whole(project: Path, log: Path, target: str = "all") -> Said:
 # --- kills of the whole ---------------------------------------------------------------
 
 
-def kills(seed: int, number: int = 6) -> dict[str, tuple[str, float]]:
+def kills(number: int = 6) -> dict[str, tuple[str, float]]:
     """SIGKILL to Snakemake's process group, or to all that it started, at seeded times."""
-    chance = random.Random(f"workflow {seed}")
+    chance = random.Random(f"workflow {SEED}")
     made = {}
     for place in range(number):
         fraction = round((place + chance.random()) / number, 3)
@@ -72,12 +74,17 @@ def kills(seed: int, number: int = 6) -> dict[str, tuple[str, float]]:
     return made
 
 
-@pytest.mark.attack(rows=kills, sample=0)
-def test_a_killed_workflow_goes_on(attack: tuple[str, float], arena: Arena) -> None:
-    victim, fraction = attack
-    project = entry(arena.folder / "project")
-    running = Call(words_of(project), project, arena.folder / "first.log")
-    moment = 2.0 + fraction * 1.1 * sum(phase.cpu_s for phase in arena.ground.phases.values())
+_KILLS = kills()
+
+
+@pytest.mark.attack(sample=0)
+@pytest.mark.parametrize(("victim", "fraction"), _KILLS.values(), ids=_KILLS)
+def test_a_killed_workflow_goes_on(
+    victim: str, fraction: float, study: Undisturbed, tmp_path: Path
+) -> None:
+    project = entry(tmp_path / "project")
+    running = Call(words_of(project), project, tmp_path / "first.log")
+    moment = 2.0 + fraction * 1.1 * sum(phase.cpu_s for phase in study.phases.values())
     assert running.wait_until(lambda: running.spent_s() > moment), "not killed in time"
     tree = running.tree()
     if victim == "group":
@@ -86,9 +93,9 @@ def test_a_killed_workflow_goes_on(attack: tuple[str, float], arena: Arena) -> N
         kill(tree)
     running.wait()
     assert_no_engine(project, ENDS_WITHIN_S)
-    said = whole(project, arena.folder / "again.log")
+    said = whole(project, tmp_path / "again.log")
     assert said.status == 0, said.tail
-    problems = _unlike_undisturbed(arena, project)
+    problems = _unlike_undisturbed(study, project)
     report = project / "results" / STUDY / "report"
     for name in ("summary.csv", "summary.parquet", "report.html"):
         assert (report / name).is_file(), f"{name} is missing"
@@ -98,7 +105,7 @@ def test_a_killed_workflow_goes_on(attack: tuple[str, float], arena: Arena) -> N
 _OF_NETWORK = r"(chains|network|clusters|facets|contact_events|loading|figures)"
 
 
-def _unlike_undisturbed(arena: Arena, project: Path) -> list[str]:
+def _unlike_undisturbed(study: Undisturbed, project: Path) -> list[str]:
     """The runs' own tables against what their inputs give when nobody disturbs the engine.
 
     A filling that was resumed is another bed, from which another process follows: see the kills of
@@ -108,7 +115,7 @@ def _unlike_undisturbed(arena: Arena, project: Path) -> list[str]:
     for place in PLACES:
         (run,) = (project / "results" / STUDY / place).iterdir()
         steps = resumed_at(run)
-        found = differences(run / "tables", arena.clean.tables(place, steps))
+        found = differences(run / "tables", study.tables(place, steps))
         problems += [
             f"{place} resumed at {steps}: {problem}"
             for problem in found
@@ -122,29 +129,29 @@ def _unlike_undisturbed(arena: Arena, project: Path) -> list[str]:
 # --- other attacks ---------------------------------------------------------------------
 
 
-def _two_at_once(arena: Arena) -> None:
+def _two_at_once(study: Undisturbed, tmp_path: Path) -> None:
     """A second call while the first runs: a live lock is respected."""
-    project = entry(arena.folder / "project")
-    first = Call(words_of(project), project, arena.folder / "first.log")
+    project = entry(tmp_path / "project")
+    first = Call(words_of(project), project, tmp_path / "first.log")
     locks = project / ".snakemake/locks"
     assert first.wait_until(lambda: bool(list(locks.glob("*")))), first.wait().tail
-    second = whole(project, arena.folder / "second.log")
+    second = whole(project, tmp_path / "second.log")
     said = first.wait(_PATIENCE_S)
     assert refused(second, "lock|another|already runs|running"), f"both ran: {second.tail}"
     assert said.status == 0, said.tail
 
 
-def _of_another_user(arena: Arena) -> None:
+def _of_another_user(study: Undisturbed, tmp_path: Path) -> None:
     """Results that may be read but not written."""
-    project = arena.ground.copy(arena.folder / "project")
+    project = study.copy(tmp_path / "project")
     _open_way(project)
-    said = main_of("dragchain", ["tables", arena.ground.run("process")], project, user=_NOBODY)
+    said = main_of("dragchain", ["tables", study.run("process")], project, user=_NOBODY)
     assert refused(said, "permission|write"), said.tail
 
 
-def _unreadable(arena: Arena) -> None:
+def _unreadable(study: Undisturbed, tmp_path: Path) -> None:
     """A study that may not be read."""
-    project = new_project(arena.folder / "project")
+    project = new_project(tmp_path / "project")
     file = write_study(project, tiny_study())
     _open_way(project)
     file.chmod(0)
@@ -162,15 +169,15 @@ def _open_way(project: Path) -> None:
             folder.chmod(folder.stat().st_mode | stat.S_IXOTH | stat.S_IROTH | stat.S_IXGRP)
 
 
-def _emptied_state(arena: Arena) -> None:
+def _emptied_state(study: Undisturbed, tmp_path: Path) -> None:
     """What Snakemake keeps of a study is lost or damaged: nothing is run again for nothing."""
-    project = entry(arena.folder / "project")
-    first = whole(project, arena.folder / "first.log", "drop_test")
+    project = entry(tmp_path / "project")
+    first = whole(project, tmp_path / "first.log", "drop_test")
     assert first.status == 0, first.tail
     for file in (project / ".snakemake").rglob("*"):
         if file.is_file():
             os.truncate(file, 0)
-    said = whole(project, arena.folder / "again.log", "drop_test")
+    said = whole(project, tmp_path / "again.log", "drop_test")
     assert said.status == 0, said.tail
     assert not said.has_traceback, said.tail
     (run,) = (project / "results" / STUDY / "drop_test").iterdir()
@@ -185,8 +192,11 @@ _PLACES = {
 }
 
 
-@pytest.mark.attack(rows=_PLACES, sample=0)
-def test_the_workflow_goes_on_or_says_why(attack: Callable[[Arena], None], arena: Arena) -> None:
+@pytest.mark.attack(sample=0)
+@pytest.mark.parametrize("attack", _PLACES.values(), ids=_PLACES)
+def test_the_workflow_goes_on_or_says_why(
+    attack: Callable[[Undisturbed, Path], None], study: Undisturbed, tmp_path: Path
+) -> None:
     if attack in (_of_another_user, _unreadable) and os.geteuid() != 0:
         pytest.skip("only root can be another user")
-    attack(arena)
+    attack(study, tmp_path)

@@ -70,7 +70,7 @@ def test_forces(folder: Path, plain: PlainRun) -> None:
         same(forces[name], rows[name], name)
     counted = [plain.counted(step) for step in rows["step"]]
     assert forces["in_statistics"].tolist() == counted
-    found = json.loads((folder / "tables/figures.json").read_text())["forces"]
+    found = json.loads((folder / "tables/findings.json").read_text())["forces"]
     for name in ("drag_n", "lateral_n", "vertical_n"):
         values = rows[name][counted].tolist()
         mean = math.fsum(values) / len(values)

@@ -63,7 +63,8 @@ def test_a_cost_counts_steps_or_seconds() -> None:
 def test_every_option_is_the_standard_case_with_other_fields(case: Case) -> None:
     found = cases(case)
     standard = found["standard"].study
-    assert standard.motion.axis_speed_m_s * SECONDS == pytest.approx(standard.motion.path_length_m)
+    motion = standard.motion
+    assert motion.nominal_speed_m_s * SECONDS == pytest.approx(motion.path_length_m)
     assert standard.chosen_fidelity().ranks == 1
     for name, one in found.items():
         assert (one.study == standard) == (name == "standard")
@@ -71,7 +72,7 @@ def test_every_option_is_the_standard_case_with_other_fields(case: Case) -> None
     assert found["workpiece_wide_facets"].study.workpiece.shape.facet_size_m == 2 * wide
     assert found["fewer_particles"].study.media.count == 3 * case.study.media.count // 4
     rest = found["rotating_bowl"].study.motion
-    assert rest.axis_speed_m_s * SECONDS == pytest.approx(rest.path_length_m)
+    assert rest.nominal_speed_m_s * SECONDS == pytest.approx(rest.path_length_m)
 
 
 def test_an_option_that_the_study_has_itself_or_cannot_have_is_left_out(

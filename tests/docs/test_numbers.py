@@ -1,11 +1,9 @@
 """Numbers in the pages come from records."""
 
 import math
-import re
-from collections.abc import Iterator
 
 import pytest
-from doc_pages import PAGES, name_of, prose
+from doc_pages import PAGES, name_of
 from page_parts import PageError, Parts, stale_files, table_recipes, values
 from paths import ROOT
 from records import change, record_table, shown_value
@@ -42,7 +40,7 @@ def test_the_numbers_of_the_papers_study_are_those_of_the_code() -> None:
         step, scale = bed_timestep(scaled, "timestep_fraction"), fidelity.youngs_modulus_scale
         stiffness = full_stiffness_number(scaled) * scale ** (2 / 3)
         unstable = law.largest_fraction(stiffness, own.restitution, spread / media.radius_mean_m)
-        steps = motion.path_length_m / motion.axis_speed_m_s / step
+        steps = motion.path_length_m / motion.nominal_speed_m_s / step
         times = 1e6 * bed_rayleigh_time(scaled), 1e6 * step, steps / 1e6
         found.append([name, scale, fidelity.timestep_fraction, *times, unstable])
     known = record_table("paper/presets")
@@ -104,34 +102,3 @@ def test_numbers_are_shown_as_the_pages_do() -> None:
 def test_the_effective_restitution_is_that_of_the_closed_form() -> None:
     for row in record_table("verification/effective_restitution").itertuples():
         assert row.effective == pytest.approx(limited_restitution(row.entered), rel=1e-4)
-
-
-# --- numbers that are typed ---------------------------------------------------------------
-
-UNITS = (
-    "N|mN|kN|Pa|kPa|MPa|GPa|mm|cm|m|km|um|µm|nm|s|ms|us|µs|ns|min|h|hours?|minutes?|seconds?|days?|"
-    "microseconds?|milliseconds?|nanoseconds?|"
-    r"kB|MB|GB|KiB|MiB|GiB|B|bytes?|Hz|kHz|1/min|rpm|J|mJ|N m|N s|rad|degrees?|°|%|"
-    "m/s|mm/s|m/s2|kg|g|kg/m3|frames/s|steps/s|fold|times|core-hours?|CPU hours?"
-)
-NUMBER = re.compile(rf"(?<![\w.])[-+]?\d[\d,.]*(?:e[-+]?\d+)?(?:\s|-|\u00a0)?(?:{UNITS})(?![\w/])")
-
-ALLOWED = ROOT / "docs/allowed_numbers.txt"
-"""Lines `number unit | reason`; a line `page: number unit | reason` is about one page."""
-
-
-def typed_numbers() -> Iterator[tuple[str, str]]:
-    for page in PAGES:
-        for found in NUMBER.findall(prose(page)):
-            yield name_of(page), " ".join(found.split())
-
-
-def test_numbers_with_a_unit_are_typed_only_for_a_reason() -> None:
-    lines = [line for line in ALLOWED.read_text().splitlines() if line and line[0] != "#"]
-    known = {text.strip(): reason.strip() for text, reason in (line.split("|") for line in lines)}
-    typed = set(typed_numbers())
-    strange = {f"{page}: {text}" for page, text in typed if text not in known}
-    assert sorted(strange - set(known)) == []
-    found = {text for page, number in typed for text in (number, f"{page}: {number}")}
-    assert [text for text, reason in known.items() if text not in found or not reason] == []
-    assert NUMBER.search("a drag of -2.64 N") and not NUMBER.search("version 3.8.0")

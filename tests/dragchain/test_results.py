@@ -204,7 +204,7 @@ def test_findings_are_those_of_the_report(project: Path, monkeypatch: pytest.Mon
 
 
 def _never(run: object) -> None:
-    raise AssertionError("figures.json was there")
+    raise AssertionError("findings.json was there")
 
 
 def test_tables_carry_study_run_units_and_basis(project: Path) -> None:

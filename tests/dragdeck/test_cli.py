@@ -75,7 +75,8 @@ def test_outside_a_project(
 ) -> None:
     monkeypatch.chdir(tmp_path_factory.mktemp("elsewhere"))
     assert main(["cases", "small"]) == 1
-    assert "not inside a dragdeck project" in capsys.readouterr().err
+    assert "not inside a dragdeck project" in (said := capsys.readouterr().err)
+    assert "dragdeck init" in said
 
 
 def test_a_new_study_can_be_run_at_once(

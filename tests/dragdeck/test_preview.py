@@ -3,7 +3,6 @@
 import re
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -60,9 +59,10 @@ def test_the_picture_shows_the_workpiece(
 ) -> None:
     assert main(["preview", "small"]) == 0
     said = capsys.readouterr().out
-    for name in ("preview.png", "set_up.png"):
-        file = project.results("small") / name
-        assert str(file) in said and file.is_file()
+    assert str(project.results("small") / "preview.png") in said
+    assert not (project.results("small") / "set_up.png").exists()
+    assert main(["step", "set-up", "small"]) == 0
+    assert (project.results("small") / "set_up.png").is_file()
     image = picture(project)
     assert pixels(image, "workpiece") > 5000
     for name in ("drag", "approach", "plunge"):
@@ -143,11 +143,12 @@ def test_the_named_case_is_drawn_and_the_first_by_default(
 ) -> None:
     drawn: list[str] = []
 
-    def draw(found: CaseLayout, title: str, refused: bool, folder: Path) -> list[Path]:
+    def draw(scene: CaseLayout, swept: object, title: str, refused: bool) -> bytes:
         drawn.append(title)
-        return []
+        return b""
 
-    monkeypatch.setattr("dragdeck.commands._drawn", draw)
+    monkeypatch.setattr("dragdeck.commands.picture", draw)
+    monkeypatch.setattr("dragdeck.commands.swept_volume", lambda *_: None)
     load({"sweep": {"motion.immersion_depth_m": [0.010, 0.016]}})
     assert main(["preview", "small"]) == 0
     assert "case quick_immersion_depth_m-0.01, one of 2 (--case)" in capsys.readouterr().out

@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from page_parts import pages, typed
+from page_parts import pages
 from paths import ROOT
 
 HISTORY = {"CHANGELOG.md"}
@@ -22,16 +22,6 @@ def fences(page: Path) -> Iterator[tuple[str, str]]:
     """Language and text of every code block."""
     for found in FENCE.finditer(page.read_text(encoding="utf-8")):
         yield found["info"].strip(), found["body"]
-
-
-def prose(page: Path) -> str:
-    """What is typed as text: nothing from records, no code, no comments, no targets of links."""
-    text = typed(page.read_text(encoding="utf-8"))
-    text = FENCE.sub("\n", text)
-    text = re.sub(r"<!--.*?-->", " ", text, flags=re.S)
-    text = re.sub(r"\$\$.*?\$\$|\$[^$\n]+\$", " ", text, flags=re.S)
-    text = re.sub(r"``[^`]*``|`[^`\n]*`", " ", text)
-    return re.sub(r"\]\([^)]*\)", "]", text)
 
 
 def template_examples() -> dict[str, str]:

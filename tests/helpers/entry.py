@@ -12,8 +12,10 @@ _PINS = ("pyproject.toml", "constraints.txt")
 
 def write_entry(folder: Path, extras: Sequence[str] = ()) -> Path:
     """Copy the script ``run`` and what it was set up from; return the folder for its programs."""
-    for name in ("run", *_PINS):
-        shutil.copy2(ROOT / name, folder / name)
+    (folder / "workflow").mkdir(exist_ok=True)
+    for name in ("run", "workflow/run.sh", *_PINS):
+        if not (folder / name).exists():
+            shutil.copy2(ROOT / name, folder / name)
     pins = b"".join((ROOT / name).read_bytes() for name in _PINS)
     checksum = subprocess.run(["cksum"], input=pins, capture_output=True, check=True).stdout
     stamp = [str(folder.resolve()), checksum.decode().strip(), *extras, ""]

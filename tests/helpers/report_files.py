@@ -9,6 +9,14 @@ from typing import Any
 from made_run import made_case, run_json, write_documents
 from pages import Page
 
+from dragchain.quantities.document import (
+    EXTRAPOLATED,
+    Extrapolated,
+    ExtrapolatedQuantity,
+    Need,
+    Reached,
+)
+from dragchain.quantities.registry import REPORTED
 from dragchain.report.findings import (
     FILE,
     AheadBehind,
@@ -23,8 +31,6 @@ from dragchain.report.findings import (
     Peaks,
     ProcessFindings,
 )
-from dragchain.report.values import EXTRAPOLATED, Extrapolated, ExtrapolatedQuantity, Need, Reached
-from dragchain.run.basis import QUANTITIES
 from dragchain.run.reference import ReferenceDrag
 from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import Estimate, EstimateColumns
@@ -129,7 +135,7 @@ def write_quantities(run: Path, corrected: float | None = None, **reached: Any) 
         ExtrapolatedQuantity(
             name=one.name, label=one.label, unit=one.unit, measured=own, value=value
         )
-        for one in QUANTITIES
+        for one in REPORTED
     )
     made = REACHED.model_copy(update=reached) if corrected else None
     Extrapolated(quantities=found, tolerance=made).write(run / EXTRAPOLATED)

@@ -10,8 +10,8 @@ import pandas as pd
 from made_run import particles_kept, run_json, save, write_documents
 from report_files import case_json
 
+from dragchain.quantities.registry import COMPARED
 from dragchain.tradeoff.compare import read_plan_runs
-from dragchain.tradeoff.measures import QUANTITIES
 from dragchain.tradeoff.outcome import Tradeoff, compare_settings
 from dragdeck.documents import SCHEMA
 
@@ -71,7 +71,7 @@ def measures(
     known = effects or {}
     of_blocks = {
         quantity.name: _blocks(quantity, known, rng.normal(bed, noise, blocks))
-        for quantity in QUANTITIES[:-2]
+        for quantity in COMPARED[:-2]
     }
     return {
         **content,

@@ -23,8 +23,8 @@ from dragchain import read_dump, write_tables
 from dragchain.network.write import write_chains
 from dragchain.tables.network_contacts import contact_rows
 from dragchain.tables.run_folder import Run
-from dragdeck.physics.coulomb import FrictionLimit
 from dragdeck.scenes.process import SCENES
+from dragdeck.study.contact_law import FrictionLimit
 
 pytestmark = [pytest.mark.engine, pytest.mark.slow]
 

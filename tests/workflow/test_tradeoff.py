@@ -28,7 +28,8 @@ PLAN: dict[str, Any] = {
     ],
     "drop_test": {"drop_test.timestep_fraction": [0.1]},
 }
-TRADEOFF = ("tradeoff", "--config", "study=small", "plan=plan.yaml")
+EVIDENCE = ("--snakefile", "evidence/Snakefile")
+TRADEOFF = ("tradeoff", *EVIDENCE, "--config", "study=small", "plan=plan.yaml")
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +74,7 @@ def test_nothing_is_left_to_do_in_the_tradeoff(traded: Path) -> None:
     assert jobs(traded, *TRADEOFF) - {"tradeoff"} == set()
 
 
-VALIDATION = ("validate", "--config", "study=small", "plan=plan.yaml")
+VALIDATION = ("validate", *EVIDENCE, "--config", "study=small", "plan=plan.yaml")
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ import yaml
 from paths import SMALL_STUDY
 from snakemake_calls import copy_of_project, jobs, succeed
 
-from dragchain.report.values import Extrapolated
+from dragchain.quantities.document import Extrapolated
 from dragchain.run.kinematics import axis_speed, drag_phase
 from dragchain.windows.estimate import Round
 from dragdeck.records.case import load_case

@@ -54,13 +54,22 @@ COMMANDS = (
             "status:open_report", (STUDY,)),
     Command("preview", "draw the set-up of a study",
             "Draw bowl, packing, workpiece and path of one case, and print its clearances and "
-            "dimensionless numbers. It runs nothing and writes preview.png and set_up.png to "
-            "results/STUDY.",
+            "dimensionless numbers. It runs nothing and writes preview.png to results/STUDY.",
             "commands:preview", (
         STUDY, FIDELITY,
         Argument("--case", metavar="NAME",
                   help="case to draw, as ./run dragdeck cases lists it (default: the first)")),
             "./run dragdeck preview planetary"),
+    Command("init", "make a project outside of a clone",
+            "Write a project into a folder: Snakefile, configuration, profiles, the study "
+            "quickstart, and the script run with the commands of a clone. Nothing is overwritten.",
+            "new_project:init", (
+        Argument("folder", type=Path, metavar="FOLDER", help="folder of the project"),),
+            "dragdeck init my-project"),
+    Command("files", "print the folder of templates and examples",
+            "Print the folder in which this version of dragdeck has its templates, plans, meshes "
+            "and example studies. A project uses its own if it has them.",
+            "shipped:files", ()),
     Command("new", "create a study",
             "Create studies/STUDY/study.yaml, which takes the fields that it does not set from "
             "another study.",
@@ -137,6 +146,9 @@ STEPS = (
         Argument("run", metavar="RUN", help="run id, as ./run dragdeck cases lists it"),
         Argument("--packing", type=Path, metavar="FILE",
                   help="packing.json of the settled packing; required for a process"))),
+    Command("set-up", "draw the set-up of a study for its report",
+            "Draw the first case of a study obliquely from above, to results/STUDY/set_up.png.",
+            "commands:draw_set_up", (STUDY, FIDELITY)),
     Command("drops", "run the drop tests of a calibration",
             "Run the drop tests that the calibration of the restitution requires, and write "
             "drops.json to the folder.",

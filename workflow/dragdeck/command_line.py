@@ -108,11 +108,11 @@ class Program:
 
 def _once(value: Any) -> Any:
     """A list of paths without those that name a file or folder again, in any way."""
-    if not isinstance(value, list) or not all(isinstance(one, Path) for one in value):
+    if not isinstance(value, list) or not all(isinstance(item, Path) for item in value):
         return value
     first: dict[Path, Path] = {}
-    for one in value:
-        first.setdefault(one.resolve(), one)
+    for path in value:
+        first.setdefault(path.resolve(), path)
     return list(first.values())
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import product
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import jinja2
 from pydantic import ValidationError
@@ -16,8 +17,8 @@ from rich.table import Table
 
 from dragdeck.advice.advise import advised_settings
 from dragdeck.advice.forecast import advice_file, advice_tables, advised_case, question
-from dragdeck.campaigns.angle_runs import run_angles
-from dragdeck.campaigns.restitution_drops import confirmation, run_drops, sweep
+from dragdeck.calibration_batches.angle_runs import run_angles
+from dragdeck.calibration_batches.restitution_drops import confirmation, run_drops, sweep
 from dragdeck.cases.bed import clump_of
 from dragdeck.cases.case import Case
 from dragdeck.cases.ranks import check_ranks, cores_here
@@ -74,6 +75,9 @@ from dragdeck.study.contact_law import coefficients, modelled
 from dragdeck.study.yaml import located
 from dragdeck.sweep.cases import new_study
 
+if TYPE_CHECKING:
+    from trimesh import Trimesh
+
 
 def _scene_type(name: str) -> SceneType:
     """A scene by its name.
@@ -102,21 +106,23 @@ def check(study: str, fidelity: str | None, verbose: bool) -> None:
 def _check(study: str, fidelity: str | None, verbose: bool) -> None:
     project = find_project(Path.cwd())
     every = project.cases(study, fidelity)
-    found = _Findings(environment(project.templates, study_templates(every[0])))
+    findings = _Findings(environment(project.templates, study_templates(every[0])))
     runs = [
         run
         for kind in SCENES.values()
-        for run in expected_runs(kind, project.run_folders(every, kind), partial(found.look, kind))
+        for run in expected_runs(
+            kind, project.run_folders(every, kind), partial(findings.look, kind)
+        )
     ]
     for varied, cases in check_search(every[0].file).items():
-        found.look_at_bounds(f"search.vary.{varied}", cases)
-    if not found.errors:
-        found.errors += idle(found.overriding - found.effective, found.templates)
-    found.show(verbose)
-    if found.errors:
-        raise together(found.errors)
+        findings.look_at_bounds(f"search.vary.{varied}", cases)
+    if not findings.errors:
+        findings.errors += idle(findings.overriding - findings.effective, findings.templates)
+    findings.show(verbose)
+    if findings.errors:
+        raise together(findings.errors)
     engine = find_engine()
-    warned = f"{len(found.warnings) or 'no'} warning{'' if len(found.warnings) == 1 else 's'}"
+    warned = f"{len(findings.warnings) or 'no'} warning{'' if len(findings.warnings) == 1 else 's'}"
     cost, *scenes = plan_in_words(runs, cores_here())
     print(*(f"  {line}" for line in scenes), sep="\n")
     print(f"{study}: no errors, {warned}; {len(every)} case(s), {cost}; LIGGGHTS {engine.version}")
@@ -139,18 +145,20 @@ class _Findings:
         case = next(iter(runs.values()))
         try:
             scene = _built(kind, case, None)
-            found = of_its_templates(deck_text(scene, self.templates), scene, self.templates)
-            _check_tolerance(case, found["changed_law"])
+            used_templates = of_its_templates(
+                deck_text(scene, self.templates), scene, self.templates
+            )
+            _check_tolerance(case, used_templates["changed_law"])
         except InputError as error:
             self.errors.append(error)
             raise
         self.overriding |= overriding(scene, self.templates)
         self.effective |= effective(scene, self.templates)
-        for text in dict.fromkeys([*map(str, scene.warnings), *_friction_unknown(found)]):
+        for text in dict.fromkeys([*map(str, scene.warnings), *_friction_unknown(used_templates)]):
             names = self.warnings.setdefault(text, [])
             names += [case.name] if case.name not in names else []
         notes = [not_corrected(case) if kind.needs_bed else ""]
-        notes.append(changed_in_words(found["changed_scripts"]))
+        notes.append(changed_in_words(used_templates["changed_scripts"]))
         for text in filter(None, notes):
             names = self.reduced.setdefault(text, [])
             names += [case.name] if case.name not in names else []
@@ -171,8 +179,8 @@ class _Findings:
         if len(refused) == len(cases):
             self.errors += refused[:1]
             return
-        for one in refused:
-            text = f"{one.field}: {one.problem}; such a setting is not run, but infeasible"
+        for problem in refused:
+            text = f"{problem.field}: {problem.problem}; such a setting is not run, but infeasible"
             self.warnings[text] = ["search"]
 
     def show(self, verbose: bool) -> None:
@@ -193,7 +201,7 @@ def _check_tolerance(case: Case, changed_law: Sequence[str]) -> None:
     InputError
         A template changes the contact law of a case whose settings follow from a tolerance.
     """
-    if case.asked and changed_law:
+    if case.requested and changed_law:
         raise located(
             InputError(
                 "the errors of settings are not known for the contact law of a template",
@@ -251,15 +259,15 @@ def explain(study: str, fidelity: str | None, scene: str | None, verbose: bool) 
         speeds = measured_speeds(project.results(study) / kind.name)
         cases = list(by_run(every, kind).values())
         for case in cases if verbose else cases[:1]:
-            one = _as_scripted(_built(kind, case, None), templates)
-            cost = expected_cost(kind, one, speeds)
+            scripted = _as_scripted(_built(kind, case, None), templates)
+            cost = expected_cost(kind, scripted, speeds)
             if not verbose:
                 width = min(100, shutil.get_terminal_size().columns)
                 reduced_text = not_corrected(case) if kind.needs_bed else ""
-                print(*page_of_scene(one, cost, len(cases), width, reduced_text), sep="\n")
+                print(*page_of_scene(scripted, cost, len(cases), width, reduced_text), sep="\n")
                 continue
-            notes = _expectations(case, kind, one)
-            show([explanation(one, cost, notes, tradeoff_if_measured())])
+            notes = _expectations(case, kind, scripted)
+            show([explanation(scripted, cost, notes, tradeoff_if_measured())])
     if not verbose:
         print("For every run, with reasons, costs and expectations: --verbose")
 
@@ -271,9 +279,9 @@ def _as_scripted(scene: StudyScene, templates: jinja2.Environment) -> StudyScene
     if not changed:
         return scene
     there = set().union(*map(modelled, contact_laws(text)))
-    found = scene.modelling(there, {row.words for row in coefficients().values() if row.model})
+    modelling = scene.modelling(there, {row.words for row in coefficients().values() if row.model})
     told = {changed_in_words(changed): "docs/howto/input_scripts.md"}
-    return replace(found, models={**told, **found.models})
+    return replace(modelling, models={**told, **modelling.models})
 
 
 def _expectations(case: Case, kind: SceneType, scene: StudyScene) -> list[tuple[str, str]]:
@@ -288,37 +296,39 @@ def preview(study: str, fidelity: str | None, case: str | None) -> None:
     """Draw one case of a study and print its clearances, whether `check` refuses it or not."""
     project = find_project(Path.cwd())
     every = project.cases(study, fidelity)
-    one = _case_named(every, case)
-    warnings, refused = _judged(one)
+    chosen = _case_named(every, case)
+    warnings, refused = _judged(chosen)
     try:
-        found = layout(one)
+        scene = layout(chosen)
     except InputError as error:
         raise together([*refused, located(error)]) from None
-    particles = ("particles", str(one.study.particle_count))
-    numbers = [*workpiece_notes(one), particles, *dimensionless(one)]
-    title = [f"{study}, case {one.name}", *(f"{name}: {text}" for name, text in numbers[:2])]
+    particles = ("particles", str(chosen.study.particle_count))
+    numbers = [*workpiece_notes(chosen), particles, *dimensionless(chosen)]
+    title = [f"{study}, case {chosen.name}", *(f"{name}: {text}" for name, text in numbers[:2])]
     if refused:
         title.append(textwrap.fill(f"REFUSED: {str(together(refused)).splitlines()[0]}"))
-    files = _drawn(found, "\n".join(title), bool(refused), project.results(study))
-    print(f"{study}: case {one.name}" + (f", one of {len(every)} (--case)" if every[1:] else ""))
+    file = project.results(study) / "preview.png"
+    file.parent.mkdir(parents=True, exist_ok=True)
+    write_bytes(file, picture(scene, _swept(scene), "\n".join(title), bool(refused)))
+    print(f"{study}: case {chosen.name}" + (f", one of {len(every)} (--case)" if every[1:] else ""))
     for name, text in numbers:
         print(f"  {name}: {text}")
     for warning in warnings:
         print(f"warning: {warning}")
-    print(*files, sep="\n")
+    print(file)
     if refused:
         raise together(refused)
 
 
-def _drawn(found: CaseLayout, title: str, refused: bool, folder: Path) -> list[Path]:
-    """Write the pictures of a layout into a folder and return their files."""
-    swept = [swept_volume(body.mesh, body.drag.poses) for body in found.workpieces]
-    png = picture(found, swept, title, refused)
-    folder.mkdir(parents=True, exist_ok=True)
-    files = [folder / name for name in ("preview.png", "set_up.png")]
-    write_bytes(files[0], png)
-    write_bytes(files[1], small_picture(found, swept))
-    return files
+def _swept(scene: CaseLayout) -> list["Trimesh"]:
+    return [swept_volume(body.mesh, body.drag.poses) for body in scene.workpieces]
+
+
+def draw_set_up(study: str, fidelity: str | None) -> None:
+    """Draw the first case of a study for its report."""
+    project = find_project(Path.cwd())
+    scene = layout(project.cases(study, fidelity)[0])
+    write_bytes(project.results(study) / "set_up.png", small_picture(scene, _swept(scene)))
 
 
 def _case_named(cases: list[Case], name: str | None) -> Case:
@@ -329,7 +339,7 @@ def _case_named(cases: list[Case], name: str | None) -> Case:
     InputError
         There is none of this name.
     """
-    named = {one.name: one for one in reversed(cases)}
+    named = {case.name: case for case in reversed(cases)}
     if name is None:
         return cases[0]
     if name not in named:
@@ -385,17 +395,17 @@ def shapes(study: str, fidelity: str | None) -> None:
         )  # fmt: skip
         for count in sorted({*_NUMBERS_OF_SPHERES, part.shape.spheres}):
             try:
-                one = clump_of(part.shape.model_copy(update={"spheres": count}))
+                clump = clump_of(part.shape.model_copy(update={"spheres": count}))
             except InputError as error:
                 table.add_row(str(count), str(error.problem))
                 continue
-            lengths = one.surface_rms, one.left_out, one.stands_out, one.radii.min()
+            lengths = clump.surface_rms, clump.left_out, clump.stands_out, clump.radii.min()
             table.add_row(
                 f"{count}{' *' if count == part.shape.spheres else ''}",
-                f"{100 * one.volume_error:+.1f} %",
-                f"{100 * one.inertia_error:.1f} %",
+                f"{100 * clump.volume_error:+.1f} %",
+                f"{100 * clump.inertia_error:.1f} %",
                 *(f"{length:.2f}" for length in lengths),
-                f"{count / one.timestep_radius:.1f}",
+                f"{count / clump.timestep_radius:.1f}",
             )
         tables.append(table)
     if not tables:
@@ -414,16 +424,16 @@ def advise(
     project = find_project(Path.cwd())
     tradeoff = tradeoff or measured_tradeoff()
     every = list(by_run(project.cases(study, fidelity, tradeoff), SCENES["process"]).values())
-    results, found = project.results(study), []
+    results, tables = project.results(study), []
     try:
         asked = [question(case, tolerance, quantity) for case in every]
     except ValidationError as error:
         raise explained(error, "command line") from None
     for case, wanted in zip(every, asked, strict=True):
         advice = advised_settings(case, wanted, tradeoff)
-        found.append(advised_case(case, advice, results))
-        show(advice_tables(case, advice, found[-1]))
-    _keep(results / "advice.json", advice_file(every[0], found))
+        tables.append(advised_case(case, advice, results))
+        show(advice_tables(case, advice, tables[-1]))
+    _keep(results / "advice.json", advice_file(every[0], tables))
 
 
 def _keep(file: Path, content: AdviceFile) -> None:

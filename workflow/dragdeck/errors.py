@@ -72,11 +72,11 @@ class DocumentError(InputError):
 
 def together(errors: Iterable[InputError]) -> InputError:
     """Several errors as one that names them all, each once; it has the fields of the first."""
-    every = {one._message(): one for error in errors for one in (error, *error.more)}
+    every = {problem._message(): problem for error in errors for problem in (error, *error.more)}
     first, *more = every.values()
     first.more = more
-    for one in more:
-        one.more = ()
+    for problem in more:
+        problem.more = ()
     return first
 
 

@@ -15,6 +15,7 @@ from dragdeck.scenes.motion import deepest
 from dragdeck.scenes.process import PROCESS, SCENES
 from dragdeck.scenes.scene import SceneType
 from dragdeck.scenes.workpiece import workpiece_length
+from dragdeck.shipped import SHIPPED, own_or_shipped
 from dragdeck.study.base import NAME, NAME_LIMIT
 from dragdeck.study.check import validate
 from dragdeck.study.search import RECORD as SEARCHED
@@ -32,6 +33,9 @@ WINDOWS = "windows"
 PLACES: dict[str, SceneType] = {**SCENES, POINTS: PROCESS, WINDOWS: PROCESS}
 """The scene of each folder of runs of a study."""
 
+_PLANS = "workflow/plans"
+"""The plans: which points are run."""
+
 OUTCOMES = (POINTS, WINDOWS)
 """Folders of runs of which one that fails is a finding, which others do without."""
 
@@ -43,24 +47,19 @@ def run_path(study: str, place: str, run: str) -> str:
 
 @dataclass(frozen=True)
 class Project:
-    """A folder with ``templates/`` and ``studies/``; results go beside them."""
+    """A folder with ``studies/``; results go beside them. What it lacks is that of dragdeck."""
 
     root: Path
 
     @property
     def templates(self) -> Path:
-        """The project's templates."""
-        return self.root / "templates"
+        """The folder of templates."""
+        return own_or_shipped(self.root, "templates")
 
     @property
     def studies(self) -> Path:
         """One folder a study."""
         return self.root / "studies"
-
-    @property
-    def plans(self) -> Path:
-        """The plans: which points are run."""
-        return self.root / "workflow" / "plans"
 
     def cases(
         self, study: str, fidelity: str | None = None, tradeoff: TradeoffRecord | None = None
@@ -75,13 +74,13 @@ class Project:
         file = study_file(self.studies, study)
         try:
             found_by = partial(resolve, tradeoff=tradeoff)
-            found = load_cases(file, fidelity, found_by, self.results(study) / SEARCHED)
+            cases = load_cases(file, fidelity, found_by, self.results(study) / SEARCHED)
             check_search(file)
-            for case in found:
+            for case in cases:
                 _check_timesteps(case)
         except InputError as error:
             raise located(error) from None
-        return found
+        return cases
 
     def plan_file(self, plan: str) -> Path:
         """The file of a plan, which is known by its name or its path.
@@ -91,12 +90,14 @@ class Project:
         InputError
             There is no such plan.
         """
-        file = Path(plan) if plan.endswith(".yaml") else self.plans / f"{plan}.yaml"
+        name = f"{_PLANS}/{plan}.yaml"
+        file = Path(plan) if plan.endswith(".yaml") else own_or_shipped(self.root, name)
         if not NAME.fullmatch(file.stem) or not file.is_file():
-            known = sorted(found.stem for found in self.plans.glob("*.yaml"))
+            folders = (self.root / _PLANS, SHIPPED / _PLANS)
+            known = sorted({path.stem for folder in folders for path in folder.glob("*.yaml")})
             raise InputError(
                 f"no such plan: {plan!a}",
-                file=self.plans,
+                file=self.root / _PLANS,
                 limit=f"{choices(plan, known)}; or the path of a .yaml file",
                 remedy=f"choose one of these, or write one; its name has {NAME_LIMIT}",
             )
@@ -206,7 +207,7 @@ def check_buildable(case: Case) -> None:
 
 
 def find_project(start: Path) -> Project:
-    """The project that a folder belongs to: the nearest with templates/ and studies/.
+    """The project that a folder belongs to: the nearest with studies/.
 
     Raises
     ------
@@ -214,14 +215,33 @@ def find_project(start: Path) -> Project:
         There is none.
     """
     for folder in (start, *start.parents):
-        if (folder / "templates").is_dir() and (folder / "studies").is_dir():
+        if (folder / "studies").is_dir():
             return Project(folder)
     raise InputError(
         "not inside a dragdeck project",
         file=start,
-        limit="a folder with templates/ and studies/",
-        remedy="change into the project's folder",
+        limit="a folder with studies/",
+        remedy="change into the project's folder, or make one: dragdeck init FOLDER",
     )
+
+
+def project_here() -> Project:
+    """The project whose root is the working folder, as of a call of Snakemake.
+
+    Raises
+    ------
+    InputError
+        It is not the root of a project.
+    """
+    project = find_project(Path.cwd())
+    if project.root != Path.cwd():
+        raise InputError(
+            "Snakemake does not work in the project's own folder",
+            file=Path.cwd(),
+            limit=str(project.root),
+            remedy=f"change into it, or add --directory {project.root}",
+        )
+    return project
 
 
 def study_templates(case: Case) -> Path:
@@ -235,14 +255,14 @@ def study_files(cases: Iterable[Case]) -> list[Path]:
 
     Hidden files are left out.
     """
-    found = set()
+    files = set()
     for case in cases:
         for folder in study_folders(case.file):
             inside = (file for file in folder.rglob("[!.]*") if file.is_file())
-            found |= {file for file in inside if "/." not in f"/{file.relative_to(folder)}"}
-        shapes = [one.study.workpiece.shape for one in of_each_workpiece(case)]
-        found |= {mesh_file(case, shape) for shape in shapes if isinstance(shape, MeshShape)}
-    return sorted(found)
+            files |= {file for file in inside if "/." not in f"/{file.relative_to(folder)}"}
+        shapes = [workpiece.study.workpiece.shape for workpiece in of_each_workpiece(case)]
+        files |= {mesh_file(case, shape) for shape in shapes if isinstance(shape, MeshShape)}
+    return sorted(files)
 
 
 def by_run(cases: Iterable[Case], scene: SceneType) -> dict[str, Case]:
@@ -267,4 +287,6 @@ def by_folder(cases: Iterable[Case], scene: SceneType) -> dict[str, Case]:
     runs = by_run(cases, scene)
     if not scene.needs_bed:
         return runs
-    return by_run([one for case in runs.values() for one in of_each_workpiece(case)], scene)
+    return by_run(
+        [workpiece for case in runs.values() for workpiece in of_each_workpiece(case)], scene
+    )

@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import cache, partial
+from importlib.util import find_spec
 from pathlib import Path
 from shlex import quote
 from typing import Any, NoReturn, Protocol, TypeVar
@@ -17,7 +18,7 @@ from uuid import uuid4
 from jsonschema import Draft202012Validator
 from snakemake_interface_common.exceptions import WorkflowError
 
-from dragdeck.campaigns.restitution_drops import record_file
+from dragdeck.calibration_batches.restitution_drops import record_file
 from dragdeck.cases.case import Case, digest
 from dragdeck.decks import RUN_FILE
 from dragdeck.decks.templates import environment, template_files
@@ -39,7 +40,7 @@ from dragdeck.project import (
     study_templates,
 )
 from dragdeck.records.run import RunRecord
-from dragdeck.scenes.lead import FIRST_WINDOWS, led, windows_of, with_leads
+from dragdeck.scenes.lead import FIRST_WINDOWS, windows_of, with_lead, with_leads
 from dragdeck.scenes.process import SCENES
 from dragdeck.study.base import Json
 from dragdeck.study.recorded import recorded_file
@@ -52,10 +53,6 @@ ENGINE_RUN = "[A-Za-z0-9._-]+-[0-9a-f]{8}"
 
 FURTHER_WORKPIECE = f"{ENGINE_RUN}[.][0-9]+"
 """A further workpiece of one: its number follows the run's name."""
-
-WINDOWS_RECORD = "workflow/dragdeck/data/windows.json"
-
-_PAGES = "analysis/dragchain"
 
 V = TypeVar("V")
 
@@ -71,6 +68,13 @@ class RoundOfRun(Wildcards, Protocol):
     """What a rule knows of a round of windows of a run."""
 
     round: str
+
+
+def _folder_of(package: str) -> Path:
+    """The folder of a package of this project."""
+    spec = find_spec(package)
+    assert spec is not None and spec.origin is not None
+    return Path(spec.origin).parent
 
 
 FromRun = Callable[[Wildcards], V]
@@ -132,14 +136,14 @@ def of_whole_run(place: str, file: str) -> FromRun[str]:
     )
 
 
-def add_records(rules: Iterable[Any]) -> None:
+def add_records(rules: Iterable[Any], environment_file: str = "../envs/python.yaml") -> None:
     """Give each of Snakemake's rules that has a command a log, a benchmark and an environment.
 
     They stand in ``logs/`` and ``benchmarks/`` of the folder of its run or study, and are called
-    like the rule, without the place of its runs.
+    like the rule, without the place of its runs. Rules that have a log already are left alone.
     """
     for rule in rules:
-        if rule.norun:
+        if rule.norun or rule.log:
             continue
         folders, name = str(next(iter(rule.output), "results")).split("/"), rule.name
         depth = 2
@@ -151,7 +155,7 @@ def add_records(rules: Iterable[Any]) -> None:
         rule.log_modifier = rule.benchmark_modifier = rule.output_modifier
         rule.set_log(f"{folder}/logs/{name}.log")
         rule.benchmark = f"{folder}/benchmarks/{name}.tsv"
-        rule.conda_env = "../envs/python.yaml"
+        rule.conda_env = environment_file
         rule.set_params(content=_content_of(list(rule.input), bool(rule.wildcard_names)))
 
 
@@ -159,11 +163,11 @@ def _content_of(inputs: Sequence[Any], of_runs: bool) -> Callable[[Any], str]:
     """Checksum of the project's own files among a rule's inputs: a restored file may be older."""
 
     def content(wildcards: Any) -> str:
-        given = [one(wildcards) if callable(one) else one for one in inputs
-                 if not (of_runs and callable(one))]  # fmt: skip
-        names = [name for one in given for name in ([one] if isinstance(one, str) else one)]
-        own = (Path(name) for name in names if not name.startswith(("results/", _HOMES)))
-        return " ".join(file_checksum(file)[:12] for file in own if file.is_file())
+        given = [input_(wildcards) if callable(input_) else input_ for input_ in inputs
+                 if not (of_runs and callable(input_))]  # fmt: skip
+        names = [name for item in given for name in ([item] if isinstance(item, str) else item)]
+        paths = (Path(name) for name in names if not name.startswith(("results/", _HOMES)))
+        return " ".join(file_checksum(file)[:12] for file in paths if file.is_file())
 
     return content
 
@@ -279,19 +283,27 @@ class Workflow:
 
     def _templates_of(self, scene: str) -> list[str]:
         """Every template that a scene's deck is made of."""
-        own = study_templates(self.cases[0])
-        templates = or_stop(environment, self.project.templates, own)
+        folders = study_templates(self.cases[0])
+        templates = or_stop(environment, self.project.templates, folders)
         return [self.relative(file) for file in or_stop(template_files, templates, scene)]
 
     def files(self, pattern: str) -> list[str]:
         """The project's files of this pattern."""
         return sorted(map(self.relative, self.project.root.glob(pattern)))
 
-    def page_templates(self, *names: str, package: str = _PAGES) -> list[str]:
+    def page_templates(self, *names: str, package: str = "dragchain") -> list[str]:
         """The templates of a page, with those that all pages are made of."""
-        shared = [f"{_PAGES}/report/{name}.html.j2" for name in ("page", "macros")]
-        own = [f"{package}/{name}" for name in names]
-        return [str(self.project.root / name) for name in (*own, *shared)]
+        shared = [_folder_of("dragchain") / f"report/{name}.html.j2" for name in ("page", "macros")]
+        return [str(file) for file in (*(_folder_of(package) / name for name in names), *shared)]
+
+    def page_files(self, pattern: str) -> list[str]:
+        """The files of this pattern that pages of dragchain are made of."""
+        return sorted(map(self.relative, _folder_of("dragchain").glob(pattern)))
+
+    @property
+    def windows_record(self) -> str:
+        """The record that windows are judged with."""
+        return self.relative(_folder_of("dragdeck") / "data/windows.json")
 
     def if_measured(self, part: str, *files: str) -> list[str]:
         """Files in the folder of the calibration, if the study has this part of it."""
@@ -336,13 +348,13 @@ class Workflow:
 
     def _origins(self, place: str) -> Iterator[tuple[str, dict[str, Case]]]:
         """Where cases of a folder's runs come from: how to name them, and by run."""
-        scene, own = PLACES[place], self.cases
+        scene, cases = PLACES[place], self.cases
         if place == WINDOWS:
-            own = [window for case in own for window in windows_of(case)]
+            cases = [window for case in cases for window in windows_of(case)]
         elif scene.needs_bed:
-            own = with_leads(own)
+            cases = with_leads(cases)
         if place != POINTS:
-            yield self.fidelity_option, by_folder(own, scene)
+            yield self.fidelity_option, by_folder(cases, scene)
         for plan in (self.plan, self.validation):
             try:
                 runs = self.points_by_run(scene.name, plan, leads=True)
@@ -384,12 +396,12 @@ class Workflow:
     def planned_runs(self, jobs: Iterable[Any]) -> list[StudyRun]:
         """The engine runs of Snakemake's jobs: what is expected of each, and how far it is."""
         places = {f"run_{place}": place for place in PLACES}
-        found: dict[str, dict[Path, Case]] = {}
+        by_folder: dict[str, dict[Path, Case]] = {}
         for job in jobs:
             if place := places.get(job.rule.name):
                 folder = self.project.root / Path(job.output[0]).parent
-                found.setdefault(place, {})[folder] = self.case_of(place, job.wildcards.run)
-        several = (expected_runs(PLACES[place], folders) for place, folders in found.items())
+                by_folder.setdefault(place, {})[folder] = self.case_of(place, job.wildcards.run)
+        several = (expected_runs(PLACES[place], folders) for place, folders in by_folder.items())
         return [run.now() for runs in several for run in runs]
 
     # --- parameters of rules ---------------------------------------------------------------
@@ -426,7 +438,7 @@ class Workflow:
         """The record of the run from which a run goes on, if there is one."""
 
         def names(wildcards: Wildcards) -> list[str]:
-            lead = led(self.case_of(place, wildcards.run)).lead
+            lead = with_lead(self.case_of(place, wildcards.run)).lead
             if lead is None:
                 return []
             run = SCENES["process"].run_id(lead)
@@ -437,7 +449,7 @@ class Workflow:
     @property
     def needed_advice(self) -> list[str]:
         """The advice of a study in which a case asks for a tolerance; nothing for another one."""
-        return [self.advice] if any(case.asked for case in self.cases) else []
+        return [self.advice] if any(case.requested for case in self.cases) else []
 
     def advice_option(self, _: object = None) -> str:
         """How to name the advice on the command line, if there is or will be one."""

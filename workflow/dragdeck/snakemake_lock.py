@@ -92,8 +92,8 @@ def hold_lock(folder: Path, report: Callable[[str], None], call: str = "") -> No
 def others_at_work(folder: Path) -> list[Holder]:
     """The other Snakemakes that hold the lock."""
     lines = (folder / _FILE).read_text(encoding="utf-8").splitlines()
-    found = [Holder(**json.loads(line)) for line in lines]
-    return [one for one in found if one.pid != os.getpid() and one.may_live()]
+    holders = [Holder(**json.loads(line)) for line in lines]
+    return [holder for holder in holders if holder.pid != os.getpid() and holder.may_live()]
 
 
 def why_locked(folder: Path) -> str | None:
@@ -104,8 +104,8 @@ def why_locked(folder: Path) -> str | None:
     return "\n".join(
         [
             "another call is making the same files",
-            *(f"  value:  process {one.pid} on {one.host} since {one.since}: {one.call}"
-              for one in others),
+            *(f"  value:  process {other.pid} on {other.host} since {other.since}: {other.call}"
+              for other in others),
             "  remedy: give the same command again when it has ended; or stop it with: "
             f"kill -INT {others[0].pid}",
         ]

@@ -12,8 +12,8 @@ from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
-_PACKAGES = ("dragdeck", "dragchain", "evidence")
-"""The packages of this project."""
+_PACKAGES = ("dragdeck", "dragchain")
+"""The packages that others of this project may import."""
 
 
 def source_hash(*modules: str) -> str:
@@ -44,16 +44,16 @@ def source_hash(*modules: str) -> str:
 
 def source_files(*modules: str) -> dict[str, Path]:
     """The files of the given modules and of all they import from this project."""
-    found: dict[str, Path] = {}
+    source_files: dict[str, Path] = {}
     waiting = list(modules)
     while waiting:
         name = waiting.pop()
         file = _file(name)
-        if name in found or file is None:
+        if name in source_files or file is None:
             continue
-        found[name] = file
+        source_files[name] = file
         waiting.extend(_imports(file, name.partition(".")[0]))
-    return found
+    return source_files
 
 
 @cache
@@ -77,14 +77,16 @@ def _records(module: str) -> tuple[Path, ...]:
 
 @cache
 def _imports(file: Path, package: str) -> tuple[str, ...]:
-    own = {package, *_PACKAGES}
-    return tuple(name for name in _imported(file) if name.partition(".")[0] in own)
+    packages = {package, *_PACKAGES}
+    return tuple(name for name in _imported(file) if name.partition(".")[0] in packages)
 
 
 def _imported(file: Path) -> Iterator[str]:
     statements: list[ast.AST] = [ast.parse(file.read_bytes())]
     for node in statements:  # and those inside them: no expression imports anything
-        statements += (one for one in ast.iter_child_nodes(node) if not isinstance(one, ast.expr))
+        statements += (
+            child for child in ast.iter_child_nodes(node) if not isinstance(child, ast.expr)
+        )
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module is not None:

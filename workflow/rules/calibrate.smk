@@ -29,7 +29,7 @@ rule sweep_drops:
         study=STUDY,
         whole=WORK.whole_study,
         fidelity=WORK.fidelity_option,
-        source=source_hash("dragdeck.campaigns.restitution_drops"),
+        source=source_hash("dragdeck.calibration_batches.restitution_drops"),
     shell:
         "dragdeck step drops {params.study} sweep {params.fidelity}"
         " --out $(dirname {output}) 2>&1 | tee -i {log}"
@@ -65,7 +65,7 @@ rule confirm_restitution:
         study=STUDY,
         whole=WORK.whole_study,
         fidelity=WORK.fidelity_option,
-        source=source_hash("dragdeck.campaigns.restitution_drops"),
+        source=source_hash("dragdeck.calibration_batches.restitution_drops"),
     shell:
         "dragdeck step drops {params.study} confirm {params.fidelity} --fit {input.fit}"
         " --out $(dirname {output}) 2>&1 | tee -i {log}"
@@ -84,7 +84,7 @@ rule simulate_angles:
         study=STUDY,
         whole=WORK.whole_study,
         fidelity=WORK.fidelity_option,
-        source=source_hash("dragdeck.campaigns.angle_runs"),
+        source=source_hash("dragdeck.calibration_batches.angle_runs"),
     shell:
         "dragdeck step angles {params.study} {params.fidelity} --cores {threads}"
         " --out $(dirname {output}) 2>&1 | tee -i {log}"

@@ -1,4 +1,4 @@
-# What the rules share: the call's checked_settings, and the study with its runs as `WORK` (dragdeck.rules).
+# What the rules share: the call's settings, and the study with its runs as `WORK` (dragdeck.rules).
 import os
 import signal
 import sys
@@ -12,13 +12,12 @@ from dragdeck.engine.reports import say, shown_bytes
 from dragdeck.engine.space import free_bytes
 from dragdeck.outlook.runs import plan_in_words
 from dragdeck.outlook.timestep import largest_of_case
-from dragdeck.project import OUTCOMES, PLACES, POINTS, WINDOWS, Project, by_run, run_path
+from dragdeck.project import OUTCOMES, PLACES, POINTS, WINDOWS, by_run, project_here, run_path
 from dragdeck.records.run import figures_of
 from dragdeck.rules import (
     ENGINE_RUN,
     FURTHER_WORKPIECE,
     RECORD,
-    WINDOWS_RECORD,
     Workflow,
     add_records,
     of_run,
@@ -30,11 +29,11 @@ from dragdeck.rules import (
     tables_of,
 )
 from dragdeck.scenes.process import SCENES
+from dragdeck.shipped import own_or_shipped
 from dragdeck.snakemake_lock import hold_lock
 from dragdeck.source_hash import source_hash
 from dragdeck.study.check import warnings
 from dragdeck.study.yaml import read_yaml
-from evidence.stability.points import bed_settings
 
 
 def locking_call():
@@ -44,10 +43,12 @@ def locking_call():
 
 
 hold_lock(Path(".snakemake"), say, locking_call())
-or_stop(read_yaml, Path("config/config.yaml"))
+PROJECT = or_stop(project_here)
+CONFIG_FILE = own_or_shipped(PROJECT.root, "config/config.yaml")
+or_stop(read_yaml, CONFIG_FILE)
 
 
-configfile: "config/config.yaml"
+configfile: CONFIG_FILE
 
 
 # Runs have no more ranks than the cores that this call was given; with a queue, than a node has.
@@ -57,8 +58,8 @@ if workflow.is_main_process and workflow.local_exec and workflow.resource_settin
 
 SCHEMA = yaml.safe_load(Path(workflow.source_path("../schemas/config.schema.yaml")).read_text())
 config.update(checked_settings(config, SCHEMA["properties"]))
-STUDY, FIDELITY, PLAN, STABILITY_MAP, COLOURS = (
-    config.get(key, "") for key in SCHEMA["properties"]
+STUDY, FIDELITY, PLAN, COLOURS = (
+    config.get(key, "") for key in ("study", "fidelity", "plan", "colours")
 )
 PLAN, VALIDATION = PLAN or "default", PLAN or "paper"
 
@@ -74,7 +75,6 @@ def shown(file, caption, category, figure="report", run="all"):
     return report(file, caption=f"../report/{caption}.rst", category=category, labels=labels)
 
 
-PROJECT = Project(Path(workflow.basedir))
 WORK = Workflow(PROJECT, STUDY, FIDELITY, PLAN, VALIDATION, judged)
 CASES = WORK.cases
 HOME = home_of(STUDY, idle=not locking_call())

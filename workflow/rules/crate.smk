@@ -3,7 +3,7 @@
 
 rule write_crate:
     input:
-        [WORK.every(name, "run.json", "tables/figures.json") for name in SCENES],
+        [WORK.every(name, "run.json", "tables/findings.json") for name in SCENES],
         # A brace would start a wildcard.
         lambda wildcards: [file for file in WORK.crate_inputs() if "{" not in file],
         report=rules.write_report.output,

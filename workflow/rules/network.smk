@@ -5,7 +5,7 @@ rule write_network_page:
     input:
         tables_of("process", [*SCENES["process"].tables, *SCENES["process"].network]),
         of_run("process", "tables/facets.parquet"),
-        WORK.files("analysis/dragchain/network_page/network.*"),
+        WORK.page_files("network_page/network.*"),
         run=of_run("process", "run.json"),
     output:
         shown(of_run("process", "network.html"), "network", "Process", "network", run="{run}"),

@@ -15,12 +15,12 @@ rule draw_set_up:
         fidelity=WORK.fidelity_option,
         source=source_hash("dragdeck.preview.picture"),
     shell:
-        "dragdeck preview {params.study} {params.fidelity} > {log} 2>&1"
+        "dragdeck step set-up {params.study} {params.fidelity} > {log} 2>&1"
 
 
 rule write_report:
     input:
-        [WORK.every(name, "run.json", "tables/figures.json") for name in SCENES],
+        [WORK.every(name, "run.json", "tables/findings.json") for name in SCENES],
         [WORK.every_table(name) for name in SCENES],
         WORK.every("process", "tables/loading.json"),
         WORK.every("process", "network.html"),

@@ -110,7 +110,7 @@ for PLACE, SCENE in SCENES.items():
                 )
                 for name in figures_of(SCENE.name)
             ],
-            of_run(PLACE, "tables/figures.json"),
+            of_run(PLACE, "tables/findings.json"),
         params:
             source=source_hash("dragchain.report.run_figures"),
         shell:
@@ -137,7 +137,7 @@ for PLACE, SCENE in SCENES.items():
 rule draw_for_journal:
     input:
         tables_of("process", [*SCENES["process"].tables, *SCENES["process"].network]),
-        of_run("process", "tables/figures.json"),
+        of_run("process", "tables/findings.json"),
         run=of_run("process", "run.json"),
     output:
         of_run("process", "figures/journal/workpiece.pdf"),
@@ -155,7 +155,7 @@ checkpoint judge_windows:
         WORK.records_of_round,
         run=of_run("process", "run.json"),
         before=WORK.round_before,
-        record=WINDOWS_RECORD,
+        record=WORK.windows_record,
     output:
         of_run("process", "windows/round-{round}.json"),
     wildcard_constraints:
@@ -174,7 +174,7 @@ rule extrapolate_process:
     input:
         tables_of("process", [*SCENES["process"].tables, *SCENES["process"].network]),
         run=of_run("process", "run.json"),
-        record=WINDOWS_RECORD,
+        record=WORK.windows_record,
         windows=WORK.last_round,
     output:
         of_run("process", "tables/extrapolated.json"),

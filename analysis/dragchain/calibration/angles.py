@@ -50,9 +50,9 @@ def exposed(flat: Floats, height: Floats, radius: Floats) -> NDArray[np.bool_]:
     pairs = cKDTree(flat).query_pairs(float(radius.max()), output_type="ndarray")
     low, high = np.where(height[pairs[:, :1]] < height[pairs[:, 1:]], pairs, pairs[:, ::-1]).T
     covers = np.linalg.norm(flat[low] - flat[high], axis=1) < radius[high]
-    found = np.ones(len(flat), dtype=bool)
-    found[low[covers]] = False
-    return found
+    uncovered = np.ones(len(flat), dtype=bool)
+    uncovered[low[covers]] = False
+    return uncovered
 
 
 def heap_angle(centre: Floats, radius: Floats) -> tuple[float, float]:
@@ -82,8 +82,8 @@ def heap_angle(centre: Floats, radius: Floats) -> tuple[float, float]:
     whole = -_slope(away[flank], top[flank])
     without = [
         -_slope(away[rest], top[rest])
-        for one in range(_SECTORS)
-        for rest in [flank & (sector != one)]
+        for number in range(_SECTORS)
+        for rest in [flank & (sector != number)]
     ]
     return whole, float(np.sqrt((_SECTORS - 1) * np.var(without)))
 

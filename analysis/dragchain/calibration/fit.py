@@ -71,7 +71,9 @@ def sample_impacts(shapes: Sequence[Waveform], measured: Measured) -> Sampling:
         ``coarse``: less than half of the samplings would see an impact.
     """
     pairs = zip(shapes, measured.impacts, strict=False)
-    return Sampling(*np.array([_sampled(one, measured, impact.peak_n) for one, impact in pairs]).T)
+    return Sampling(
+        *np.array([_sampled(diameter, measured, impact.peak_n) for diameter, impact in pairs]).T
+    )
 
 
 def _sampled(shape: Waveform, measured: Measured, peak_n: float) -> list[float]:
@@ -79,7 +81,7 @@ def _sampled(shape: Waveform, measured: Measured, peak_n: float) -> list[float]:
     random = np.random.default_rng(_SAMPLING_SEED)
     step, (start, end) = measured.interval_s, (shape.time_s[0], shape.time_s[-1])
     count = int((end - start) / step) + 6
-    found: list[tuple[float, float, float]] = []
+    samples: list[tuple[float, float, float]] = []
     for phase in random.random(_SAMPLINGS):
         time = start + (np.arange(count) - 3 + phase) * step
         force = np.interp(time, shape.time_s, shape.force_n, 0.0, 0.0) * peak_n / shape.peak_n
@@ -88,8 +90,8 @@ def _sampled(shape: Waveform, measured: Measured, peak_n: float) -> list[float]:
         if len(above) < 2:
             continue
         seen = pulse(time, force, (int(above[0]), int(above[-1])), step)
-        found.append((seen.peak_n / peak_n, seen.centroid_s - shape.centroid_s, seen.width_s))
-    if len(found) < _SAMPLINGS / 2:
+        samples.append((seen.peak_n / peak_n, seen.centroid_s - shape.centroid_s, seen.width_s))
+    if len(samples) < _SAMPLINGS / 2:
         raise RecordError(
             "coarse",
             "the sampling rate is too low to resolve an impact of this particle",
@@ -97,7 +99,7 @@ def _sampled(shape: Waveform, measured: Measured, peak_n: float) -> list[float]:
             limit="2 samples above the noise in most impacts",
             remedy="record at a higher rate",
         )
-    table = np.array(found)
+    table = np.array(samples)
     (ratio, bias, width), (ratio_std, bias_std, _) = table.mean(axis=0), table.std(axis=0, ddof=1)
     return [ratio, ratio_std, bias, bias_std, width]
 
@@ -229,8 +231,8 @@ def fit(misfit: Misfit) -> Fit:
     """
     e = misfit.emulator
     bounds = (e.low, e.high)
-    found = minimize_scalar(misfit, bounds=bounds, method="bounded", options={"xatol": 1e-9})
-    best, least = float(found.x), float(found.fun)
+    result = minimize_scalar(misfit, bounds=bounds, method="bounded", options={"xatol": 1e-9})
+    best, least = float(result.x), float(result.fun)
     degrees = len(misfit.observed.times_s) + len(misfit.observed.log_peaks) - 1
     inflation = math.sqrt(max(1.0, least / degrees)) if degrees else 1.0
     rise = _RISE * inflation**2

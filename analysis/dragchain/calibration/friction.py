@@ -15,6 +15,7 @@ import pandas as pd
 from dragchain.arrays import Floats
 from dragchain.calibration.angles import read_angle
 from dragchain.errors import TableError
+from dragchain.statistics.bed_effects import EffectsFit, fit_effects
 from dragchain.statistics.estimate import CONFIDENCE, Estimate
 from dragdeck.documents import Part
 from dragdeck.files import write_text
@@ -39,15 +40,12 @@ class AngleModel:
     ----------
     ranges : (2, 2) array
         Lower and upper end of friction and rolling friction.
-    factors, covariance : (10,) and (10, 10) array
-    scatter_deg : float
-        Standard deviation of the angles about the polynomial: that of a run, and lack of fit.
+    fit : EffectsFit
+        Factors of its 10 terms; the residuals are those of a run, and lack of fit.
     """
 
     ranges: Floats
-    factors: Floats
-    covariance: Floats
-    scatter_deg: float
+    fit: EffectsFit
 
     @classmethod
     def through(cls, pairs: Floats, angle_deg: Floats, ranges: Floats) -> "AngleModel":
@@ -63,16 +61,13 @@ class AngleModel:
         if spare < _SPARE:
             least = terms.shape[1] + _SPARE
             raise TableError(f"{len(terms)} runs of a measured angle succeeded, not {least}")
-        inverse = np.asarray(np.linalg.inv(terms.T @ terms), dtype=np.float64)
-        factors = inverse @ terms.T @ angle_deg
-        variance = float(((angle_deg - terms @ factors) ** 2).sum() / spare)
-        return cls(ranges, factors, variance * inverse, variance**0.5)
+        return cls(ranges, fit_effects(terms, angle_deg, range(len(terms))))
 
     def at(self, pairs: Floats) -> tuple[Floats, Floats]:
         """Mean angle at (M, 2) pairs of coefficients and its standard uncertainty, degrees."""
         terms = _terms(pairs, self.ranges)
-        variance = ((terms @ self.covariance) * terms).sum(axis=1)
-        return terms @ self.factors, np.sqrt(variance)
+        variance = ((terms @ self.fit.covariance) * terms).sum(axis=1)
+        return terms @ self.fit.effects, np.sqrt(variance)
 
 
 def _terms(pairs: Floats, ranges: Floats) -> Floats:
@@ -150,14 +145,18 @@ class Posterior:
         pairs = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
         misfit, log = dict[Rig, Floats](), dict[str, Floats]()
         for name, model in models.items():
-            (angle, own), (mean, std) = measured[name], model.at(pairs)
-            width = np.hypot(std, own).reshape(GRID, GRID)
+            (angle, reading_error), (mean, std) = measured[name], model.at(pairs)
+            width = np.hypot(std, reading_error).reshape(GRID, GRID)
             misfit[name] = (angle - mean.reshape(GRID, GRID)) / width
             log[name] = -(misfit[name] ** 2) / 2 - np.log(width)
         if len(log) > 1:
             log["both"] = np.sum(list(log.values()), axis=0)
-        found = {name: np.exp(one - one.max()) for name, one in log.items()}
-        return cls(axes, misfit, {name: one / one.sum() for name, one in found.items()})
+        likelihoods = {name: np.exp(logarithm - logarithm.max()) for name, logarithm in log.items()}
+        return cls(
+            axes,
+            misfit,
+            {name: likelihood / likelihood.sum() for name, likelihood in likelihoods.items()},
+        )
 
     def coefficients(self, name: str) -> Coefficients:
         """Means, equal-tailed intervals and correlation."""
@@ -170,7 +169,7 @@ class Posterior:
         away = self.axes - mean[:, None]
         spread = np.sqrt((away**2 * marginal).sum(axis=1))
         length = CONFIDENCE * np.ptp(self.axes, axis=1)
-        first, second = (Estimate(*one) for one in np.column_stack([mean, ends]).tolist())
+        first, second = (Estimate(*row) for row in np.column_stack([mean, ends]).tolist())
         return Coefficients(
             friction=first,
             rolling_friction=second,
@@ -181,12 +180,12 @@ class Posterior:
 
 def angle_models(known: AnglesFile, runs: pd.DataFrame) -> dict[Rig, AngleModel]:
     """The angle of each measurement as a function of the coefficients, from ``angles.csv``."""
-    ranges, found = np.array([known.friction, known.rolling_friction]), {}
+    ranges, models = np.array([known.friction, known.rolling_friction]), {}
     for name in known.measured:
-        own = runs[runs["rig"] == name]
-        pairs = own[["friction", "rolling_friction"]].to_numpy(np.float64)
-        found[name] = AngleModel.through(pairs, own["angle_deg"].to_numpy(np.float64), ranges)
-    return found
+        of_rig = runs[runs["rig"] == name]
+        pairs = of_rig[["friction", "rolling_friction"]].to_numpy(np.float64)
+        models[name] = AngleModel.through(pairs, of_rig["angle_deg"].to_numpy(np.float64), ranges)
+    return models
 
 
 def find_friction(known: AnglesFile, runs: pd.DataFrame) -> FrictionFile:
@@ -204,8 +203,8 @@ def find_friction(known: AnglesFile, runs: pd.DataFrame) -> FrictionFile:
     return FrictionFile(
         **dict(known),
         best=(float(posterior.axes[0, i]), float(posterior.axes[1, j])),
-        misfit={name: float(one[i, j]) for name, one in posterior.misfit.items()},
-        scatter_deg={name: one.scatter_deg for name, one in models.items()},
+        misfit={name: float(misfits[i, j]) for name, misfits in posterior.misfit.items()},
+        scatter_deg={name: model.fit.residual_std for name, model in models.items()},
         found={name: posterior.coefficients(name) for name in posterior.weights},
     )
 
@@ -220,13 +219,13 @@ def write_friction(runs_file: Path, out_dir: Path) -> str:
     """
     known = AnglesFile.read(runs_file)
     runs = pd.DataFrame([read_angle(runs_file.parent / name) for name in known.runs])
-    found = find_friction(known, runs)
+    result = find_friction(known, runs)
     write_text(out_dir / "angles.csv", runs.to_csv(index=False, lineterminator="\n"))
-    found.write(out_dir / "angles.json")
-    last, (friction, rolling) = [*found.found.values()][-1], found.best
+    result.write(out_dir / "angles.json")
+    last, (friction, rolling) = [*result.found.values()][-1], result.best
     ends = [
-        f"{one.ci95_low:.3g} to {one.ci95_high:.3g}"
-        for one in (last.friction, last.rolling_friction)
+        f"{coefficient.ci95_low:.3g} to {coefficient.ci95_high:.3g}"
+        for coefficient in (last.friction, last.rolling_friction)
     ]
     return (
         f"set pairs.{known.pair}.friction: {friction:.3g}, rolling_friction: {rolling:.3g}\n"

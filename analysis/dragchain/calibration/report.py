@@ -22,26 +22,26 @@ from dragdeck.study.force_record import Record, read_record
 # --- figures -------------------------------------------------------------------------------------
 
 
-def draw_impacts(record: Record, found: RecordFit, confirm: Drops) -> Figure:
+def draw_impacts(record: Record, fit: RecordFit, confirm: Drops) -> Figure:
     """The record, and each impact measured and simulated."""
-    measured, time = found.measured, record.time_s
+    measured, time = fit.measured, record.time_s
     force = record.force_n - measured.baseline(time, float(time[0]))
     figure = new_figure(5.2)
     parts: Any = figure.subfigures(2, 1, height_ratios=(1, 1.35))
-    _whole(parts[0].subplots(), time, force, found)
+    _whole(parts[0].subplots(), time, force, fit)
     drops = confirm.select("reference")[0], confirm.select("confirm")[0]
     panels = parts[1].subplots(1, len(measured.impacts), sharey=True, squeeze=False)[0]
     for place, axes in enumerate(panels):
         impact = measured.impacts[place]
-        centre = impact.centroid_s - found.sampling.time_bias_s[place]
+        centre = impact.centroid_s - fit.sampling.time_bias_s[place]
         _one_impact(axes, time - centre, force, place, drops)
         axes.set_title(f"impact {impact.impact}: {impact.samples} samples")
     panels[0].set_ylabel("force (N)")
     return legend_below(figure)
 
 
-def _whole(axes: Axes, time: Floats, force: Floats, found: RecordFit) -> None:
-    measured = found.measured
+def _whole(axes: Axes, time: Floats, force: Floats, fit: RecordFit) -> None:
+    measured = fit.measured
     axes.plot((time - time[0]) * 1e3, force, color=COLOURS["experiment"], linewidth=0.7)
     for impact in measured.impacts:
         place = (impact.peak_time_s - time[0]) * 1e3, impact.peak_n
@@ -85,10 +85,10 @@ _RIGS: Mapping[str, tuple[str, str]] = {
 }
 
 
-def draw_angles(found: FrictionFile, runs: pd.DataFrame) -> Figure:
+def draw_angles(friction: FrictionFile, runs: pd.DataFrame) -> Figure:
     """The joint probability of both coefficients, and the angles that were simulated."""
-    models = angle_models(found, runs)
-    posterior = Posterior.of(models, found.measured)
+    models = angle_models(friction, runs)
+    posterior = Posterior.of(models, friction.measured)
     figure, (joint, *others) = new_panels(3.2, 1 + len(models))
     x, y = posterior.axes
     weights = [*posterior.weights.values()][-1].T
@@ -99,12 +99,14 @@ def draw_angles(found: FrictionFile, runs: pd.DataFrame) -> Figure:
         label, colour = _RIGS[name]
         joint.contour(x, y, posterior.misfit[name].T, [-1.0, 1.0], colors=colour, linestyles="-")
         key(joint, f"{label}, within one standard uncertainty", color=colour, ls="-", marker="")
-        own = runs[runs["rig"] == name]
-        dots = axes.scatter(own["friction"], own["angle_deg"], c=own["rolling_friction"], s=14)
-        axes.axhline(found.measured[name][0], color=colour)
+        of_rig = runs[runs["rig"] == name]
+        dots = axes.scatter(
+            of_rig["friction"], of_rig["angle_deg"], c=of_rig["rolling_friction"], s=14
+        )
+        axes.axhline(friction.measured[name][0], color=colour)
         axes.set(xlabel="friction", ylabel=f"{label} (degrees)")
     figure.colorbar(dots, ax=others[-1], label="rolling friction")
-    joint.plot(*found.best, "k+")
+    joint.plot(*friction.best, "k+")
     joint.set(
         xlabel="friction", ylabel="rolling friction", title="95 % and 50 % of the probability"
     )
@@ -135,14 +137,14 @@ def write_calibration_report(folder: Path, record: Path | None, angles: bool = F
     figures, drops, friction = dict[str, Figure](), None, None
     if record:
         sweep, confirm = (read_drops(folder / name / "drops.json") for name in ("sweep", "confirm"))
-        found = calibrate_file(record, sweep)
-        drops = _of_drops(found, sweep, confirm)
+        fit = calibrate_file(record, sweep)
+        drops = _of_drops(fit, sweep, confirm)
     if angles:
         friction = FrictionFile.read(folder / "angles.json")
 
     def draw() -> Mapping[str, Figure]:
         if record:
-            figures["impacts"] = draw_impacts(read_record(record), found, confirm)
+            figures["impacts"] = draw_impacts(read_record(record), fit, confirm)
         if friction:
             figures["angles"] = draw_angles(friction, pd.read_csv(folder / "angles.csv"))
         return figures
@@ -151,15 +153,15 @@ def write_calibration_report(folder: Path, record: Path | None, angles: bool = F
     write_report(folder, template, draw=draw, friction=friction, drops=drops)
 
 
-def _of_drops(found: RecordFit, sweep: Drops, confirm: Drops) -> Mapping[str, object]:
+def _of_drops(fit: RecordFit, sweep: Drops, confirm: Drops) -> Mapping[str, object]:
     """What the page shows of a drop test."""
-    observed = found.observed
+    observed = fit.observed
     names = [f"time of impact {k + 2}" for k in range(len(observed.times_s))]
     names += [f"peak {k + 2} / peak 1" for k in range(len(observed.log_peaks))]
     return {
-        "result": result(found),
-        "impacts": impact_table(found).to_dict("records"),
-        "residuals": list(zip(names, found.fit.residuals, strict=True)),
+        "result": result(fit),
+        "impacts": impact_table(fit).to_dict("records"),
+        "residuals": list(zip(names, fit.fit.residuals, strict=True)),
         "bias": _by_deck_value(bias_table(sweep)),
         "confirm": confirmed(confirm),
     }

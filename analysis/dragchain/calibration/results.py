@@ -150,39 +150,39 @@ def write_calibration(record: Path, drops_file: Path, out: Path) -> CalibrationF
     DragdeckError
         The record or the sweep cannot be used.
     """
-    found = calibrate_file(record, read_drops(drops_file))
-    content = result(found)
-    for name, table in (("bias", bias_table(found.drops)), ("impacts", impact_table(found))):
+    fit = calibrate_file(record, read_drops(drops_file))
+    content = result(fit)
+    for name, table in (("bias", bias_table(fit.drops)), ("impacts", impact_table(fit))):
         text = table.to_csv(index=False, float_format="%.9g", lineterminator="\n")
         write_text(out / f"{name}.csv", text)
     content.write(out / "result.json")
     return content
 
 
-def result(found: RecordFit) -> CalibrationFile:
+def result(fit: RecordFit) -> CalibrationFile:
     """Content of ``result.json``."""
-    full = found.fit_reference
+    full = fit.fit_reference
     put_at_full = Estimate(full.restitution, full.ci95_low, full.ci95_high)
-    drops, deck = found.drops, found.fit.restitution
+    drops, deck = fit.drops, fit.fit.restitution
     measured, known = put_at_full.mapped(drops.reference.rebound), drops.known
     return CalibrationFile(
         known=known,
-        put=Put(field=f"pairs.{known.pair}.restitution", value=_rounded(found.fit)),
+        put=Put(field=f"pairs.{known.pair}.restitution", value=_rounded(fit.fit)),
         measured=measured,
         effective=drops.production.rebound(deck),
-        fit=found.fit,
-        fit_full=found.fit_reference,
-        peaks_compared=found.with_peaks,
-        width_ratio=found.width_ratio,
-        direct=_direct(found),
+        fit=fit.fit,
+        fit_full=fit.fit_reference,
+        peaks_compared=fit.with_peaks,
+        width_ratio=fit.width_ratio,
+        direct=_direct(fit),
         correction=deck - measured.value,
         put_for=tuple(
-            _put_for(drops, measured, found.fit, purpose, option)
+            _put_for(drops, measured, fit.fit, purpose, option)
             for purpose in PURPOSES
             for option in (True, False)
         ),
         settings={purpose: drops.select(purpose)[0].drop for purpose in PURPOSES},
-        record=found.measured,
+        record=fit.measured,
     )
 
 
@@ -192,12 +192,12 @@ def _rounded(fit: Fit) -> float:
     return round(fit.restitution, max(2, math.ceil(-math.log10(width)) + 1))
 
 
-def _direct(found: RecordFit) -> Direct:
-    since = np.append(0.0, found.observed.times_s)
-    contact = found.drops.reference.contact_s(found.fit_reference.restitution)
+def _direct(fit: RecordFit) -> Direct:
+    since = np.append(0.0, fit.observed.times_s)
+    contact = fit.drops.reference.contact_s(fit.fit_reference.restitution)
     flights = (np.diff(since) - contact[: len(since) - 1]).tolist()
     return Direct(
-        first_impact=flights[0] / (2.0 * found.drops.known.fall_time_s),
+        first_impact=flights[0] / (2.0 * fit.drops.known.fall_time_s),
         second_impact=flights[1] / flights[0] if len(flights) > 1 else None,
     )
 
@@ -209,9 +209,9 @@ def read_off(
 
     The interval includes that of the measured rebound and the scatter of the drops.
     """
-    value, own = measured.value, NORMAL_QUANTILE * model.rebound_error
-    low = value - math.hypot(value - measured.ci95_low, own)
-    high = value + math.hypot(measured.ci95_high - value, own)
+    value, error = measured.value, NORMAL_QUANTILE * model.rebound_error
+    low = value - math.hypot(value - measured.ci95_low, error)
+    high = value + math.hypot(measured.ci95_high - value, error)
     return model.inverse(value), model.inverse(low), model.inverse(high)
 
 
@@ -243,14 +243,14 @@ def bias_table(drops: Drops) -> pd.DataFrame:
     return table.reset_index().sort_values(setting, ascending=[True, False, True])
 
 
-def impact_table(found: RecordFit) -> pd.DataFrame:
+def impact_table(fit: RecordFit) -> pd.DataFrame:
     """Measured and simulated impacts, one row each."""
-    observed, sampling, impacts = found.observed, found.sampling, found.measured.impacts
-    model, deck, count = found.drops.production, found.fit.restitution, len(impacts)
+    observed, sampling, impacts = fit.observed, fit.sampling, fit.measured.impacts
+    model, deck, count = fit.drops.production, fit.fit.restitution, len(impacts)
     ratio = observed.peaks_n / observed.peaks_n[0]
     ratio_std = ratio * np.hypot(observed.peaks_std[0], observed.peaks_std)
-    scale = math.sqrt(found.fit.height_m / found.drops.known.height_m)
-    parts = scale * model.flights_s(deck) + found.drops.reference.contact_s(deck)
+    scale = math.sqrt(fit.fit.height_m / fit.drops.known.height_m)
+    parts = scale * model.flights_s(deck) + fit.drops.reference.contact_s(deck)
     return pd.DataFrame(
         {
             "impact": range(1, count + 1),
@@ -313,9 +313,9 @@ def confirmed(drops: Drops) -> Confirmed:
 
 def calibrate_command(record: Path, drops_file: Path, out_dir: Path) -> str:
     """Fit a drop test as the command line asks for; what to put into the study."""
-    found = write_calibration(record, drops_file, out_dir)
+    result = write_calibration(record, drops_file, out_dir)
     return (
-        f"set pairs.{found.known.pair}.restitution: {found.put.value:g}\n"
-        f"  95 % CI {found.fit.ci95_low:.4f} to {found.fit.ci95_high:.4f}\n"
-        f"  effective restitution {found.effective:.4f}; measured {found.measured.value:.4f}"
+        f"set pairs.{result.known.pair}.restitution: {result.put.value:g}\n"
+        f"  95 % CI {result.fit.ci95_low:.4f} to {result.fit.ci95_high:.4f}\n"
+        f"  effective restitution {result.effective:.4f}; measured {result.measured.value:.4f}"
     )

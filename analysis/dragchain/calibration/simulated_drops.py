@@ -307,7 +307,7 @@ def _contact_parts(run: DropRun) -> list[float]:
 
 def _polynomials(value: Floats, columns: Floats, *, single: bool) -> tuple[Floats, Floats]:
     """Least-squares polynomials through (N, C) columns; scatter of one point, or of the mean."""
-    found = np.asarray(polyfit(value, columns, _DEGREE), dtype=np.float64)
-    rest = columns - polyval(value, found).T
+    coefficients = np.asarray(polyfit(value, columns, _DEGREE), dtype=np.float64)
+    rest = columns - polyval(value, coefficients).T
     scatter: Floats = np.sqrt(np.sum(rest**2, axis=0) / (len(value) - _DEGREE - 1))
-    return found, scatter if single else scatter * math.sqrt((_DEGREE + 1) / len(value))
+    return coefficients, scatter if single else scatter * math.sqrt((_DEGREE + 1) / len(value))

@@ -19,6 +19,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 from pydantic import JsonValue
 
 from dragchain.arrays import Floats
@@ -26,14 +27,16 @@ from dragchain.drag import circumference
 from dragchain.errors import TableError
 from dragchain.figures.panels import head, new_panels
 from dragchain.figures.style import MARKERS, SERIES, WIDE_IN, force_map
+from dragchain.quantities.along import MAP_AZIMUTHS, MAP_DEPTHS, loading_along
+from dragchain.quantities.basis import Standing
+from dragchain.quantities.registry import REPORTED, Quantity
 from dragchain.report.campaign import write_report
 from dragchain.report.cases import ReportedCase, StudyRuns, cases_of, read_study_runs
 from dragchain.report.page import NETWORK_PAGE, TIMES, render_page, with_interval, write_bundle
-from dragchain.run.basis import QUANTITIES, Quantity, Standing
 from dragchain.run.case import changed_inputs
+from dragchain.statistics.bed_effects import fit_effects
 from dragchain.statistics.estimate import Estimate, flattened, mean_of
 from dragchain.tables.by_step import read_table
-from dragchain.tradeoff.measure_run import MAP_AZIMUTHS, MAP_DEPTHS, loading_along
 
 _LARGEST_MODEL = 4
 """Factors whose interactions are estimated at most."""
@@ -49,12 +52,12 @@ class ComparedCase:
     @cached_property
     def by_seed(self) -> Mapping[JsonValue, StudyRuns]:
         """Its process runs by the seed of their packing."""
-        return {one.process.case.inputs.get("seed"): one for one in self.case.studies}
+        return {study.process.case.inputs.get("seed"): study for study in self.case.studies}
 
     @cached_property
     def load_maps(self) -> Mapping[JsonValue, Floats]:
         """Mean normal load of each packing by depth and azimuth, N."""
-        return {seed: _load_map(one) for seed, one in self.by_seed.items()}
+        return {seed: _load_map(study) for seed, study in self.by_seed.items()}
 
 
 @dataclass(frozen=True)
@@ -100,25 +103,25 @@ class CaseDifference:
 
 def differences(first: ComparedCase, other: ComparedCase) -> list[CaseDifference]:
     """Every quantity that two cases have."""
-    found = []
-    for quantity in QUANTITIES:
-        pair = [one.case.values.of(quantity.name) for one in (first, other)]
+    rows = []
+    for quantity in REPORTED:
+        pair = [case.case.values.of(quantity.name) for case in (first, other)]
         if all(pair):
-            found.append(_difference(quantity, first, other))
-    return found
+            rows.append(_difference(quantity, first, other))
+    return rows
 
 
 def _difference(quantity: Quantity, first: ComparedCase, other: ComparedCase) -> CaseDifference:
-    several = [_standings(one, quantity) for one in (first, other)]
-    corrected = all(one.corrected for packings in several for one in packings.values())
-    before, after = (_mean(one, quantity, corrected) for one in (first, other))
-    own = [
-        {seed: _number(one, corrected).value for seed, one in packings.items()}
+    several = [_standings(case, quantity) for case in (first, other)]
+    corrected = all(standing.corrected for packings in several for standing in packings.values())
+    before, after = (_mean(case, quantity, corrected) for case in (first, other))
+    numbers = [
+        {seed: _number(standing, corrected).value for seed, standing in packings.items()}
         for packings in several
     ]
-    paired = len(own[0]) > 1 and own[0].keys() == own[1].keys()
+    paired = len(numbers[0]) > 1 and numbers[0].keys() == numbers[1].keys()
     if paired:
-        change = mean_of([own[1][seed] - own[0][seed] for seed in own[0]])
+        change = mean_of([numbers[1][seed] - numbers[0][seed] for seed in numbers[0]])
     else:
         half = math.hypot(before.half_width, after.half_width)
         change = Estimate.around(after.value - before.value, half)
@@ -126,17 +129,17 @@ def _difference(quantity: Quantity, first: ComparedCase, other: ComparedCase) ->
     return CaseDifference(other.name, quantity, before, after, change, basis, paired)
 
 
-def _standings(one: ComparedCase, quantity: Quantity) -> dict[JsonValue, Standing]:
-    found = {seed: study.values.of(quantity.name) for seed, study in one.by_seed.items()}
-    return {seed: standing for seed, standing in found.items() if standing}
+def _standings(case: ComparedCase, quantity: Quantity) -> dict[JsonValue, Standing]:
+    standings = {seed: study.values.of(quantity.name) for seed, study in case.by_seed.items()}
+    return {seed: standing for seed, standing in standings.items() if standing}
 
 
 def _number(standing: Standing, corrected: bool) -> Estimate:
     return standing.shown if corrected else standing.run
 
 
-def _mean(one: ComparedCase, quantity: Quantity, corrected: bool) -> Estimate:
-    standing = one.case.values.of(quantity.name)
+def _mean(case: ComparedCase, quantity: Quantity, corrected: bool) -> Estimate:
+    standing = case.case.values.of(quantity.name)
     assert standing is not None
     return _number(standing, corrected)
 
@@ -176,13 +179,15 @@ def factors_of(cases: Sequence[ComparedCase]) -> dict[str, list[JsonValue]]:
 
     Empty unless there are at least two, and every combination of their levels is a case.
     """
-    inputs = [one.case.first.process.case.inputs for one in cases]
+    inputs = [case.case.first.process.case.inputs for case in cases]
     names = {name for other in inputs[1:] for name in changed_inputs(other, inputs[0])} - {"seed"}
-    found = {name: [one.get(name) for one in inputs] for name in sorted(names)}
-    levels = [{repr(level) for level in column} for column in found.values()]
-    combined = {tuple(map(repr, row)) for row in zip(*found.values(), strict=True)}
+    levels_by_name = {
+        name: [inputs_of_case.get(name) for inputs_of_case in inputs] for name in sorted(names)
+    }
+    levels = [{repr(level) for level in column} for column in levels_by_name.values()]
+    combined = {tuple(map(repr, row)) for row in zip(*levels_by_name.values(), strict=True)}
     crossed = len(combined) == math.prod(map(len, levels)) == len(cases)
-    return found if len(found) > 1 and crossed else {}
+    return levels_by_name if len(levels_by_name) > 1 and crossed else {}
 
 
 def effects_of(
@@ -194,65 +199,76 @@ def effects_of(
     assumed; numbers are ordered, others are as they come. A packing that all cases share is a
     block. Interactions are left out where too few runs remain for the scatter.
     """
-    from statsmodels.formula.api import ols
-
-    columns = {f"x{k}": _ordered(levels) for k, levels in enumerate(factors.values())}
-    rows = [
-        {"y": standing.run.value, "seed": seed, "case": k}
-        | {name: order[k] for name, (order, _) in columns.items()}
-        for k, one in enumerate(cases)
-        for seed, standing in _standings(one, quantity).items()
+    columns = {name: _ordered(levels) for name, levels in factors.items()}
+    values = [
+        (number, seed, standing.run.value)
+        for number, case in enumerate(cases)
+        for seed, standing in _standings(case, quantity).items()
     ]
-    if len({row["case"] for row in rows}) < len(cases):
+    if len({number for number, *_ in values}) < len(cases):
         return []
-    frame = pd.DataFrame(rows)
-    if not 0.0 < np.ptp(frame["y"]) < math.inf:
+    numbers, seeds, measured = zip(*values, strict=True)
+    if not 0.0 < np.ptp(measured) < math.inf:
         return []
-    shared = all(one.by_seed.keys() == cases[0].by_seed.keys() for one in cases)
-    block = " + C(seed)" if shared and len(cases[0].by_seed) > 1 else ""
+    shared = all(case.by_seed.keys() == cases[0].by_seed.keys() for case in cases)
+    packings = list(dict.fromkeys(seeds))[1:] if shared else []
+    blocks = np.array([[float(seed == packing) for packing in packings] for seed in seeds])
     pairs = list(combinations(columns, 2)) if len(columns) <= _LARGEST_MODEL else []
     singles = [(name,) for name in columns]
     for terms in ([*singles, *pairs], singles):
-        formula = " + ".join(":".join(f"C({name})" for name in term) for term in terms)
-        fit = ols(f"y ~ {formula}{block}", frame).fit()
-        if fit.df_resid >= 1:
+        changes = [change for term in terms for change in _changes(term, columns)]
+        of_cases = np.column_stack([np.ones(len(cases)), *(_at(c, columns) for c in changes)])
+        design = np.hstack([of_cases[list(numbers)], blocks])
+        if np.linalg.matrix_rank(design) == design.shape[1] < len(design):
             break
     else:
         return []
-    exog = pd.DataFrame(fit.model.exog).groupby(frame["case"]).mean()
-    titles = dict(zip(columns, factors, strict=True))
-    found = []
-    for term in terms:
-        for others in product(*(range(1, len(columns[name][1])) for name in term)):
-            test = fit.t_test(_contrast(exog, columns, dict(zip(term, others, strict=True))))
-            names = tuple(titles[name] for name in term)
-            words = [(columns[name][1], other) for name, other in zip(term, others, strict=True)]
-            levels = tuple(f"{labels[0]} to {labels[other]}" for labels, other in words)
-            effect = Estimate(float(test.effect[0]), *map(float, test.conf_int()[0]))
-            found.append(FactorEffect(quantity, names, levels, effect))
-    return found
+    fit = fit_effects(design, np.array(measured), range(len(design)))
+    effects = []
+    for change in changes:
+        weights = np.append(_contrast(of_cases, columns, change), np.zeros(len(packings)))
+        words = tuple(
+            f"{columns[name][1][0]} to {columns[name][1][level]}" for name, level in change.items()
+        )
+        effects.append(FactorEffect(quantity, tuple(change), words, fit.estimate(weights)))
+    return effects
+
+
+_Columns = Mapping[str, tuple[list[int], list[str]]]
+"""The number of each case's level and the names of the levels, by factor."""
+
+
+def _changes(term: Sequence[str], columns: _Columns) -> list[dict[str, int]]:
+    """Every combination of levels of some factors but their first ones."""
+    others = product(*(range(1, len(columns[name][1])) for name in term))
+    return [dict(zip(term, levels, strict=True)) for levels in others]
+
+
+def _at(levels: Mapping[str, int], columns: _Columns) -> NDArray[np.bool_]:
+    """Which cases have these levels, (cases,)."""
+    alike = [np.equal(columns[name][0], level) for name, level in levels.items()]
+    return np.asarray(np.all(alike, axis=0))
 
 
 def _ordered(levels: Sequence[JsonValue]) -> tuple[list[int], list[str]]:
     """The number of each case's level, from 0, and what the levels are called."""
-    numeric = all(isinstance(one, int | float) for one in levels)
+    numeric = all(isinstance(item, int | float) for item in levels)
     known: list[JsonValue] = []
-    for level in sorted(levels, key=lambda one: float(str(one))) if numeric else levels:
+    for level in sorted(levels, key=lambda item: float(str(item))) if numeric else levels:
         if level not in known:
             known.append(level)
-    return [known.index(one) for one in levels], [str(one) for one in known]
+    return [known.index(item) for item in levels], [str(item) for item in known]
 
 
-def _contrast(
-    exog: pd.DataFrame, columns: Mapping[str, tuple[list[int], list[str]]], term: Mapping[str, int]
-) -> Floats:
+def _contrast(of_cases: Floats, columns: _Columns, change: Mapping[str, int]) -> Floats:
     """Weights of coefficients: from the first levels to others, averaged over other factors."""
-    weights = np.zeros(exog.shape[1])
-    for ends in product((0, 1), repeat=len(term)):
-        at = {name: other * end for (name, other), end in zip(term.items(), ends, strict=True)}
-        here = np.all([np.equal(columns[name][0], level) for name, level in at.items()], axis=0)
-        weights += (-1) ** (len(term) - sum(ends)) * exog.to_numpy()[here].mean(axis=0)
-    return weights / len(term)  # of an interaction, half
+    weights = np.zeros(of_cases.shape[1])
+    for ends in product((0, 1), repeat=len(change)):
+        levels = {
+            name: level * end for (name, level), end in zip(change.items(), ends, strict=True)
+        }
+        weights += (-1) ** (len(change) - sum(ends)) * of_cases[_at(levels, columns)].mean(axis=0)
+    return weights / len(change)  # of an interaction, half
 
 
 # --- figures -------------------------------------------------------------------------------------
@@ -260,9 +276,9 @@ def _contrast(
 
 def _load_map(study: StudyRuns) -> Floats:
     """Load map of a run: that from its windows where it has one."""
-    found = study.extrapolated.load_map if study.extrapolated else None
-    if found is not None:
-        return np.array(found.value).reshape(MAP_DEPTHS, MAP_AZIMUTHS)
+    load_map = study.extrapolated.load_map if study.extrapolated else None
+    if load_map is not None:
+        return np.array(load_map.value).reshape(MAP_DEPTHS, MAP_AZIMUTHS)
     return loading_along(study.process.folder, study.process.case, 1)[1]
 
 
@@ -273,12 +289,12 @@ def draw_maps(cases: Sequence[ComparedCase]) -> Figure:
     """
     first, *others = cases
     width = max(12, 88 // len(cases))
-    means = [np.mean([*one.load_maps.values()], axis=0) for one in cases]
+    means = [np.mean([*case.load_maps.values()], axis=0) for case in cases]
     figure, panels = new_panels(4.2, 2 * len(cases), WIDE_IN, len(cases), sharex=True, sharey=True)
     scale = Normalize(0.0, max(float(mean.max()) for mean in means))
-    for axes, one, mean in zip(panels, cases, means, strict=False):
+    for axes, case, mean in zip(panels, cases, means, strict=False):
         drawn = _patches(axes, mean, cmap=force_map(), norm=scale)
-        axes.set_title(fill(one.name, width))
+        axes.set_title(fill(case.name, width))
     figure.colorbar(drawn, ax=panels[: len(cases)], label="normal load (N per patch)")
     panels[len(cases)].set_visible(False)
     panels[0].tick_params(labelbottom=True)
@@ -286,13 +302,13 @@ def draw_maps(cases: Sequence[ComparedCase]) -> Figure:
     largest = max(float(np.abs(change).max()) for change in changes)
     below = panels[len(cases) + 1 :]
     below[0].tick_params(labelleft=True)
-    for axes, one, change in zip(below, others, changes, strict=True):
+    for axes, case, change in zip(below, others, changes, strict=True):
         drawn = _patches(axes, change, cmap="RdBu_r", norm=Normalize(-largest, largest))
-        title = f"{fill(one.name, width)}\nminus the first"
+        title = f"{fill(case.name, width)}\nminus the first"
         axes.set(title=title, xlabel="azimuth from motion")
-        if len(one.load_maps) > 1 and one.load_maps.keys() == first.load_maps.keys():
+        if len(case.load_maps) > 1 and case.load_maps.keys() == first.load_maps.keys():
             _mark_certain(
-                axes, [one.load_maps[seed] - first.load_maps[seed] for seed in first.load_maps]
+                axes, [case.load_maps[seed] - first.load_maps[seed] for seed in first.load_maps]
             )
     figure.colorbar(drawn, ax=below, label="difference (N per patch)")
     for axes in panels[:: len(cases)]:
@@ -332,10 +348,10 @@ def draw_response(
     figure, panels = new_panels(3.4, len(quantities), WIDE_IN)
     for axes, quantity in zip(panels, quantities, strict=True):
         for number, label in enumerate(dict.fromkeys(labels)):
-            here = [k for k, own in enumerate(labels) if own == label]
-            found = [_mean(cases[k], quantity, corrected=False) for k in here]
+            here = [k for k, other in enumerate(labels) if other == label]
+            means = [_mean(cases[k], quantity, corrected=False) for k in here]
             value, low, high = np.array(
-                [(one.value, one.ci95_low, one.ci95_high) for one in found]
+                [(mean.value, mean.ci95_low, mean.ci95_high) for mean in means]
             ).T
             reach = np.nan_to_num([value - low, high - value])
             style: dict[str, Any] = {
@@ -376,16 +392,16 @@ def read_compared(folders: Sequence[Path]) -> list[ComparedCase]:
     studies: dict[str, list[StudyRuns]] = {}
     for folder in folders:
         for run_dir in _process_runs(folder):
-            one = read_study_runs(run_dir)
-            studies.setdefault(one.process.case.study, []).append(one)
+            study_runs = read_study_runs(run_dir)
+            studies.setdefault(study_runs.process.case.study, []).append(study_runs)
     grouped = {study: cases_of(runs) for study, runs in studies.items()}
     cases = [
-        ComparedCase(_name(study, case, len(grouped), len(found)), case)
-        for study, found in grouped.items()
-        for case in found
+        ComparedCase(_name(study, case, len(grouped), len(of_study)), case)
+        for study, of_study in grouped.items()
+        for case in of_study
     ]
     if len(cases) < 2:
-        known = ", ".join(one.name for one in cases)
+        known = ", ".join(case.name for case in cases)
         raise TableError(
             f"a comparison has at least two cases, and this one has only {known}: name another "
             "study, or one with a sweep (packings of one case are one case)"
@@ -419,16 +435,26 @@ def write_comparison(out_dir: Path, folders: Sequence[Path]) -> None:
     cases = read_compared(folders)
     first, *others = cases
     rows = [row for other in others for row in differences(first, other)]
-    by_quantity = {one: [row for row in rows if row.quantity == one] for one in QUANTITIES}
-    notes = Counter(note for one in cases for note in one.case.values.notes)
+    by_quantity = {
+        quantity: [row for row in rows if row.quantity == quantity] for quantity in REPORTED
+    }
+    notes = Counter(note for case in cases for note in case.case.values.notes)
     factors = factors_of(cases)
-    measured = [one for one in QUANTITIES if first.case.values.of(one.name)]
+    measured = [quantity for quantity in REPORTED if first.case.values.of(quantity.name)]
     effects = (
-        [row for one in measured for row in effects_of(cases, factors, one)] if factors else []
+        [row for quantity in measured for row in effects_of(cases, factors, quantity)]
+        if factors
+        else []
     )
     linked = _write_networks(out_dir, cases)
-    inputs = [one.case.first.process.case.inputs for one in cases]
-    changed = sorted({name for own in inputs[1:] for name in changed_inputs(own, inputs[0])})
+    inputs = [case.case.first.process.case.inputs for case in cases]
+    changed = sorted(
+        {
+            name
+            for inputs_of_case in inputs[1:]
+            for name in changed_inputs(inputs_of_case, inputs[0])
+        }
+    )
 
     def draw() -> dict[str, Figure]:
         figures = {"maps": draw_maps(cases)}
@@ -448,11 +474,15 @@ def write_comparison(out_dir: Path, folders: Sequence[Path]) -> None:
         filters={"relative": _relative, "joined": f" {TIMES} ".join},
         cases=cases,
         rows=rows,
-        by_quantity={one: found for one, found in by_quantity.items() if found},
+        by_quantity={
+            quantity: of_quantity for quantity, of_quantity in by_quantity.items() if of_quantity
+        },
         notes=notes,
         effects=effects,
         linked=linked,
-        changed=[(name, [own.get(name) for own in inputs]) for name in changed],
+        changed=[
+            (name, [inputs_of_case.get(name) for inputs_of_case in inputs]) for name in changed
+        ],
     )
 
 
@@ -462,7 +492,7 @@ def _relative(estimate: Estimate) -> str:
 
 def _table(rows: Sequence[CaseDifference | FactorEffect], *estimates: str) -> pd.DataFrame:
     """Rows as a table, with their estimates in three columns each."""
-    found = []
+    table = []
     for row in rows:
         plain: dict[str, object] = {"quantity": row.quantity.name, "unit": row.quantity.unit}
         if isinstance(row, CaseDifference):
@@ -471,17 +501,17 @@ def _table(rows: Sequence[CaseDifference | FactorEffect], *estimates: str) -> pd
         else:
             plain["factors"] = " x ".join(row.factors)
             plain["levels"] = " x ".join(row.levels)
-        found.append(flattened(plain | {name: getattr(row, name) for name in estimates}))
-    return pd.DataFrame(found)
+        table.append(flattened(plain | {name: getattr(row, name) for name in estimates}))
+    return pd.DataFrame(table)
 
 
 def _write_networks(out_dir: Path, cases: Sequence[ComparedCase]) -> bool:
     """Copy the contact networks of the cases side by side on one page; whether all have one."""
-    files = [one.case.first.process.folder / NETWORK_PAGE for one in cases]
+    files = [case.case.first.process.folder / NETWORK_PAGE for case in cases]
     if not all(file.is_file() for file in files):
         return False
     copies = {f"network-{number}.html": file.read_bytes() for number, file in enumerate(files, 1)}
-    shown = list(zip(copies, (one.name for one in cases), strict=True))
+    shown = list(zip(copies, (case.name for case in cases), strict=True))
     page = render_page("compare/networks.html.j2", shown=shown)
     write_bundle(out_dir, files=copies, pages={"networks": page})
     return True

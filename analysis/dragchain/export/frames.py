@@ -19,7 +19,7 @@ from dragchain.tables.by_step import RisingSteps, read_steps
 from dragchain.tables.columns import CONTACTS, KINEMATICS, ORIENTATION
 from dragchain.tables.run_folder import Run, workpiece_places
 from dragdeck.records.case import CaseOfRun
-from dragdeck.study.drive import Rotation
+from dragdeck.study.drive import Orientations
 
 _BODY = {name: body for body, name in KINDS.items()}
 _PARTICLES = ("step", *KINEMATICS)
@@ -64,7 +64,7 @@ def chain_membership(frame: NetworkFrame, chains: pd.DataFrame) -> Membership:
         If a chain names a particle or a contact that the frame does not have.
     """
     sizes = (frame.particle_id.size, frame.normal_force.size)
-    found = Membership(
+    membership = Membership(
         *({name: np.zeros(size, np.int64) for name in MEMBERSHIPS} for size in sizes)
     )
     row = {number: k for k, number in enumerate(frame.particle_id.tolist())}
@@ -81,15 +81,18 @@ def chain_membership(frame: NetworkFrame, chains: pd.DataFrame) -> Membership:
             particles = [row[number] for number in ids]
             if definition == "peters":
                 peters += 1
-                found.particles["peters_chain"][particles] = peters
-                found.contacts["peters_chain"][links(particles)] = peters
+                membership.particles["peters_chain"][particles] = peters
+                membership.contacts["peters_chain"][links(particles)] = peters
                 continue
             first, last = particles[0], particles[-1]
             begun[first] += 1
             if reaches_bowl:
                 start = between[WORKPIECE, -1, first][begun[first] - 1]
                 contacts = [start, *links(particles), between[_BODY[end_kind], -1, last][0]]
-                for of, rows in ((found.particles, particles), (found.contacts, contacts)):
+                for of, rows in (
+                    (membership.particles, particles),
+                    (membership.contacts, contacts),
+                ):
                     of["widest_paths"][rows] += 1
                     of["dominant"][rows] |= bool(dominant)
     except (KeyError, IndexError):
@@ -98,7 +101,7 @@ def chain_membership(frame: NetworkFrame, chains: pd.DataFrame) -> Membership:
             " particles.parquet or contacts.parquet\n"
             "  remedy: make the chains again with `./run dragchain chains`"
         ) from None
-    return found
+    return membership
 
 
 def _contacts(frame: NetworkFrame) -> dict[tuple[int, ...], list[int]]:
@@ -107,11 +110,11 @@ def _contacts(frame: NetworkFrame) -> dict[tuple[int, ...], list[int]]:
     Their key is the kind of the second body, and the rows of the particles, -1 for another body.
     """
     order = np.argsort(-frame.normal_force, kind="stable")
-    found = defaultdict[tuple[int, ...], list[int]](list)
+    bodies = defaultdict[tuple[int, ...], list[int]](list)
     columns = (order, frame.other[order], *np.sort([frame.a[order], frame.b[order]], axis=0))
     for contact, *key in zip(*(column.tolist() for column in columns), strict=True):
-        found[tuple(key)].append(contact)
-    return dict(found)
+        bodies[tuple(key)].append(contact)
+    return dict(bodies)
 
 
 @dataclass(frozen=True)
@@ -148,7 +151,7 @@ class FrameData:
     membership : Membership or None
         What is in a chain; None if there are no chain tables, or if they do not
         reach this frame.
-    workpiece : (3,) float and Rotation, or None
+    workpiece : (3,) float and Orientations, or None
         The workpiece's reference point in m and its orientation; None if there is no workpiece.
     """
 
@@ -158,7 +161,7 @@ class FrameData:
     contacts: pd.DataFrame | None
     network: NetworkFrame | None
     membership: Membership | None
-    workpiece: tuple[Floats, Rotation] | None
+    workpiece: tuple[Floats, Orientations] | None
 
 
 @dataclass(frozen=True)

@@ -101,7 +101,7 @@ def _particles_mesh(frame_data: FrameData, *, with_chains: bool) -> Any:
     """
     import pyvista as pv
 
-    particles, found = frame_data.particles, frame_data.membership
+    particles, membership = frame_data.particles, frame_data.membership
     mesh = pv.PolyData(particles[["x_m", "y_m", "z_m"]].to_numpy(np.float64))
     data = mesh.point_data
     data["id"] = particles["particle_id"].to_numpy(np.int64)
@@ -113,7 +113,7 @@ def _particles_mesh(frame_data: FrameData, *, with_chains: bool) -> Any:
         data["major_stress_pa"] = major_stress(particle_stress(frame_data.network))[0]
         data["max_normal_force_n"] = _max_normal_force(frame_data.network)
     if with_chains:
-        _chains(data, found.particles if found else None, len(particles))
+        _chains(data, membership.particles if membership else None, len(particles))
     return mesh
 
 
@@ -138,7 +138,7 @@ def _contacts_mesh(frame_data: FrameData, *, with_chains: bool) -> Any:
     import pyvista as pv
 
     contacts, frame = frame_data.contacts, frame_data.network
-    found = frame_data.membership
+    membership = frame_data.membership
     assert contacts is not None and frame is not None
     if contacts.empty:
         return pv.PolyData()
@@ -153,12 +153,12 @@ def _contacts_mesh(frame_data: FrameData, *, with_chains: bool) -> Any:
     for name in ("normal_force_n", "tangential_force_n", "overlap_m"):
         data[name] = contacts[name].to_numpy(np.float64)
     if with_chains:
-        _chains(data, found.contacts if found else None, len(contacts))
+        _chains(data, membership.contacts if membership else None, len(contacts))
     return mesh
 
 
-def _chains(data: Any, found: Mapping[str, Ints] | None, size: int) -> None:
+def _chains(data: Any, chain_columns: Mapping[str, Ints] | None, size: int) -> None:
     """Add number of the chain, number of workpiece paths, and dominance; -1 if not searched."""
     for name in MEMBERSHIPS:
-        values = np.full(size, -1) if found is None else found[name]
+        values = np.full(size, -1) if chain_columns is None else chain_columns[name]
         data[name] = values.astype(np.int32)

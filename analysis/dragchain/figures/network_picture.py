@@ -31,7 +31,7 @@ from dragchain.run.workpiece import placed, read_workpiece_mesh
 from dragchain.tables.by_step import read_table
 from dragchain.tables.run_folder import workpiece_places
 from dragdeck.records.case import CaseOfRun
-from dragdeck.study.drive import Rotation
+from dragdeck.study.drive import Orientations
 
 View = Literal["xy", "xz"]
 
@@ -63,7 +63,7 @@ class NetworkScene:
         The network frame.
     workpiece_m : (3,) float
         Centre of the workpiece's bottom face at the frame.
-    rotation : Rotation
+    rotation : Orientations
         Orientation of the workpiece, which looks along +x in its STL file.
     dominant : WidestPath or None
         The frame's dominant workpiece path.
@@ -73,7 +73,7 @@ class NetworkScene:
 
     frame: NetworkFrame
     workpiece_m: Floats
-    rotation: Rotation
+    rotation: Orientations
     dominant: WidestPath | None
     process_time_s: float
 

@@ -17,7 +17,7 @@ from dragchain.arrays import Floats, Ints
 from dragchain.errors import TableError
 from dragchain.run.kinematics import drag_surface_speed
 from dragchain.tables.columns import vector
-from dragdeck.physics.contact_mechanics import hertz_contact_time
+from dragdeck.physics.contact_mechanics import hertz_contact_time, sphere_mass
 from dragdeck.records.case import CaseOfRun
 
 IMPACT, SLIDING, ROLLING, RESTING = TYPES = ("impact", "sliding", "rolling", "resting")
@@ -92,7 +92,7 @@ def surfaces(case: CaseOfRun) -> Surfaces:
     if "workpiece" not in case.contact_moduli:
         raise TableError(f"{case.run}: case.json has no contact_moduli.workpiece; render it again")
     contact, radius = case.contact_moduli["workpiece"], case.media.radius_mean_m
-    mass = case.media.density_kg_m3 * 4.0 / 3.0 * np.pi * radius**3
+    mass = sphere_mass(radius, case.media.density_kg_m3)
     time_s = hertz_contact_time(mass, radius, contact.modulus_pa, drag_surface_speed(case))
     return Surfaces(contact.friction, float(time_s))
 

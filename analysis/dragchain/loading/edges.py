@@ -61,17 +61,13 @@ def sharp_edges(surface: Surface, highest_m: float) -> tuple[Floats, Floats]:
 
     Their ends, (E, 2, 3) in m, and interior angles, (E,) in rad.
     """
-    points, at = np.unique(surface.corners.reshape(-1, 3), axis=0, return_inverse=True)
-    facets = at.reshape(-1, 3)
-    pairs = np.sort(np.stack([facets, np.roll(facets, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
-    _, edge, count = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
-    order = np.argsort(edge.ravel(), kind="stable")
-    order = order[count[edge.ravel()[order]] == 2].reshape(-1, 2)
-    one, other = (order // 3).T
-    normals, centres, ends = surface.normals, surface.centres, points[pairs[order[:, 0]]]
-    turn = np.arccos(np.einsum("ij,ij->i", normals[one], normals[other]).clip(-1.0, 1.0))
-    convex = np.einsum("ij,ij->i", centres[other] - centres[one], normals[one]) < 0.0
-    sharp = convex & (ends[:, :, 2].max(axis=1) <= highest_m) & (turn > np.radians(FEATURE_DEG))
+    from trimesh import Trimesh
+
+    points, facets = np.unique(surface.corners.reshape(-1, 3), axis=0, return_inverse=True)
+    mesh = Trimesh(points, facets.reshape(-1, 3), process=False)
+    ends, turn = points[mesh.face_adjacency_edges], mesh.face_adjacency_angles
+    sharp = mesh.face_adjacency_convex & (turn > np.radians(FEATURE_DEG))
+    sharp &= ends[:, :, 2].max(axis=1) <= highest_m
     return ends[sharp], np.pi - turn[sharp]
 
 
@@ -164,9 +160,11 @@ def band_actions(
         excess = means.cumsum(axis=-1)[..., :-1] - even
         return np.concatenate([means, excess, even], axis=-1) / seconds
 
-    found, count = estimates(sums, statistic), len(area_m2)
-    return found[:count], [
-        replace(one, ci95_low=one.ci95_low - error, ci95_high=one.ci95_high + error)
-        for one, of in zip(found[count:], found[2 * count - 1 :], strict=False)
+    sums_and_means, count = estimates(sums, statistic), len(area_m2)
+    return sums_and_means[:count], [
+        replace(estimate, ci95_low=estimate.ci95_low - error, ci95_high=estimate.ci95_high + error)
+        for estimate, of in zip(
+            sums_and_means[count:], sums_and_means[2 * count - 1 :], strict=False
+        )
         for error in [_AREA_ERROR * of.value]
     ]

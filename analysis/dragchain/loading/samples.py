@@ -315,7 +315,9 @@ def standard_errors(sampled: Sampled, name: str, count: int) -> Floats:
 
     As `slow_error` of the series of each facet, which need not be held for that.
     """
-    frame, facet, amount = (sampled.rows[one].to_numpy() for one in ("frame", "facet_id", name))
+    frame, facet, amount = (
+        sampled.rows[column].to_numpy() for column in ("frame", "facet_id", name)
+    )
     waves = slow_waves(sampled.frames)
     squares = [np.bincount(facet, amount * wave[frame], count) ** 2 for wave in waves]
     return np.asarray(np.sqrt(sampled.frames * np.mean(squares, axis=0)))

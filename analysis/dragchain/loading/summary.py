@@ -109,12 +109,12 @@ def _totals(sampled: Sampled, events: pd.DataFrame) -> Totals:
             [total / metre, front / (front + back), np.stack(others, -1)], axis=-1
         )
 
-    found = estimates(sums, statistic)
-    friction_part, normal_part, sliding_part, contacts, begins = found[2 * count :]
+    totals = estimates(sums, statistic)
+    friction_part, normal_part, sliding_part, contacts, begins = totals[2 * count :]
     return Totals(
         totals={name: float(rows[name].sum()) for name in _KNOWN} | {"events": len(events)},
-        per_metre=dict(zip(_KNOWN, found, strict=False)) | {"events": begins},
-        front_fraction=dict(zip(_KNOWN, found[count:], strict=False)),
+        per_metre=dict(zip(_KNOWN, totals, strict=False)) | {"events": begins},
+        front_fraction=dict(zip(_KNOWN, totals[count:], strict=False)),
         friction_fraction_of_work=friction_part,
         normal_fraction_of_work=normal_part,
         load_while_sliding_fraction=sliding_part,
@@ -138,11 +138,11 @@ def _types(sampled: Sampled, events: pd.DataFrame, event: Ints) -> dict[str, Con
         fractions = both / both.sum(axis=-2, keepdims=True)
         return np.asarray(fractions.reshape(*means.shape[:-1], -1))
 
-    found = iter(estimates(np.column_stack([*amounts, *begun]), statistic))
+    types_in_order = iter(estimates(np.column_stack([*amounts, *begun]), statistic))
     return {
         name: ContactType(
             events=int((kind == name).sum()),
-            fraction_of={key: next(found) for key in (*_BY_TYPE, "events")},
+            fraction_of={key: next(types_in_order) for key in (*_BY_TYPE, "events")},
             intensity={key: event_quantiles(events[key][kind == name]) for key in _INTENSITIES},
         )
         for name in TYPES
@@ -175,8 +175,8 @@ def _profile(sampled: Sampled, edges: Floats, halves: tuple[Ints, Ints]) -> Prof
     for half in halves:
         np.add.at(sums, (frame, half), 0.5 * weight)
     scale = sampled.path_m / sampled.frames * (edges[1] - edges[0])
-    found = estimates(sums, lambda means: means / scale)
-    return Profile(edges=tuple(edges.tolist()), force_slide=EstimateColumns.of(found))
+    profile = estimates(sums, lambda means: means / scale)
+    return Profile(edges=tuple(edges.tolist()), force_slide=EstimateColumns.of(profile))
 
 
 # --- closure ---------------------------------------------------------------------------------

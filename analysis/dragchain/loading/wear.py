@@ -134,7 +134,7 @@ def compute_wear(
             quantities={name: event_quantiles(events[name]) for name in TOUCH_QUANTITIES},
         )
     impact = case.removal is not None and case.removal.laws[-1].impact
-    each = [_action(one, surface, group, factor * one.interval_s) for one in of_laws]
+    each = [_action(law, surface, group, factor * law.interval_s) for law in of_laws]
     total, density, error = zip(*each, strict=True)
     share = loading.types["impact"].fraction_of["force_slide_n_m"]
     wear = Wear(
@@ -203,19 +203,21 @@ def _action(
 
 def _sum(parts: Sequence[Estimate]) -> Estimate:
     """The sum of independent estimates."""
-    half = math.hypot(*(one.half_width for one in parts))
-    return Estimate.around(math.fsum(one.value for one in parts), half)
+    half = math.hypot(*(part.half_width for part in parts))
+    return Estimate.around(math.fsum(part.value for part in parts), half)
 
 
-def _share(one: Estimate, others: Sequence[Estimate]) -> Estimate:
+def _share(estimate: Estimate, others: Sequence[Estimate]) -> Estimate:
     """The part of one of independent estimates in the sum of all."""
     if not others:
         return Estimate(1.0, 1.0, 1.0)
     rest = _sum(others)
-    if not one.value or not rest.value:
-        return Estimate(float(one.value > 0.0), math.nan, math.nan)
-    half = math.hypot(one.relative_half_width, rest.relative_half_width)
-    return Estimate(*(1 / (1 + rest.value / one.value * math.exp(half * s)) for s in (0, 1, -1)))
+    if not estimate.value or not rest.value:
+        return Estimate(float(estimate.value > 0.0), math.nan, math.nan)
+    half = math.hypot(estimate.relative_half_width, rest.relative_half_width)
+    return Estimate(
+        *(1 / (1 + rest.value / estimate.value * math.exp(half * s)) for s in (0, 1, -1))
+    )
 
 
 # --- first touch ---------------------------------------------------------------------------------
@@ -276,5 +278,5 @@ def touch_maps(events: pd.DataFrame, surface: Surface, time_s: float) -> dict[st
         "peak_pressure_pa": facets["peak_pressure_pa"].max(),
     }
     every, per = range(len(surface.corners)), surface.areas * time_s
-    maps = {name: one.reindex(every, fill_value=0.0).to_numpy() for name, one in each.items()}
+    maps = {name: series.reindex(every, fill_value=0.0).to_numpy() for name, series in each.items()}
     return maps | {"touches_per_m2_s": maps["touches_per_m2_s"] / per}

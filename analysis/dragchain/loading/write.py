@@ -73,28 +73,30 @@ def write_loading(run_dir: Path) -> list[Path]:
     SeriesError
         If the run is too short for its statistics.
     """
-    found = compute_loading(run_dir)
+    loading = compute_loading(run_dir)
     tables = run_dir / "tables"
     names = ("facets.parquet", "contact_events.parquet", "loading.json", "workpiece.vtp")
     facets, events, summary, vtp = files = [tables / name for name in names]
-    write_parquet(found.facets, facets)
-    write_parquet(found.events, events)
-    found.summary.write(summary)
-    if found.wear is not None:
-        found.wear.write(run_dir / WEAR)
-    if found.touch_events is not None:
-        write_parquet(found.touch_events, tables / "touch_events.parquet")
-    mesh = as_polydata(found.surface)
-    for name in found.facets:
-        mesh.cell_data[name] = found.facets[name].to_numpy()
+    write_parquet(loading.facets, facets)
+    write_parquet(loading.events, events)
+    loading.summary.write(summary)
+    if loading.wear is not None:
+        loading.wear.write(run_dir / WEAR)
+    if loading.touch_events is not None:
+        write_parquet(loading.touch_events, tables / "touch_events.parquet")
+    mesh = as_polydata(loading.surface)
+    for name in loading.facets:
+        mesh.cell_data[name] = loading.facets[name].to_numpy()
     write_vtp(vtp, mesh)
     with drawing():
-        return [*files, save(figure_of(found), run_dir / "figures" / "workpiece.png")]
+        return [*files, save(figure_of(loading), run_dir / "figures" / "workpiece.png")]
 
 
-def figure_of(found: WorkpieceLoading) -> Figure:
+def figure_of(loading: WorkpieceLoading) -> Figure:
     """The figure of the workpiece; see `workpiece_figure`."""
-    return workpiece_figure(found.case, found.sampled, found.surface, found.facets, found.summary)
+    return workpiece_figure(
+        loading.case, loading.sampled, loading.surface, loading.facets, loading.summary
+    )
 
 
 def compute_loading(run_dir: Path) -> WorkpieceLoading:

@@ -149,12 +149,12 @@ def _shape(frame: NetworkFrame, points: Floats, starts: Ints) -> dict[str, Float
 
 def _of_each(starts: Ints, values: NDArray[Any], measure: Callable[[Any], NDArray[Any]]) -> Floats:
     """Measure each chain's values: all chains of one length at once, (n, length, ...)."""
-    found = np.empty(len(starts) - 1)
+    means = np.empty(len(starts) - 1)
     lengths = np.diff(starts)
     for length in np.unique(lengths):
         which = np.flatnonzero(lengths == length)
-        found[which] = measure(values[starts[which][:, None] + np.arange(length)])
-    return found
+        means[which] = measure(values[starts[which][:, None] + np.arange(length)])
+    return means
 
 
 def _mean(values: NDArray[Any]) -> Floats:
@@ -186,8 +186,8 @@ def write_chains(run_dir: Path) -> None:
     network: list[dict[str, float]] = []
     grown: list[dict[str, NDArray[Any]]] = []
     tables, case = run_dir / "tables", load_case(run_dir)
-    names = np.array([one.name for one in case.classes])
-    with table_writer(tables / "chains.parquet") as found:
+    names = np.array([class_.name for class_ in case.classes])
+    with table_writer(tables / "chains.parquet") as writer:
         for frame in network_frames(run_dir):
             clusters = frame_clusters(frame)
             network.append(frame_statistics(frame, clusters))
@@ -195,8 +195,8 @@ def write_chains(run_dir: Path) -> None:
             chains = chain_table(frame)
             if names.size:
                 each = (names[case.class_of(np.array(ids))] for ids in chains["particle_ids"])
-                chains["classes"] = [one.tolist() for one in each]
-            found.write(chains)
+                chains["classes"] = [numbers.tolist() for numbers in each]
+            writer.write(chains)
         if not network:
             raise TableError(
                 f"{run_dir}: the statistics contain no frame of the contact network; "

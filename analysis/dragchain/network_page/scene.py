@@ -14,7 +14,7 @@ import pandas as pd
 from matplotlib.colors import to_hex
 from numpy.typing import NDArray
 from pydantic import JsonValue
-from scipy.spatial.transform import Rotation as Quaternion
+from scipy.spatial.transform import Rotation
 
 from dragchain.arrays import Floats, Ints
 from dragchain.drag import drag_peaks, peak_separation_s, read_counted
@@ -134,8 +134,8 @@ def highest_peaks(run: Run) -> pd.DataFrame:
         If the run is too short to have peaks.
     """
     peaks = drag_peaks(read_counted(run.folder, ("time_s", "drag_n")), run.case)
-    found = pd.DataFrame({"time_s": peaks.time_s, "drag_n": peaks.drag_n})
-    return found.nsmallest(PEAKS, "drag_n")
+    peak_rows = pd.DataFrame({"time_s": peaks.time_s, "drag_n": peaks.drag_n})
+    return peak_rows.nsmallest(PEAKS, "drag_n")
 
 
 def shown_frames(run: Run, peak_time_s: Floats) -> FrameSeries:
@@ -174,7 +174,7 @@ def read_shown(series: FrameSeries) -> Shown:
         kept, chain = _near(network, data.workpiece[0]), membership.contacts
         place = np.where(kept, np.cumsum(kept) - 1, -1)
         bodies = BODIES + data.contacts["b_id"].to_numpy(np.int64)
-        found = data.contacts.assign(
+        shown = data.contacts.assign(
             frame=number,
             a=place[network.a],
             b=np.where(network.between_particles(), place[network.b], bodies),
@@ -183,8 +183,8 @@ def read_shown(series: FrameSeries) -> Shown:
             + DOMINANT * chain["dominant"],
         )
         particles.append(data.particles[kept].assign(frame=number))
-        contacts.append(found[(found["a"] >= 0) & (found["b"] >= 0)])
-        turn = Quaternion.from_matrix(data.workpiece[1].matrices[0]).as_quat()
+        contacts.append(shown[(shown["a"] >= 0) & (shown["b"] >= 0)])
+        turn = Rotation.from_matrix(data.workpiece[1].matrices[0]).as_quat()
         poses.append([*data.workpiece[0], *turn])
         most = max(most, kept.size)
     return Shown(pd.concat(particles), pd.concat(contacts), np.array(poses), most)
@@ -256,9 +256,9 @@ def page_scene(run: Run) -> PageScene:
             "count": shown.most,
             "most": MOST_PARTICLES,
             "reach": 1e3 * shown.reach_m(),
-            "classes": [{"name": one.name, "first": one.first_id} for one in case.classes],
+            "classes": [{"name": class_.name, "first": class_.first_id} for class_ in case.classes],
         },
-        **({"clumps": [_clump(one) for one in case.bodies]} if case.bodies else {}),
+        **({"clumps": [_clump(body) for body in case.bodies]} if case.bodies else {}),
         "workpieces": [_workpiece(columns, run, shown, series.steps)],
         "curve": _curve(columns, run),
         "peaks": _peaks(peaks, times_s, case),
@@ -275,7 +275,7 @@ def _clump(bodies: BodiesOfRun) -> dict[str, JsonValue]:
 def _colours() -> list[str]:
     """The colour map of all figures, without its palest end, which could not be seen on white."""
     colours = force_map()
-    return [to_hex(one) for one in colours(np.linspace(0.06, 0.94, 33))]
+    return [to_hex(colour) for colour in colours(np.linspace(0.06, 0.94, 33))]
 
 
 # --- frames ----------------------------------------------------------------------------------
@@ -363,11 +363,11 @@ def _workpiece(columns: PackedColumns, run: Run, shown: Shown, steps: Ints) -> d
     case = run.case
     surface = read_surface(run.folder, case)
     columns.add("corners", "f24", 1e3 * surface.corners)
-    own = needed(case.workpiece, "workpiece")
+    workpiece = needed(case.workpiece, "workpiece")
     return {
         "poses": (shown.poses * [1e3, 1e3, 1e3, 1.0, 1.0, 1.0, 1.0]).tolist(),
-        "radius": 1e3 * own.radius_m,
-        "immersion": 1e3 * own.immersion_depth_m,
+        "radius": 1e3 * workpiece.radius_m,
+        "immersion": 1e3 * workpiece.immersion_depth_m,
         "headings": _headings(run, steps).tolist(),
         "loads": _loads(columns, run),
     }

@@ -17,16 +17,10 @@ from pydantic import JsonValue
 from dragchain.loading.document import Loading
 from dragchain.loading.wear import FILE as WEAR
 from dragchain.loading.wear import Wear
+from dragchain.quantities.document import Extrapolated, ExtrapolatedQuantity
 from dragchain.report.findings import FILE, DropFindings, FillingFindings, Findings, ProcessFindings
 from dragchain.report.page import TIMES, fixed, number, with_interval
-from dragchain.report.values import (
-    Extrapolated,
-    ExtrapolatedQuantity,
-    Values,
-    read_optional,
-    values_of,
-    values_over_packings,
-)
+from dragchain.report.values import Values, read_optional, values_of, values_over_packings
 from dragchain.run.case import changed_inputs, upstream_folders, with_changes
 from dragchain.run.kinematics import axis_speed, drag_phase, motion_of, needed, path_passed
 from dragchain.statistics.estimate import mean_of

@@ -16,6 +16,7 @@ from dragchain.report.cases import read_study_runs
 from dragdeck.files import file_checksum, write_text
 from dragdeck.records.case import CaseOfRun, load_case
 from dragdeck.records.run import changed_in_words, read_accepted
+from dragdeck.shipped import SHIPPED
 
 METADATA = "ro-crate-metadata.json"
 LEFT_OUT = "left_out.csv"
@@ -74,7 +75,7 @@ def write_crate(
     draft.mkdir(parents=True)
     try:
         crate = _Crate(draft, load_case(run_dirs[0]), licence)
-        crate.add([*map(_below_here, inputs), *(one for one in report if one.name != "complete")])
+        crate.add([*inputs, *(one for one in report if one.name != "complete")])
         for folder in run_dirs:
             crate.add_run(_below_here(folder))
         crate.close()
@@ -91,6 +92,13 @@ def _below_here(path: Path) -> Path:
         remedy = "call this in the project's folder, and put the file there"
         raise ExportError(f"{path} is not below {Path.cwd()}\n  remedy: {remedy}")
     return found
+
+
+def _in_crate(file: Path) -> Path:
+    """The path of a file in the crate: from the present folder, or from the files of dragdeck."""
+    if file.is_absolute() and file.is_relative_to(SHIPPED):
+        return file.relative_to(SHIPPED)
+    return _below_here(file)
 
 
 class _Crate:
@@ -123,10 +131,11 @@ class _Crate:
 
     def add(self, files: Sequence[Path]) -> list[Any]:
         """Copy files into the crate under their own paths, each once."""
-        for file in files:
-            if file not in self._files:
-                self._files[file] = self._add(file, file)
-        return [self._files[file] for file in files]
+        paths = {_in_crate(file): file for file in files}
+        for path, file in paths.items():
+            if path not in self._files:
+                self._files[path] = self._add(file, path)
+        return [self._files[path] for path in paths]
 
     def _add(self, source: Path, file: Path) -> Any:
         guessed = _TYPES.get(file.suffix) or mimetypes.guess_type(file.name)[0]

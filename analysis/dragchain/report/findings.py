@@ -10,7 +10,7 @@ from dragchain.statistics.estimate import Estimate, EstimateColumns, Real
 from dragchain.tables.impacts import Restitution
 from dragdeck.documents import Document, Part, omitted
 
-FILE = Path("tables") / "figures.json"
+FILE = Path("tables") / "findings.json"
 
 
 class Peaks(Part):

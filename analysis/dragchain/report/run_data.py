@@ -146,7 +146,7 @@ def dominant_bottlenecks(network: pd.DataFrame, chains: pd.DataFrame) -> Floats:
 
 
 def write_findings(run: RunData) -> Findings:
-    """Compute the findings of a run, write them to ``tables/figures.json`` and return them.
+    """Compute the findings of a run, write them to ``tables/findings.json`` and return them.
 
     Raises
     ------

@@ -315,7 +315,7 @@ _DRAW: Mapping[str, _Draw] = {draw.__name__: draw for draw in (*DRAW_PROCESS, fi
 
 
 def write_figures(run_dir: Path) -> list[Path]:
-    """Draw the figures of a run into ``figures/`` and their numbers into ``tables/figures.json``.
+    """Draw the figures of a run into ``figures/`` and their numbers into ``tables/findings.json``.
 
     Parameters
     ----------

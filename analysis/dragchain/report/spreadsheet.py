@@ -9,8 +9,8 @@ from itertools import chain
 import pandas as pd
 import pyarrow as pa
 
+from dragchain.quantities.basis import Standing
 from dragchain.report.cases import ReportedCase
-from dragchain.run.basis import Standing
 from dragchain.tables.columns import descriptions, unit_end, unit_of
 from dragdeck.records.case import AssumptionOfRun
 

@@ -9,10 +9,10 @@ import pandas as pd
 
 from dragchain.drag import FORCES
 from dragchain.errors import TableError
+from dragchain.quantities.basis import Standing
 from dragchain.report.cases import StudyRuns, cases_of
 from dragchain.report.findings import ProcessFindings
 from dragchain.report.values import Against
-from dragchain.run.basis import Standing
 from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import Estimate
 

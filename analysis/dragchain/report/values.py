@@ -1,7 +1,7 @@
 """The quantities of a process run, each with what it says of the process."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -10,141 +10,14 @@ from typing import NamedTuple
 from dragchain.drag import FORCES, TORQUE
 from dragchain.loading.document import FILE as LOADING
 from dragchain.loading.document import Loading
+from dragchain.quantities.basis import Basis, Correction, Standing, judge, notes
+from dragchain.quantities.document import EXTRAPOLATED, Extrapolated
+from dragchain.quantities.registry import REPORTED
 from dragchain.report.findings import ProcessFindings
-from dragchain.run.basis import QUANTITIES, Basis, Correction, Standing, judge, notes
 from dragchain.run.reference import ReferenceDrag, reference_drags
 from dragchain.statistics.estimate import Estimate, mean_of
-from dragdeck.documents import Document, Part
 from dragdeck.records.case import CaseOfRun
 from dragdeck.records.run import changed_in_words
-
-EXTRAPOLATED = Path("tables") / "extrapolated.json"
-
-
-class ExtrapolatedQuantity(Part):
-    """A quantity of a run, and its value at the physical modulus where windows give it.
-
-    Attributes
-    ----------
-    name, label, unit : str
-    measured : Estimate
-        Value of the run as it was simulated.
-    value : Estimate or None
-        At the physical Young's modulus, None if neither windows nor the run itself give it.
-    """
-
-    name: str
-    label: str
-    unit: str
-    measured: Estimate
-    value: Estimate | None = None
-
-
-class Need(NamedTuple):
-    """How many windows, and else packings of all windows, bring a quantity to its tolerance."""
-
-    windows: int
-    packings: int
-
-
-class Reached(Part):
-    """What a run was asked for, and what it and its windows reached.
-
-    Attributes
-    ----------
-    tolerance : float
-        Relative half-width of the 95 % interval at which no further window is run.
-    asked : tuple of str
-        Quantities to which it applies, by name.
-    reached : bool
-        Whether all of them are inside the tolerance.
-    needed : Need
-        Windows and packings that are expected to do.
-    runs : tuple of str
-        Windows that enter; none if the run itself has the physical modulus.
-    refused : mapping
-        Reason by window, of those that do not enter.
-    """
-
-    tolerance: float
-    asked: tuple[str, ...]
-    reached: bool
-    needed: Need
-    runs: tuple[str, ...] = ()
-    refused: Mapping[str, str] = {}
-
-
-class LoadMap(Part):
-    """Mean normal load on the workpiece by depth and azimuth; 4 depths, 12 azimuths each.
-
-    Attributes
-    ----------
-    soft : tuple of float
-        Of the run with reduced moduli, N.
-    value, std : tuple of float
-        At the physical modulus, N, and its standard deviation.
-    soft_error, error : float
-        Expected relative L1 error (sum of the absolute errors over the total load): of the soft
-        run's map, and of the corrected one.
-    """
-
-    soft: tuple[float, ...]
-    value: tuple[float, ...]
-    std: tuple[float, ...]
-    soft_error: float
-    error: float
-
-    @property
-    def said(self) -> str:
-        """How far both maps are expected to be off, in a sentence."""
-        soft, corrected = 100 * self.soft_error, 100 * self.error
-        return (
-            f"The load map of the run is off by about {soft:.0f} % of the load at the physical "
-            f"Young's modulus, the corrected one in {EXTRAPOLATED.name} by about {corrected:.0f} % "
-            "(sum of the absolute errors of 48 patches, over the total load)."
-        )
-
-
-class Extrapolated(Document):
-    """The content of ``extrapolated.json``.
-
-    Attributes
-    ----------
-    tolerance : Reached or None
-        Of a run that was asked for one.
-    load_map : LoadMap or None
-        Of a run with windows.
-    """
-
-    remedy = "make it with: ./run dragchain step extrapolate"
-
-    quantities: tuple[ExtrapolatedQuantity, ...]
-    tolerance: Reached | None = None
-    load_map: LoadMap | None = None
-
-    @property
-    def said(self) -> str:
-        """What was asked and reached, in a sentence; empty if nothing was asked."""
-        found = self.tolerance
-        if found is None:
-            return ""
-        known = {one.name: one.label for one in self.quantities}
-        labels = [f"the {known.get(name, name)}" for name in found.asked]
-        what = " and ".join(filter(None, (", ".join(labels[:-1]), labels[-1])))
-        asked = f"{what} to within {100 * found.tolerance:.3g} %"
-        who, verb = "The run at the physical Young's modulus", ("gives", "does not give")
-        if found.runs:
-            who = f"{len(found.runs)} windows at the physical Young's modulus"
-            verb = ("give", "do not give")
-        if found.reached:
-            return f"{who} {verb[0]} {asked}."
-        windows, packings = found.needed
-        more = f"{windows} windows" if packings == 1 and found.runs else f"{packings} seeds"
-        return f"{who} {verb[1]} {asked}: about {more} would."
-
-    def of(self, name: str) -> ExtrapolatedQuantity | None:
-        """A quantity by its name, None if it was not measured."""
-        return next((one for one in self.quantities if one.name == name), None)
 
 
 def read_optional(run_dir: Path) -> tuple[Loading | None, Extrapolated | None]:
@@ -265,7 +138,7 @@ def values_of(
     """
     own = dict(_own(case, found, loading, extrapolated))
     standings = []
-    for quantity in QUANTITIES:
+    for quantity in REPORTED:
         if quantity.name in own:
             force = found.forces.get(_FORCES.get(quantity.name, ""))
             correction = _correction(quantity.name, extrapolated)

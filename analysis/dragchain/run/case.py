@@ -10,8 +10,8 @@ from pydantic import JsonValue
 from dragchain.arrays import Floats
 from dragchain.errors import TableError
 from dragdeck.errors import DragdeckError
-from dragdeck.physics.coulomb import FrictionLimit
 from dragdeck.records.case import CaseOfRun, ClassOfRun, load_case
+from dragdeck.study.contact_law import FrictionLimit
 
 
 def changed_inputs(

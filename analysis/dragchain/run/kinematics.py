@@ -12,7 +12,7 @@ from dragchain.arrays import Floats, Ints
 from dragchain.errors import TableError
 from dragdeck.records.case import CaseOfRun
 from dragdeck.records.run import Phase
-from dragdeck.study.drive import Rotation, about_vertical, rotated, wrap_angle
+from dragdeck.study.drive import Orientations, about_vertical, rotated, wrap_angle
 from dragdeck.study.driven import DrivenMotion
 from dragdeck.study.model import Motion
 
@@ -188,7 +188,7 @@ def directions(steps: Ints, ref_xy_m: Floats, case: CaseOfRun) -> Floats:
     return np.where(since > 0, driven.directions(since, ref_xy_m), start)
 
 
-def workpiece_rotation(steps: Ints, direction_rad: Floats, case: CaseOfRun) -> Rotation:
+def workpiece_rotation(steps: Ints, direction_rad: Floats, case: CaseOfRun) -> Orientations:
     """Orientations of the workpiece's own frame.
 
     Parameters

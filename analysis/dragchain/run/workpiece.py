@@ -10,7 +10,7 @@ from dragchain.arrays import Floats
 from dragchain.errors import TableError
 from dragchain.run.kinematics import needed
 from dragdeck.records.case import CaseOfRun
-from dragdeck.study.drive import Rotation, rotated
+from dragdeck.study.drive import Orientations, rotated
 
 
 def read_workpiece_mesh(run_dir: Path, case: CaseOfRun) -> Any:
@@ -37,7 +37,7 @@ def _mesh_file(run_dir: Path, case: CaseOfRun) -> Path:
     return file
 
 
-def placed(workpiece: Any, workpiece_m: Floats, rotation: Rotation) -> Any:
+def placed(workpiece: Any, workpiece_m: Floats, rotation: Orientations) -> Any:
     """The workpiece's mesh turned, and put to its reference point."""
     pose = np.eye(4)
     pose[:3, :3], pose[:3, 3] = rotation.matrices[0], workpiece_m

@@ -1,13 +1,11 @@
 """The document of a scaling, ``scaling.json``: what the runs say of one field."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 from pydantic import Field
 
 from dragchain.statistics.estimate import CONFIDENCE, Estimate, Verdict
-from dragchain.statistics.power_law import Shifted, TwoTerms
 from dragdeck.documents import Document, Part
 from dragdeck.records.case import FidelityOfRun
 
@@ -47,22 +45,7 @@ class Expectation(Part):
     within: tuple[float, float] | None = None
 
 
-class CurvePoint(Part):
-    """A point of a curve.
-
-    Attributes
-    ----------
-    x : float
-        Value of the field.
-    value : float
-        Drag, N.
-    """
-
-    x: float
-    value: float
-
-
-class BandPoint(CurvePoint):
+class BandPoint(Part):
     """A point of a curve with its 95 % confidence interval.
 
     Attributes
@@ -73,6 +56,8 @@ class BandPoint(CurvePoint):
         Drag and its interval, N.
     """
 
+    x: float
+    value: float
     ci95_low: float
     ci95_high: float
 
@@ -88,11 +73,9 @@ class FittedLaw(Part):
         Geometric mean of the levels.
     degrees : int
         Degrees of freedom of the intervals.
-    spread, bed_fraction : float
-        Standard deviation between runs, of the logarithm, and the fraction of this variance that
-        is common to runs with the same packing.
-    lack_of_fit : float or None
-        p-value of the lack-of-fit test.
+    residual_std, bed_fraction : float
+        Standard deviation of a run about the law, of the logarithm, and the fraction of this
+        variance that is common to runs with the same packing.
     exponent : Estimate
         Fitted exponent.
     drag_at_centre_n : Estimate
@@ -113,17 +96,9 @@ class FittedLaw(Part):
     highest: float = Field(alias="to")
     runs: int
     degrees: int
-    spread: float
+    residual_std: float
     bed_fraction: float
-    lack_of_fit: float | None
     curve: tuple[BandPoint, ...]
-
-
-@dataclass(frozen=True)
-class ShiftedLaw(Shifted):
-    """The expected power of a shifted level, and its curve."""
-
-    curve: tuple[CurvePoint, ...]
 
 
 class Level(Part):
@@ -141,12 +116,10 @@ class Level(Part):
         Gap between workpiece and bowl wall in mean particle diameters; None off a circle.
     floor_particles : float
         Gap between tip and floor in mean particle diameters.
-    drag_n : Estimate
-        Mean of this level alone, N.
+    drag_n : float
+        Geometric mean of this level alone, N.
     fitted_n : float
-        Drag according to the power law fitted to all levels, N.
-    deviation : Estimate or None
-        Relative difference from the law of the other levels; None for too few runs.
+        Drag according to the power law, N.
     """
 
     x: float
@@ -155,9 +128,8 @@ class Level(Part):
     inertial_number: float | None
     gap_particles: float | None
     floor_particles: float
-    drag_n: Estimate
+    drag_n: float
     fitted_n: float
-    deviation: Estimate | None
 
 
 class ScaledRun(Part):
@@ -203,16 +175,12 @@ class ScalingFile(Document):
     verdict : str
         ``confirmed`` if the interval of the fitted exponent contains the expected one, otherwise
         ``contradicted``.
-    fit, fit_within : FittedLaw
-        Fit to all levels, and to those at which the exponent is expected.
-    two_terms, shifted : TwoTerms, ShiftedLaw or None
-        Alternative forms of the law.
+    fit : FittedLaw
+        Fit to the levels at which the exponent is expected.
     eta : Estimate
         Dimensionless drag, see `ScaledRun`.
     levels : tuple of Level
         One entry per level.
-    local_exponents : tuple of Estimate
-        Exponents between neighbouring levels.
     runs : tuple of ScaledRun
         One entry per run.
     scene : mapping
@@ -233,12 +201,8 @@ class ScalingFile(Document):
     expected: Expectation
     verdict: Judged
     fit: FittedLaw
-    fit_within: FittedLaw | None
-    two_terms: TwoTerms | None
-    shifted: ShiftedLaw | None
     eta: Estimate
     levels: tuple[Level, ...]
-    local_exponents: tuple[Estimate, ...]
     runs: tuple[ScaledRun, ...]
     scene: Mapping[str, float]
     fidelity: FidelityOfRun
@@ -247,11 +211,6 @@ class ScalingFile(Document):
     started: str | None
     engine: str | None
     cpu_time_s: float | None
-
-    @property
-    def judged(self) -> FittedLaw:
-        """The law that is compared with the expectation."""
-        return self.fit_within or self.fit
 
     @property
     def axis(self) -> Axis:

@@ -1,9 +1,10 @@
-"""How the mean drag depends on one field of a study: runs, power law, its test and its figure."""
+"""How the mean drag depends on one field of a study: runs, power law and its figure."""
 
 import html
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -13,25 +14,22 @@ from matplotlib.figure import Figure
 
 from dragchain.arrays import Floats
 from dragchain.drag import FORCES, read_counted, summarise_forces
-from dragchain.errors import TableError
+from dragchain.errors import SeriesError, TableError
 from dragchain.figures.panels import legend_below, log_ticks, new_panels
-from dragchain.figures.style import BLUE, GREEN, INK, ORANGE, WIDTH_IN, drawing, png
+from dragchain.figures.style import BLUE, INK, ORANGE, WIDTH_IN, drawing, png
 from dragchain.report.page import page_environment
 from dragchain.run.case import changed_inputs
 from dragchain.run.kinematics import motion_of, needed
 from dragchain.scaling.document import (
     BandPoint,
-    CurvePoint,
     Expectation,
     FittedLaw,
     Level,
     ScaledRun,
     ScalingFile,
-    ShiftedLaw,
 )
-from dragchain.statistics import power_law
+from dragchain.statistics.bed_effects import EffectsFit, fit_effects
 from dragchain.statistics.estimate import Estimate, flattened
-from dragchain.statistics.power_law import fit_shifted, fit_two_terms
 from dragdeck.files import write_bytes, write_text
 from dragdeck.records.case import CaseOfRun, load_case
 from dragdeck.records.run import RunRecord
@@ -47,6 +45,9 @@ SCENE = ("bowl_to_particle", "particle_friction", "lowest_restitution", "particl
 """Numbers of the scene that a scaling reports."""
 
 _CURVE_POINTS = 41
+
+_LEAST_LEVELS = 3
+"""A line through two levels always fits."""
 
 # --- the runs --------------------------------------------------------------------------------
 
@@ -119,12 +120,12 @@ def _read_run(folder: Path, field: str) -> RunOfScaling:
 
 def _check_alike(cases: Sequence[CaseOfRun], field: str) -> None:
     first, *others = ({**case.inputs, "fidelity": case.fidelity.model_dump()} for case in cases)
-    for case, own in zip(cases[1:], others, strict=True):
-        changed = changed_inputs(own, first)
+    for case, case_inputs in zip(cases[1:], others, strict=True):
+        changed = changed_inputs(case_inputs, first)
         name = next((name for name in changed if name not in (field, *_UNLIKE)), None)
         if name is not None:
             raise TableError(
-                f"{case.run}: {name} is {own.get(name)!r}, in {cases[0].run} it is "
+                f"{case.run}: {name} is {case_inputs.get(name)!r}, in {cases[0].run} it is "
                 f"{first.get(name)!r}; the runs of a scaling differ in {field} and seed only"
             )
 
@@ -132,10 +133,59 @@ def _check_alike(cases: Sequence[CaseOfRun], field: str) -> None:
 # --- the law ---------------------------------------------------------------------------------
 
 
+@dataclass(frozen=True)
+class PowerLaw:
+    """``drag = a x^n``, fitted to the logarithms of the mean drags of runs.
+
+    Attributes
+    ----------
+    levels : (L,) ndarray
+        The different levels, rising.
+    fit : EffectsFit
+        Logarithm of the drag at the centre of the levels, and n.
+    """
+
+    levels: Floats
+    fit: EffectsFit
+
+    @cached_property
+    def centre(self) -> float:
+        """Geometric mean of the levels."""
+        return float(np.exp(np.mean(np.log(self.levels))))
+
+    @property
+    def exponent(self) -> Estimate:
+        """The exponent n."""
+        return self.fit.estimate([0.0, 1.0])
+
+    def at(self, x: float) -> Estimate:
+        """The drag at a level, N."""
+        return self.fit.estimate([1.0, math.log(x / self.centre)]).exp()
+
+
+def fit_power_law(rows: Sequence[ScaledRun]) -> PowerLaw:
+    """Fit a power law to the mean drags of runs that partly share beds.
+
+    Raises
+    ------
+    SeriesError
+        If there are too few levels or runs.
+    """
+    x = np.array([row.level for row in rows])
+    levels = np.unique(x)
+    if len(levels) < _LEAST_LEVELS:
+        raise SeriesError(
+            f"{len(levels)} level(s) are too few to test a power law: use {_LEAST_LEVELS} or more"
+        )
+    design = np.column_stack([np.ones(len(x)), np.log(x) - np.mean(np.log(levels))])
+    drag = np.log([row.drag_n for row in rows])
+    return PowerLaw(levels, fit_effects(design, drag, [row.bed for row in rows]))
+
+
 def find(
     run_dirs: Sequence[Path], field: str, expected: Expectation, commands: Sequence[str] = ()
 ) -> ScalingFile:
-    """Everything that runs say of a field.
+    """The power law of a field from runs.
 
     Parameters
     ----------
@@ -153,16 +203,13 @@ def find(
         If the runs do not make a scaling.
     """
     runs = read_scaled_runs(run_dirs, field)
-    law = power_law.fit_power_law(_sample(runs))
-    inner = None
-    if expected.within is not None:
-        inner = power_law.fit_power_law(law.runs.within(*expected.within))
-    judged = inner or law
-    shaped = expected.exponent is not None and expected.exponent >= 1.0
-    power = expected.exponent or 0.0
+    low, high = expected.within or (0.0, math.inf)
+    fitted = [run.row for run in runs if low <= run.row.level <= high]
+    law = fit_power_law(fitted)
     first = runs[0].case
     files = [folder / "run.json" for folder in run_dirs]
     records = [RunRecord.read(file) for file in files if file.is_file()]
+    levels = dict.fromkeys(run.row.level for run in runs)
     return ScalingFile(
         study=first.study,
         field=field,
@@ -170,15 +217,11 @@ def find(
         verdict=(
             "no expectation"
             if expected.exponent is None
-            else judged.exponent.agrees_with(expected.exponent)
+            else law.exponent.agrees_with(expected.exponent)
         ),
-        fit=_fitted(law),
-        fit_within=None if inner is None else _fitted(inner),
-        two_terms=fit_two_terms(judged, power) if shaped else None,
-        shifted=_shifted(judged, power) if shaped else None,
-        eta=_mean_eta(runs, judged),
-        levels=tuple(_level(law, number, runs) for number in range(len(law.runs.levels))),
-        local_exponents=tuple(law.local_exponents()),
+        fit=_fitted(law, len(fitted)),
+        eta=_mean_eta(fitted),
+        levels=tuple(_level(law, x, [run for run in runs if run.row.level == x]) for x in levels),
         runs=tuple(run.row for run in runs),
         scene={
             **{name: float(first.numbers[name]) for name in SCENE if name in first.numbers},
@@ -193,69 +236,47 @@ def find(
     )
 
 
-def _sample(runs: Sequence[RunOfScaling]) -> power_law.RunMeans:
-    rows = [run.row for run in runs]
-    drag = np.array([row.drag_n for row in rows])
-    errors = np.array([row.standard_error_n for row in rows]) / drag
-    return power_law.RunMeans(
-        np.array([row.level for row in rows]), drag, errors, [row.bed for row in rows]
-    )
-
-
-def _fitted(law: power_law.PowerLaw) -> FittedLaw:
-    levels = law.runs.levels
+def _fitted(law: PowerLaw, runs: int) -> FittedLaw:
+    lowest, highest = (float(end) for end in law.levels[[0, -1]])
+    curve = (float(x) for x in np.geomspace(lowest, highest, _CURVE_POINTS))
     return FittedLaw(
         exponent=law.exponent,
         change_per_decade=law.exponent.exp(factor=math.log(10.0), minus=1.0),
-        centre=law.runs.centre,
-        drag_at_centre_n=law.at(law.runs.centre),
-        lowest=float(levels[0]),
-        highest=float(levels[-1]),
-        runs=len(law.runs.x),
-        degrees=law.line.degrees,
-        **vars(law.scatter),
-        lack_of_fit=law.lack_of_fit,
-        curve=tuple(BandPoint(x=x, **asdict(law.at(x))) for x in _curve(law)),
+        centre=law.centre,
+        drag_at_centre_n=law.at(law.centre),
+        lowest=lowest,
+        highest=highest,
+        runs=runs,
+        degrees=law.fit.degrees,
+        residual_std=law.fit.residual_std,
+        bed_fraction=law.fit.bed_fraction,
+        curve=tuple(BandPoint(x=x, **asdict(law.at(x))) for x in curve),
     )
 
 
-def _curve(law: power_law.PowerLaw) -> list[float]:
-    """Levels at which a curve is drawn."""
-    levels = law.runs.levels
-    return [float(x) for x in np.geomspace(levels[0], levels[-1], _CURVE_POINTS)]
-
-
-def _shifted(law: power_law.PowerLaw, power: float) -> ShiftedLaw:
-    """The expected power of a shifted level."""
-    found = fit_shifted(law, power)
-    curve = tuple(CurvePoint(x=x, value=found.at(x)) for x in _curve(law))
-    return ShiftedLaw(**vars(found), curve=curve)
-
-
-def _mean_eta(runs: Sequence[RunOfScaling], law: power_law.PowerLaw) -> Estimate:
-    """Geometric mean of eta over the runs of a law; a trend in it widens the interval."""
-    known = [run.row.eta for run in runs if run.row.level in law.runs.levels]
-    etas = replace(law.runs, values=np.array(known))
-    constant = np.ones((len(known), 1))
-    covariance = etas.covariance(power_law.estimate_scatter(etas, constant))
-    fit = power_law.solve(constant, etas.logarithms, covariance, etas.degrees(1))
+def _mean_eta(rows: Sequence[ScaledRun]) -> Estimate:
+    """Geometric mean of eta over runs; a trend in it widens the interval."""
+    etas = np.log([row.eta for row in rows])
+    fit = fit_effects(np.ones((len(rows), 1)), etas, [row.bed for row in rows])
     return fit.estimate([1.0]).exp()
 
 
-def _level(law: power_law.PowerLaw, number: int, runs: Sequence[RunOfScaling]) -> Level:
-    x = float(law.runs.levels[number])
-    here = [run for run in runs if run.row.level == x]
+def _level(law: PowerLaw, x: float, runs: Sequence[RunOfScaling]) -> Level:
+    case = runs[0].case
     return Level(
         x=x,
-        runs=len(here),
-        eta=float(np.exp(np.mean([math.log(run.row.eta) for run in here]))),
-        inertial_number=here[0].case.numbers.get("inertial_number"),
-        gap_particles=here[0].gap_particles,
-        floor_particles=float(np.mean([run.floor_particles for run in here])),
-        drag_n=law.level(number),
+        runs=len(runs),
+        eta=_geometric_mean([run.row.eta for run in runs]),
+        inertial_number=case.numbers.get("inertial_number"),
+        gap_particles=runs[0].gap_particles,
+        floor_particles=float(np.mean([run.floor_particles for run in runs])),
+        drag_n=_geometric_mean([run.row.drag_n for run in runs]),
         fitted_n=law.at(x).value,
-        deviation=law.deviation(number),
     )
+
+
+def _geometric_mean(values: Sequence[float]) -> float:
+    return float(np.exp(np.mean(np.log(values))))
 
 
 def write_scaling(
@@ -290,38 +311,36 @@ def write_scaling(
     """
     within = (fit_range[0], fit_range[1]) if fit_range else None
     asked = Expectation(exponent=expected, source=source, within=within)
-    found = find(run_dirs, field, asked, [command] if command else [])
+    scaling = find(run_dirs, field, asked, [command] if command else [])
     with drawing():
-        picture = png(draw_scalings([found]))
-    found.write(out_dir / "scaling.json")
-    rows = table(found).to_csv(index=False, float_format="%.6g", lineterminator="\n")
+        picture = png(draw_scalings([scaling]))
+    scaling.write(out_dir / "scaling.json")
+    rows = table(scaling).to_csv(index=False, float_format="%.6g", lineterminator="\n")
     write_text(out_dir / "scaling.csv", rows)
     write_bytes(out_dir / "scaling.png", picture)
-    return said(found)
+    return said(scaling)
 
 
-def table(found: ScalingFile) -> pd.DataFrame:
-    """The levels of a scaling, one row each, intervals as ``*_ci95_low`` and ``*_ci95_high``."""
-    exponents = (*found.local_exponents, None)
-    rows = [
-        flattened({**dict(level), "local_exponent": local})
-        for level, local in zip(found.levels, exponents, strict=True)
-    ]
-    return pd.DataFrame(rows).rename(columns={"x": found.field})
+def table(scaling: ScalingFile) -> pd.DataFrame:
+    """The levels of a scaling, one row each."""
+    rows = [flattened(dict(level)) for level in scaling.levels]
+    return pd.DataFrame(rows).rename(columns={"x": scaling.field})
 
 
 def read_scalings() -> list[ScalingFile]:
     """The scalings that come with the package, those of slow drag first."""
-    found = [ScalingFile.read(file) for file in _STORED.glob("*.json")]
+    scalings = [ScalingFile.read(file) for file in _STORED.glob("*.json")]
     place = {name: number for number, name in enumerate(_ORDER)}
-    return sorted(found, key=lambda one: (place.get(one.study, len(_ORDER)), one.study))
+    return sorted(
+        scalings, key=lambda scaling: (place.get(scaling.study, len(_ORDER)), scaling.study)
+    )
 
 
-def said(found: ScalingFile) -> str:
+def said(scaling: ScalingFile) -> str:
     """What a scaling says in words, one remark per line."""
     words = page_environment().get_template("scaling/words.html.j2").module
-    statement, remarks = (str(getattr(words, name)(found)) for name in ("statement", "remarks"))
-    lines = [f"{found.field}: {statement.strip()}"]
+    statement, remarks = (str(getattr(words, name)(scaling)) for name in ("statement", "remarks"))
+    lines = [f"{scaling.field}: {statement.strip()}"]
     lines += [f"  {line}" for line in remarks.splitlines() if line]
     return html.unescape("\n".join(lines))
 
@@ -343,56 +362,47 @@ def draw_scalings(scalings: Sequence[ScalingFile]) -> Figure:
     width = (0.72 if len(scalings) == 1 else 1.2) * WIDTH_IN
     height = 3.35 * math.ceil(len(scalings) / 2) + 0.55
     figure, panels = new_panels(height, len(scalings), width, 2)
-    for axes, found in zip(panels, scalings, strict=True):
-        label, unit, factor = found.axis
+    for axes, scaling in zip(panels, scalings, strict=True):
+        label, unit, factor = scaling.axis
         axes.set(xscale="log", yscale="log", ylabel="mean drag force magnitude (N)")
-        axes.set(xlabel=f"{label} ({unit})" if unit else label, title=_title(found))
-        _law(axes, found, factor)
-        _points(axes, found, factor)
-        _ticks(axes, found, factor)
+        axes.set(xlabel=f"{label} ({unit})" if unit else label, title=_title(scaling))
+        _law(axes, scaling, factor)
+        _points(axes, scaling, factor)
+        _ticks(axes, scaling, factor)
     return legend_below(figure)
 
 
-def _title(found: ScalingFile) -> str:
-    exponent, expected = found.judged.exponent, found.expected.exponent
+def _title(scaling: ScalingFile) -> str:
+    exponent, expected = scaling.fit.exponent, scaling.expected.exponent
     value, low, high = (
         f"{round(number, 2) + 0.0:.2f}"
         for number in (exponent.value, exponent.ci95_low, exponent.ci95_high)
     )
     words = f"exponent {value} ({low} to {high})"
-    return words if expected is None else f"{words}, expected {expected:g}: {found.verdict}"
+    return words if expected is None else f"{words}, expected {expected:g}: {scaling.verdict}"
 
 
-def _law(axes: Axes, found: ScalingFile, factor: float) -> None:
-    judged = found.judged
-    x, drag = _line(judged.curve, factor)
-    low, high = ([getattr(p, end) for p in judged.curve] for end in ("ci95_low", "ci95_high"))
+def _law(axes: Axes, scaling: ScalingFile, factor: float) -> None:
+    law = scaling.fit
+    x = factor * np.array([point.x for point in law.curve])
+    low, drag, high = (
+        [getattr(point, name) for point in law.curve] for name in ("ci95_low", "value", "ci95_high")
+    )
     axes.fill_between(x, low, high, color=BLUE, alpha=0.15, lw=0, label="95 % confidence band")
     axes.plot(x, drag, color=BLUE, lw=1.8, label="fitted power law")
-    whole, full_fit = _line(found.fit.curve, factor)
-    if found.fit_within:
-        axes.plot(whole, full_fit, ":", color=BLUE, label="power law, full range")
-    if found.expected.exponent is not None:
-        slope = (whole / (factor * judged.centre)) ** found.expected.exponent
-        slope *= judged.drag_at_centre_n.value
-        axes.plot(whole, slope, "--", color=ORANGE, lw=1.4, label="expected slope")
-    if found.shifted:
-        label = "expected power law with offset"
-        axes.plot(*_line(found.shifted.curve, factor), "-.", color=GREEN, label=label)
+    if scaling.expected.exponent is not None:
+        slope = (x / (factor * law.centre)) ** scaling.expected.exponent
+        slope *= law.drag_at_centre_n.value
+        axes.plot(x, slope, "--", color=ORANGE, lw=1.4, label="expected slope")
 
 
-def _line(curve: Sequence[CurvePoint], factor: float) -> tuple[Floats, list[float]]:
-    """Levels in the unit of the axis, and drag."""
-    return factor * np.array([point.x for point in curve]), [point.value for point in curve]
-
-
-def _points(axes: Axes, found: ScalingFile, factor: float) -> None:
-    levels = [level for level in found.levels if level.runs > 1]
+def _points(axes: Axes, scaling: ScalingFile, factor: float) -> None:
+    levels = [level for level in scaling.levels if level.runs > 1]
     x = [factor * level.x for level in levels]
-    means = [level.drag_n.value for level in levels]
+    means = [level.drag_n for level in levels]
     axes.plot(x, means, "_", ms=17, mew=2.0, color=INK, label="mean per level")
-    x = [factor * place for place in _beside(found.runs)]
-    drag, error = zip(*((run.drag_n, run.standard_error_n) for run in found.runs), strict=True)
+    x = [factor * place for place in _beside(scaling.runs)]
+    drag, error = zip(*((run.drag_n, run.standard_error_n) for run in scaling.runs), strict=True)
     label = "run, ± standard error"
     axes.errorbar(x, drag, error, color=INK, fmt="o", mfc="white", zorder=3, label=label)
 
@@ -404,9 +414,9 @@ def _beside(runs: Sequence[ScaledRun]) -> list[float]:
     return [run.level * (1.0 + _SIDEWAYS * (beds.index(run.bed) - middle)) for run in runs]
 
 
-def _ticks(axes: Axes, found: ScalingFile, factor: float) -> None:
+def _ticks(axes: Axes, scaling: ScalingFile, factor: float) -> None:
     """Every level on the horizontal axis, round numbers on the vertical."""
-    levels = [factor * level.x for level in found.levels]
+    levels = [factor * level.x for level in scaling.levels]
     axes.set_xlim(levels[0] / _PAD, levels[-1] * _PAD)
     low, high = axes.get_ylim()
     stretch = max(1.0, math.sqrt(_LEAST_SPAN * low / high))

@@ -78,7 +78,7 @@ class Trials:
 
     def joined(self, place: Floats, value: Any, error: float) -> "Trials":
         """With a further place; its values are NaN if it was refused."""
-        rows = [np.broadcast_to(one, (1, len(self.low))) for one in (value, error)]
+        rows = [np.broadcast_to(part, (1, len(self.low))) for part in (value, error)]
         every = (self.places, place), (self.values, rows[0]), (self.errors, rows[1])
         places, values, errors = (np.vstack(pair) for pair in every)
         return Trials(places, values, errors, self.low, self.high)
@@ -152,7 +152,7 @@ class Responses:
 
     def predict(self, places: Floats) -> tuple[Floats, Floats]:
         """Expected responses at (M, D) places and their standard errors, (M, Q) each."""
-        each = [one.predict(places) for one in self._each]
+        each = [prediction.predict(places) for prediction in self._each]
         mean, error = (np.stack(columns, axis=1) for columns in zip(*each, strict=True))
         return mean, error
 

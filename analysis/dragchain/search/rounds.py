@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from dragchain.arrays import Floats
+from dragchain.quantities.registry import REPORTED
 from dragchain.report.cases import ReportedCase, read_study_runs
 from dragchain.report.removal import depth_spread, removal_of
-from dragchain.run.basis import QUANTITIES
 from dragchain.run.workpiece import read_surface
 from dragchain.search.proposals import Trials, best_place, propose, spread_places
 from dragchain.statistics.estimate import (
@@ -59,7 +59,7 @@ _OWN: Mapping[str, tuple[str, str]] = {
 }
 """Label and unit of the quantities that are not in the registry of the report."""
 
-_LABELS = {**_OWN, **{one.name: (one.label, one.unit) for one in QUANTITIES}}
+_LABELS = {**_OWN, **{quantity.name: (quantity.label, quantity.unit) for quantity in REPORTED}}
 
 
 def label(measure: SearchedMeasure) -> str:
@@ -71,28 +71,28 @@ def label(measure: SearchedMeasure) -> str:
 
 def quantity_of(measure: SearchedMeasure, run_dir: Path) -> float:
     """A quantity of one process run, NaN if it has no finite value."""
-    one, name = ReportedCase((read_study_runs(run_dir),)), measure.quantity
+    case, name = ReportedCase((read_study_runs(run_dir),)), measure.quantity
     if name == "peak_pressure":
-        touches = one.first.wear.touches if one.first.wear else None
+        touches = case.first.wear.touches if case.first.wear else None
         return touches.quantities["peak_pressure_pa"].p95 if touches else math.nan
     if name not in _OWN:
-        standing = one.values.of(name)
+        standing = case.values.of(name)
         return standing.shown.value if standing else math.nan
-    found = removal_of(one)
-    if found is None:
+    removal = removal_of(case)
+    if removal is None:
         return math.nan
     if name in ("minutes", "minutes_slowest"):
-        mean, slowest = found.minutes.values()
+        mean, slowest = removal.minutes.values()
         value = (mean if name == "minutes" else slowest).value
         return value if math.isfinite(value) else math.nan
-    own = found.facets[found.facets["immersed"]]
+    facets = removal.facets[removal.facets["immersed"]]
     if measure.heights_m:
         low, high = measure.heights_m
-        height = read_surface(run_dir, one.first.process.case).centres[:, 2]
-        own = own[((height >= low) & (height < high))[own.index]]
-    if own.empty or not own["depth_m_s"].any():
+        height = read_surface(run_dir, case.first.process.case).centres[:, 2]
+        facets = facets[((height >= low) & (height < high))[facets.index]]
+    if facets.empty or not facets["depth_m_s"].any():
         return math.nan
-    depth, variation = depth_spread(own)
+    depth, variation = depth_spread(facets)
     return depth if name == "removal_depth" else variation[1]
 
 
@@ -115,15 +115,15 @@ class SearchedStudy:
     def study(self) -> Study:
         """The study with its search; its bounds are checked."""
         self.project.cases(self.name)
-        found = validate(read_study(self.file), self.file, whole=True)
-        if found.search is None:
+        valid = validate(read_study(self.file), self.file, whole=True)
+        if valid.search is None:
             raise InputError(
                 "a required key is missing",
                 file=self.file,
                 field="search",
                 remedy="say what may vary and what is wanted: docs/howto/sweep.md",
             )
-        return found
+        return valid
 
     @property
     def search(self) -> Search:
@@ -144,7 +144,7 @@ class SearchedStudy:
     def asked(self) -> str:
         """Hash of all that the choice of settings depends on, but not of how many there are."""
         plain = self.study.plain()
-        search = {name: one for name, one in self.search.plain().items() if name != "runs"}
+        search = {name: entry for name, entry in self.search.plain().items() if name != "runs"}
         run = PROCESS.run_id(self.case({}, self.study.sweep["seed"][0]))
         others = {name: plain.get(name) for name in ("sweep", "removal")}
         return digest({"run": run, "search": search, **others})
@@ -174,7 +174,10 @@ class SearchedStudy:
     def place(self, values: Settings) -> Floats:
         """A setting in fractions of its bounds."""
         return np.array(
-            [(values[one] - low) / (high - low) for one, (low, high) in self.search.vary.items()]
+            [
+                (values[field] - low) / (high - low)
+                for field, (low, high) in self.search.vary.items()
+            ]
         )
 
     def values_at(self, place: Floats) -> dict[str, Any]:
@@ -191,13 +194,15 @@ def read_point(studied: SearchedStudy, point: SearchPoint) -> Measured:
     """What the runs of a setting say."""
     folders = studied.folders(point.values)
     states = [run_status(folder) for folder in folders]
-    failed = next((one for one in states if one.state == "failed" and one.final), None)
+    failed = next((state for state in states if state.state == "failed" and state.final), None)
     if failed:
         return failed.problem.partition("\n")[0]
-    if any(one.state != "complete" for one in states):
+    if any(state.state != "complete" for state in states):
         return None
-    found = np.array([[quantity_of(one, folder) for one in studied.measures] for folder in folders])
-    return found if np.isfinite(found).all() else "a quantity has no finite value"
+    values = np.array(
+        [[quantity_of(measure, folder) for measure in studied.measures] for folder in folders]
+    )
+    return values if np.isfinite(values).all() else "a quantity has no finite value"
 
 
 # --- findings ------------------------------------------------------------------------------------
@@ -222,7 +227,7 @@ class SearchFindings:
     @cached_property
     def searched(self) -> Any:
         """Whether a point is no confirmation, (N,)."""
-        return np.array([not one.confirms for one in self.points])
+        return np.array([not point.confirms for point in self.points])
 
     @cached_property
     def means(self) -> Floats:
@@ -235,14 +240,14 @@ class SearchFindings:
 
         That of a coefficient of variation is taken as the same at all points.
         """
-        own = [one.quantity == "removal_variation" for one in self.studied.measures]
-        return np.where(own, 1.0, np.abs(self.means))
+        varied = [measure.quantity == "removal_variation" for measure in self.studied.measures]
+        return np.where(varied, 1.0, np.abs(self.means))
 
     @cached_property
     def _residuals(self) -> Floats:
         """Of the packings about the mean of each point searched that counts, (N, P, Q)."""
-        found = (self.packings - self.means[:, None]) / self._scale[:, None]
-        return np.asarray(found[self.searched & np.isfinite(self.means).all(axis=1)])
+        residuals = (self.packings - self.means[:, None]) / self._scale[:, None]
+        return np.asarray(residuals[self.searched & np.isfinite(self.means).all(axis=1)])
 
     def _errors(self, residuals: Floats, degrees: int) -> Floats:
         pooled = np.sqrt((residuals**2).sum(axis=(0, 1)) / degrees / residuals.shape[1])
@@ -288,8 +293,8 @@ class SearchFindings:
         """
         trials, search = self.trials, self.studied.search
         loss_of = loss(search.objective, self.means[:, 0])
-        run = [k for k, one in enumerate(self.points)
-               if np.isfinite(loss_of[k]) and "fidelity" not in one.values
+        run = [k for k, point in enumerate(self.points)
+               if np.isfinite(loss_of[k]) and "fidelity" not in point.values
                and "contradicted" not in self.verdict(k)]  # fmt: skip
         if len(run) < 2:
             return run
@@ -308,7 +313,7 @@ class SearchFindings:
         values[:, 0] = loss(search.objective, values[:, 0])
         ends = [(-math.inf, math.inf), *(limit.ends for limit in search.limits)]
         return Trials(
-            np.array([self.studied.place(one.values) for one in self.of_search]),
+            np.array([self.studied.place(point.values) for point in self.of_search]),
             values,
             self.noise[self.searched],
             *np.array(ends).T,
@@ -342,48 +347,51 @@ def read_findings(
     """Read all points; those whose runs were rejected say so then. None if a run has not ended."""
     rows, known = list[Floats](), list[SearchPoint]()
     shape = len(studied.study.sweep["seed"]), len(studied.measures)
-    for one in points:
-        found = one.refused if one.refused else measure(studied, one)
-        if found is None:
+    for point in points:
+        measured = point.refused if point.refused else measure(studied, point)
+        if measured is None:
             return None
-        if isinstance(found, str):
-            ran = one.ran or not one.refused
-            one = one.model_copy(update={"refused": found, "ran": ran})
-            found = np.full(shape, np.nan)
-        rows.append(found)
-        known.append(one)
+        if isinstance(measured, str):
+            ran = point.ran or not point.refused
+            point = point.model_copy(update={"refused": measured, "ran": ran})
+            measured = np.full(shape, np.nan)
+        rows.append(measured)
+        known.append(point)
     return SearchFindings(studied, known, np.array(rows).reshape(-1, *shape))
 
 
 # --- the next round ------------------------------------------------------------------------------
 
 
-def next_points(found: SearchFindings) -> list[SearchPoint]:
+def next_points(findings: SearchFindings) -> list[SearchPoint]:
     """The points of the next round; none if the search is complete."""
-    studied, search, points = found.studied, found.studied.search, found.of_search
-    tried = [one for one in points if one.ran or not one.refused]
-    number = 1 + max((one.round for one in found.points), default=0)
+    studied, search, points = findings.studied, findings.studied.search, findings.of_search
+    tried = [point for point in points if point.ran or not point.refused]
+    number = 1 + max((point.round for point in findings.points), default=0)
     if not points:
         places = list(spread_places(search.start, len(search.vary), search.seed))
         return [_point(studied, place, number, "start") for place in places]
-    if np.isfinite(found.means[:, 0]).sum() < 2:
+    if np.isfinite(findings.means[:, 0]).sum() < 2:
         raise _stuck(studied, "fewer than two settings can be compared", points[0].refused)
     if len(tried) >= search.runs:
-        done = found.points[-1].confirms
-        return [] if done else _confirmation(found, number)
-    trials, chosen = found.trials, list[SearchPoint]()
+        done = findings.points[-1].confirms
+        return [] if done else _confirmation(findings, number)
+    trials, chosen = findings.trials, list[SearchPoint]()
     wanted = min(search.at_once, search.runs - len(tried))
-    while sum(not one.refused for one in chosen) < wanted and len(chosen) < _MOST_REFUSED:
-        seed = search.seed + 1000 * len(found.points) + len(chosen)
-        one = _point(studied, propose(trials, seed), number, "model", found.trials)
-        if any(one.values == other.values for other in (*found.points, *chosen)):
+    while (
+        sum(not chosen_point.refused for chosen_point in chosen) < wanted
+        and len(chosen) < _MOST_REFUSED
+    ):
+        seed = search.seed + 1000 * len(findings.points) + len(chosen)
+        point = _point(studied, propose(trials, seed), number, "model", findings.trials)
+        if any(point.values == other.values for other in (*findings.points, *chosen)):
             place = np.random.default_rng(seed).random(len(search.vary))
-            one = _point(studied, place, number, "model", found.trials)
-        place = studied.place(one.values)
-        gone = bool(one.refused)
+            point = _point(studied, place, number, "model", findings.trials)
+        place = studied.place(point.values)
+        gone = bool(point.refused)
         trials = trials.joined(place, math.nan, math.nan) if gone else trials.believing(place)
-        chosen.append(one)
-    if all(one.refused for one in chosen):
+        chosen.append(point)
+    if all(chosen_point.refused for chosen_point in chosen):
         raise _stuck(studied, "one setting after the other is refused", chosen[-1].refused)
     return chosen
 
@@ -408,16 +416,16 @@ def _point(
     )
 
 
-def _confirmation(found: SearchFindings, number: int) -> list[SearchPoint]:
+def _confirmation(findings: SearchFindings, number: int) -> list[SearchPoint]:
     """The best setting by the model at the fidelity of the confirmation, and at the study's own."""
-    studied = found.studied
-    gone = [one.values for one in found.points if one.refused]
+    studied = findings.studied
+    gone = [refused_point.values for refused_point in findings.points if refused_point.refused]
 
     def accepted(place: Floats) -> bool:
         values = studied.values_at(place)
         return values not in gone and not studied.refusal(values)
 
-    best = best_place(found.trials, accepted)
+    best = best_place(findings.trials, accepted)
     if best is None:
         raise _stuck(studied, "every setting that the model expects to be good is refused")
     point = _point(studied, best.place, number, "confirmation")
@@ -426,5 +434,5 @@ def _confirmation(found: SearchFindings, number: int) -> list[SearchPoint]:
         return [soft]
     values = {**soft.values, "fidelity": studied.search.confirm}
     full = soft.model_copy(update={"values": values, "refused": studied.refusal(values)})
-    known = [one.values for one in found.points]
-    return [one for one in (soft, full) if one.values not in known]
+    known = [known_point.values for known_point in findings.points]
+    return [option for option in (soft, full) if option.values not in known]

@@ -5,8 +5,7 @@ chance. Runs that start from the same bed are alike to some degree; how much is
 estimated too, so that pairing counts exactly as much as it helps.
 
 How much those have in common is estimated by the restricted likelihood (Patterson and Thompson
-1971, Biometrika 58, 545), which differs with what else is known: `fit_effects` estimates one
-variance of all runs, `dragchain.statistics.power_law` what comes on top of each run's known error.
+1971, Biometrika 58, 545). Runs that share no bed make it ordinary least squares.
 """
 
 import math
@@ -71,14 +70,14 @@ class Whitened:
     def of(cls, design: Floats, values: Floats, covariance: Floats) -> "Whitened":
         """Whiten a design (N, P) and values (N,) by their covariance (N, N)."""
         root = np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
-        left, right = (np.linalg.solve(root, one) for one in (design, values))
+        left, right = (np.linalg.solve(root, part) for part in (design, values))
         return cls(root, np.asarray(left), np.asarray(right))
 
     @cached_property
     def effects(self) -> Floats:
         """The effects by least squares, (P,)."""
-        found = np.linalg.lstsq(self.design, self.values, rcond=None)[0]
-        return np.asarray(found, dtype=np.float64)
+        solution = np.linalg.lstsq(self.design, self.values, rcond=None)[0]
+        return np.asarray(solution, dtype=np.float64)
 
     @cached_property
     def residuals(self) -> Floats:
@@ -110,9 +109,16 @@ class Whitened:
         return float(np.log(np.diag(self.root)).sum() + np.log(np.abs(np.diag(triangle))).sum())
 
 
+Combination = tuple[tuple[str, Hashable], ...]
+"""Factors and their levels, those of the reference left out."""
+
+_LARGEST_FRACTION = 0.98
+"""Largest fraction of the variance that a bed is allowed to explain."""
+
+
 @dataclass(frozen=True)
-class Effects:
-    """Effects of a linear model with their covariance.
+class EffectsFit:
+    """Effects of settings, with their covariance.
 
     Attributes
     ----------
@@ -120,11 +126,17 @@ class Effects:
     covariance : (P, P) ndarray
     degrees : int
         Degrees of freedom of an interval.
+    residual_std : float
+        Standard deviation of one run about its settings' effects, bed included.
+    bed_fraction : float
+        The part of that variance which runs from the same bed have in common.
     """
 
     effects: Floats
     covariance: Floats
     degrees: int
+    residual_std: float
+    bed_fraction: float
 
     @property
     def quantile(self) -> float:
@@ -140,29 +152,6 @@ class Effects:
     def estimate(self, weights: ArrayLike) -> Estimate:
         """A combination of the effects, weights (P,), with its interval."""
         return t_interval(*self.contrast(weights), self.degrees)
-
-
-Combination = tuple[tuple[str, Hashable], ...]
-"""Factors and their levels, those of the reference left out."""
-
-_LARGEST_FRACTION = 0.98
-"""Largest fraction of the variance that a bed is allowed to explain."""
-
-
-@dataclass(frozen=True)
-class EffectsFit(Effects):
-    """Effects of settings.
-
-    Attributes
-    ----------
-    residual_std : float
-        Standard deviation of one run about its settings' effects, bed included.
-    bed_fraction : float
-        The part of that variance which runs from the same bed have in common.
-    """
-
-    residual_std: float
-    bed_fraction: float
 
 
 def fit_effects(design: Floats, values: Floats, beds: Sequence[Hashable]) -> EffectsFit:
@@ -207,8 +196,8 @@ def _best_fraction(design: Floats, values: Floats, same_bed: Floats) -> float:
         model = Whitened.of(design, values, correlation(same_bed, fraction))
         return model.log_determinants + 0.5 * model.degrees * math.log(max(model.square, 1e-300))
 
-    found = minimize_scalar(loss, bounds=(0.0, _LARGEST_FRACTION), method="bounded")
-    return float(found.x) if found.fun < loss(0.0) else 0.0
+    optimum = minimize_scalar(loss, bounds=(0.0, _LARGEST_FRACTION), method="bounded")
+    return float(optimum.x) if optimum.fun < loss(0.0) else 0.0
 
 
 @dataclass(frozen=True)
@@ -237,8 +226,8 @@ class Factors:
 
     def _terms(self, setting: Mapping[str, Hashable]) -> list[Combination]:
         """The columns that are 1 for a setting, besides the first."""
-        own = tuple((f, setting[f]) for f in self.reference if setting[f] != self.reference[f])
-        return [(pair,) for pair in own] if self.additive else [own] * bool(own)
+        changed = tuple((f, setting[f]) for f in self.reference if setting[f] != self.reference[f])
+        return [(pair,) for pair in changed] if self.additive else [changed] * bool(changed)
 
     def row(self, setting: Mapping[str, Hashable]) -> Floats:
         """Row of the design matrix for some settings, (1 + columns,)."""

@@ -77,7 +77,10 @@ class MeanEstimate:
 
     def over(self, below: "MeanEstimate") -> Estimate:
         """The ratio to an independent mean: relative half-widths add up as squares do."""
-        above, under = (0.5 * (one.ci95_high - one.ci95_low) / one.mean for one in (self, below))
+        above, under = (
+            0.5 * (estimate.ci95_high - estimate.ci95_low) / estimate.mean
+            for estimate in (self, below)
+        )
         value, reliable = self.mean / below.mean, self.reliable and below.reliable
         half = abs(value) * math.hypot(above, under)
         return Estimate(value, value - half, value + half, reliable=reliable)
@@ -273,11 +276,11 @@ def estimates(
     with np.errstate(divide="ignore", invalid="ignore"):
         values = statistic(means)
         series = centred @ _slopes(sums, means, statistic)
-        found = [
-            estimate_mean(one, confidence=confidence) if np.isfinite(one).all() else None
-            for one in series.T
+        mean_estimates = [
+            estimate_mean(column, confidence=confidence) if np.isfinite(column).all() else None
+            for column in series.T
         ]
-        reach = [one.ci95_high - one.mean if one else np.nan for one in found]
+        reach = [mean.ci95_high - mean.mean if mean else np.nan for mean in mean_estimates]
         shares = np.nan_to_num(centred.T @ series / np.sum(series**2, axis=0))
         moves = (shares * reach).T
         low, high = (
@@ -286,7 +289,7 @@ def estimates(
         beyond = np.maximum(low - values, values - high) > _ROUNDING * np.abs(values)
     low, high = (np.where(beyond, np.nan, end) for end in (low, high))
     few = ((least == 0.0) & (np.abs(moves) > LARGEST_REACH * means)).any(axis=1)
-    reliable = [one is not None and one.reliable for one in found] & ~few
+    reliable = [mean is not None and mean.reliable for mean in mean_estimates] & ~few
     ends = zip(values.tolist(), low.tolist(), high.tolist(), reliable.tolist(), strict=True)
     return [Estimate(*end, reliable=sure) for *end, sure in ends]
 

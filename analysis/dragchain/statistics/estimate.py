@@ -123,7 +123,12 @@ class EstimateColumns:
     @classmethod
     def of(cls, estimates: Sequence[Estimate]) -> "EstimateColumns":
         """The columns of estimates."""
-        return cls(*(tuple(getattr(one, own.name) for one in estimates) for own in fields(cls)))
+        return cls(
+            *(
+                tuple(getattr(estimate, field.name) for estimate in estimates)
+                for field in fields(cls)
+            )
+        )
 
     def at(self, place: int) -> Estimate:
         """One of them."""

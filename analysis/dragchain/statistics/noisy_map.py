@@ -76,14 +76,14 @@ def map_spread(values: Floats, errors: Floats, areas: Floats, patch: Ints) -> Ma
         differences = max(0.0, beyond / square) if square > 0.0 else 0.0
     maps = _drawn(value, area, max(events, 1e-9 * float(area.mean())), differences)
     maps /= np.average(maps, axis=1, weights=area)[:, None]
-    found, relative = [], []
+    spreads, relative = [], []
     for part in (0.05, 0.95):
         estimate = _estimate(_quantiles(maps, area, part), _quantiles(value, area, part))
         error = math.sqrt(events / float(area.mean()) / max(estimate.value, 1e-300) + differences)
         known = error <= LARGEST_ERROR
-        found.append(estimate if known else Estimate(*[math.nan] * 3))
+        spreads.append(estimate if known else Estimate(*[math.nan] * 3))
         relative.append(error)
-    return MapSpread((found[0], found[1]), (relative[0], relative[1]))
+    return MapSpread((spreads[0], spreads[1]), (relative[0], relative[1]))
 
 
 def _estimate(drawn: Floats, measured: float | Floats) -> Estimate:

@@ -46,7 +46,7 @@ class Bodies:
             raise TableError(
                 f"step {spheres.step}: the spheres of particles are not those of case.json"
             )
-        parts = [_moving(spheres, one) for one in self.case.bodies]
+        parts = [_moving(spheres, body) for body in self.case.bodies]
         return Frame(
             spheres.step,
             {name: np.concatenate([part[name] for part in parts]) for name in parts[0]},
@@ -118,7 +118,7 @@ def _moving(spheres: Frame, size: BodiesOfRun) -> Columns:
     )
     centre, turned = pose(np.array(size.offsets_m), places)
     arm, spin = places.mean(axis=1) - centre, spin[:, 0]
-    found = {
+    motion = {
         CENTRE: centre,
         VELOCITY: velocity.mean(axis=1) - np.cross(spin, arm),
         SPIN: spin,
@@ -128,7 +128,7 @@ def _moving(spheres: Frame, size: BodiesOfRun) -> Columns:
         "particle_id": size.first_id + np.arange(size.count),
         "radius_m": np.full(size.count, size.radius_m),
     }
-    for names, values in found.items():
+    for names, values in motion.items():
         columns |= dict(zip(names, values.T, strict=True))
     return columns
 
@@ -157,6 +157,6 @@ def _sum(at: Ints, values: Floats, count: int) -> Floats:
 
 
 def _largest(at: Ints, count: int, values: Floats) -> Floats:
-    found = np.full(count, -np.inf)
-    np.maximum.at(found, at, values)
-    return found
+    largest = np.full(count, -np.inf)
+    np.maximum.at(largest, at, values)
+    return largest

@@ -41,10 +41,10 @@ def intact(path: Path) -> Iterator[None]:
     if not path.is_file():
         raise TableError(f"{path} is missing: run `{_command(path)}`")
     try:
-        found = pq.read_metadata(path)
-        if path.stem in _NEVER_EMPTY and found.num_rows == 0:
+        metadata = pq.read_metadata(path)
+        if path.stem in _NEVER_EMPTY and metadata.num_rows == 0:
             raise pa.ArrowInvalid("it has no rows")
-        for field in found.schema.to_arrow_schema():
+        for field in metadata.schema.to_arrow_schema():
             if field.type in (pa.string(), pa.large_string()) and _NUMBER.search(field.name):
                 raise pa.ArrowTypeError(f"column {field.name} contains text instead of numbers")
         yield

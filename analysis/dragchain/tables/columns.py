@@ -88,11 +88,11 @@ def _rows() -> list[tuple[str, tuple[str, ...], str]]:
 
 def descriptions(column: str) -> dict[str, str]:
     """What a column means in each table that may have it, by the table's name."""
-    found: dict[str, str] = {}
+    descriptions: dict[str, str] = {}
     for pattern, tables, text in _rows():
         if fnmatchcase(column, pattern):
-            found = dict.fromkeys(tables, text) | found
-    return found
+            descriptions = dict.fromkeys(tables, text) | descriptions
+    return descriptions
 
 
 def unit_end(column: str) -> str:

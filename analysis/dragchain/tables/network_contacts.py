@@ -12,7 +12,8 @@ from dragchain.tables.columns import CENTRE, FLOOR_FORCES, FORCES, SIDE_FORCES
 from dragchain.tables.workpiece_contacts import WallContacts, tangential_force
 from dragdeck.documents import Document
 from dragdeck.dumps.frame import Frame
-from dragdeck.physics.coulomb import FrictionLimit, within_friction
+from dragdeck.physics.coulomb import within_friction
+from dragdeck.study.contact_law import FrictionLimit
 
 KINDS = ("particle-particle", "particle-workpiece", "particle-floor", "particle-side")
 """Kinds of contact; their position is the code in `ContactRows.kind`."""

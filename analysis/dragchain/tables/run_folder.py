@@ -17,9 +17,9 @@ from dragchain.tables.by_step import read_table
 from dragchain.tables.workpiece_contacts import Meshes, WorkpieceFrames, join_workpiece_frames
 from dragdeck.decks.outputs import OutputOfRun, load_outputs
 from dragdeck.dumps.frame import Columns, Frame
-from dragdeck.physics.coulomb import FrictionLimit
 from dragdeck.records.case import CaseOfRun, load_case
-from dragdeck.study.drive import Rotation
+from dragdeck.study.contact_law import FrictionLimit
+from dragdeck.study.drive import Orientations
 
 ON_WORKPIECE = ("workpiece_particles", "workpiece_contacts")
 """The outputs that are joined, unless others of their columns are asked for."""
@@ -132,7 +132,7 @@ class Run:
 # --- place of the workpiece ----------------------------------------------------------------------
 
 
-WorkpiecePlaces = Callable[[int], tuple[Floats, Rotation]]
+WorkpiecePlaces = Callable[[int], tuple[Floats, Orientations]]
 
 _WORKPIECE = ["step", "ref_x_m", "ref_y_m", "ref_z_m", "direction_rad"]
 """Columns of ``workpiece_force.parquet`` that say where the workpiece is."""
@@ -160,7 +160,7 @@ def _reference_point(workpiece: pd.DataFrame, step: int) -> Floats:
     return np.array([np.interp(step, at, column) for column in point.T])
 
 
-def _workpiece_rotation(workpiece: pd.DataFrame, step: int, case: CaseOfRun) -> Rotation:
+def _workpiece_rotation(workpiece: pd.DataFrame, step: int, case: CaseOfRun) -> Orientations:
     """The workpiece's orientation at a step, its direction of motion that of the nearest sample."""
     nearest = [int(np.abs(workpiece["step"].to_numpy(np.int64) - step).argmin())]
     direction = workpiece["direction_rad"].to_numpy(np.float64)[nearest]

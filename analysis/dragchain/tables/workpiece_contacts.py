@@ -18,7 +18,8 @@ from dragchain.arrays import Floats, Ints, places
 from dragchain.errors import TableError
 from dragchain.tables.columns import ATTRACTION, CENTRE, FORCES, POINT, SPIN, VELOCITY
 from dragdeck.dumps.frame import Columns, Frame
-from dragdeck.physics.coulomb import FrictionLimit, within_friction
+from dragdeck.physics.coulomb import within_friction
+from dragdeck.study.contact_law import FrictionLimit
 
 _NORMAL = ("normal_x", "normal_y", "normal_z")
 
@@ -164,10 +165,10 @@ def join_workpiece_frames(
     TableError
         If the frames are of different steps, or a particle comes twice in one.
     """
-    for one, other in zip(particles, contacts, strict=True):
-        if one.step != other.step:
+    for particle, other in zip(particles, contacts, strict=True):
+        if particle.step != other.step:
             raise TableError(
-                f"the next step of workpiece_particles is {one.step}, but that of "
+                f"the next step of workpiece_particles is {particle.step}, but that of "
                 f"workpiece_contacts is {other.step}: both must be written with the same period"
             )
     frames = (*particles, *contacts)
@@ -189,16 +190,16 @@ def join_workpiece_frames(
     unplaced = np.ones(len(known), dtype=np.bool_)
     unplaced[_rows_of(touching, pushed)[1]] = False
     placed, mesh = _place(touching, pushed, above), _on(touching)
-    own = mesh == meshes.workpiece
+    facing = mesh == meshes.workpiece
     return WorkpieceFrames(
         np.array([frame.step for frame in particles]),
         np.array([frame.opening for frame in particles]),
-        placed.select(own),
+        placed.select(facing),
         placed.select(mesh == meshes.bowl),
-        touching.ids("particle_id")[own] // above,
+        touching.ids("particle_id")[facing] // above,
         pushed.vectors(*FORCES)[unplaced],
         known[unplaced] // above,
-        written - int(np.count_nonzero(own)),
+        written - int(np.count_nonzero(facing)),
     )
 
 
@@ -240,10 +241,10 @@ def _within_friction(
     overlap = np.asarray(contacts.columns["overlap_m"][loud], dtype=np.float64)
     on_bowl = _on(contacts)[loud] == bowl
     ids = contacts.ids("particle_id")[loud] % above
-    of_class = [one.at(ids, ids) for one in friction]
+    of_class = [class_limit.at(ids, ids) for class_limit in friction]
     limit = np.where(on_bowl, of_class[1].friction, of_class[0].friction)
     attraction = np.zeros(contacts.rows)
-    both = (one.attraction_n(radius, overlap) for one in of_class)
+    both = (class_limit.attraction_n(radius, overlap) for class_limit in of_class)
     attraction[loud] = np.where(~on_bowl, *both)
     forces[loud], _ = within_friction(forces[loud], normal[loud], limit, attraction[loud])
     added = (*FORCES, *_NORMAL, ATTRACTION)
@@ -283,13 +284,13 @@ def _heads(particle_id: Ints, body: Ints, points: Floats, patch_m2: Floats) -> I
 
     The contacts of a particle with a body follow each other, deepest first.
     """
-    own = np.arange(len(points))
+    positions = np.arange(len(points))
     new = np.r_[True, (np.diff(particle_id) != 0) | np.diff(body)][: len(points)]
-    rank = own - np.maximum.accumulate(np.where(new, own, 0))
-    head = own.copy()
+    rank = positions - np.maximum.accumulate(np.where(new, positions, 0))
+    head = positions.copy()
     for place in range(1, rank.max(initial=0) + 1):
         for ahead in range(place, 0, -1):
-            rows = np.flatnonzero((rank == place) & (head == own))
+            rows = np.flatnonzero((rank == place) & (head == positions))
             others = rows - ahead
             apart = np.square(points[rows] - points[others]).sum(axis=1)
             inside = (head[others] == others) & (apart <= patch_m2[others])

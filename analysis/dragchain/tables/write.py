@@ -201,7 +201,7 @@ def _write_workpiece_contacts(run: Run, file: Path) -> None:
     with ExitStack() as stack:
         files = (file, *([run.table("sphere_contacts.parquet")] if bodies else ()))
         names = _contact_names(run.case)
-        tables = [stack.enter_context(table_writer(one, names)) for one in files]
+        tables = [stack.enter_context(table_writer(path, names)) for path in files]
         for frames in run.workpiece_frames():
             force, place = samples.at(frames.step)
             used = closure.add(frames, force, counted_mask(frames.step, run.case))
@@ -227,8 +227,8 @@ def _write_touches(run: Run, file: Path) -> None:
 
 
 def _contact_names(case: CaseOfRun) -> tuple[str, ...]:
-    own = WORKPIECE_CONTACTS + ((ATTRACTION,) if attracts(case) else ())
-    return _with_classes(own, "workpiece_contacts", case)
+    names = WORKPIECE_CONTACTS + ((ATTRACTION,) if attracts(case) else ())
+    return _with_classes(names, "workpiece_contacts", case)
 
 
 def _contacts(bodies: Bodies, frames: WorkpieceFrames) -> Iterator[tuple[WallContacts, Ints]]:
@@ -297,8 +297,8 @@ def _named(names: tuple[str, ...], vectors: Floats) -> dict[str, Floats]:
 def _write_particles(run: Run, file: Path) -> None:
     bodies = Bodies(run.case)
     moving = KINEMATICS + (ORIENTATION if bodies else ())
-    own = ("step", "time_s", *moving)
-    with table_writer(file, _with_classes(own, "particles", run.case)) as table:
+    names = ("step", "time_s", *moving)
+    with table_writer(file, _with_classes(names, "particles", run.case)) as table:
         for frame in run.frames("particles"):
             frame = (bodies.frame(frame) if bodies else frame).by_particle()
             steps = np.full(frame.rows, frame.step)
@@ -362,15 +362,15 @@ def _contact_columns(step: int, rows: ContactRows, case: CaseOfRun) -> Rows:
     }
 
 
-def _with_classes(own: tuple[str, ...], table: str, case: CaseOfRun) -> tuple[str, ...]:
-    return own + (CLASSES[table] if case.classes else ())
+def _with_classes(names: tuple[str, ...], table: str, case: CaseOfRun) -> tuple[str, ...]:
+    return names + (CLASSES[table] if case.classes else ())
 
 
 def _classes(table: str, case: CaseOfRun, *particle_ids: Ints) -> dict[str, pa.Array]:
     """The columns of a table with the classes of (N,) particles; ids below 1 have none."""
     if not case.classes:
         return {}
-    names = (*(one.name for one in case.classes), "none")
+    names = (*(class_.name for class_ in case.classes), "none")
     codes = (np.where(ids > 0, case.class_of(ids), len(names) - 1) for ids in particle_ids)
     return {
         column: category(of_column, names)

@@ -18,10 +18,11 @@ from scipy import stats
 
 from dragchain.arrays import Floats
 from dragchain.errors import SeriesError, TableError
+from dragchain.quantities.registry import Quantity
 from dragchain.run.case import changed_inputs
 from dragchain.statistics.bed_effects import EffectsFit, Factors, fit_effects
 from dragchain.statistics.estimate import CONFIDENCE, student_quantile
-from dragchain.tradeoff.measures import FILE, Measurand, Measures
+from dragchain.tradeoff.measures import FILE, Measures
 from dragdeck.records.tradeoff import ErrorEntry
 
 _PARAMETERS = ("youngs_modulus_scale", "timestep_fraction", "speed_factor")
@@ -209,7 +210,7 @@ class QuantityComparison:
 
     Attributes
     ----------
-    quantity : Measurand
+    quantity : Quantity
     reference : float
         Its value at the reference, estimated from all runs.
     se : float
@@ -223,7 +224,7 @@ class QuantityComparison:
         What `errors` and `between` draw on.
     """
 
-    quantity: Measurand
+    quantity: Quantity
     reference: float
     se: float
     run_std: float
@@ -244,7 +245,7 @@ class QuantityComparison:
 
 
 def compare_quantity(
-    quantity: Measurand, runs: Sequence[PlanRun], reference: Setting
+    quantity: Quantity, runs: Sequence[PlanRun], reference: Setting
 ) -> QuantityComparison:
     """Every setting against the reference in one quantity.
 

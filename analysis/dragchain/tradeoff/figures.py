@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from dragchain.arrays import Floats
 from dragchain.figures.panels import key, legend_below, log_ticks, new_panels
 from dragchain.figures.style import INK, LIGHT, MARKERS, WIDE_IN
+from dragchain.quantities.registry import MAIN
 from dragchain.tradeoff.compare import Setting
-from dragchain.tradeoff.measures import MAIN
 from dragchain.tradeoff.outcome import TOLERANCES, Tradeoff
 from dragdeck.records.tradeoff import ErrorEntry
 

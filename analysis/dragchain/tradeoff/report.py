@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from dragchain.quantities.along import LONG_WAVE, SHORT_WAVE
+from dragchain.quantities.registry import COMPARED, MAIN
 from dragchain.report.campaign import write_report
 from dragchain.report.page import MINUS, number
 from dragchain.statistics.estimate import CONFIDENCE
 from dragchain.tradeoff.compare import Setting, read_plan_runs
 from dragchain.tradeoff.figures import draw_pareto
-from dragchain.tradeoff.measure_run import LONG_WAVE, SHORT_WAVE
-from dragchain.tradeoff.measures import MAIN, QUANTITIES
 from dragchain.tradeoff.outcome import (
     TOLERANCES,
     ComparedDrop,
@@ -99,7 +99,7 @@ def run_table(tradeoff: Tradeoff) -> pd.DataFrame:
             "failure": run.measures.why_failed,
             "counted_path_m": run.measures.arc_m or math.nan,
             **run.measures.cost.model_dump(),
-            **{one.name: run.stretches[0].get(one.name, math.nan) for one in QUANTITIES},
+            **{one.name: run.stretches[0].get(one.name, math.nan) for one in COMPARED},
         }
         for run in tradeoff.runs
     ]

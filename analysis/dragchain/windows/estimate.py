@@ -23,7 +23,7 @@ from pydantic import AllowInfNan, BeforeValidator
 from scipy.special import erf
 
 from dragchain.arrays import Floats
-from dragchain.report.values import Extrapolated, LoadMap, Need, Reached
+from dragchain.quantities.document import Extrapolated, LoadMap, Need, Reached
 from dragchain.statistics.correlated import MIN_SAMPLES, estimate_mean
 from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate, mean_of, student_quantile
 from dragdeck.documents import Document, Part

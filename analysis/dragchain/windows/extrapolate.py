@@ -4,9 +4,15 @@ import math
 from collections.abc import Iterator
 from pathlib import Path
 
-from dragchain.report.values import EXTRAPOLATED, Extrapolated, ExtrapolatedQuantity, Need, Reached
-from dragchain.tradeoff.measure_run import quantities_along
-from dragchain.tradeoff.measures import QUANTITIES
+from dragchain.quantities.along import quantities_along
+from dragchain.quantities.document import (
+    EXTRAPOLATED,
+    Extrapolated,
+    ExtrapolatedQuantity,
+    Need,
+    Reached,
+)
+from dragchain.quantities.registry import COMPARED
 from dragchain.windows.estimate import UNKNOWN, Round, WindowsRecord, of_one_run
 from dragdeck.records.case import CaseOfRun, load_case
 
@@ -63,7 +69,7 @@ def _quantities(
 ) -> Iterator[ExtrapolatedQuantity]:
     along = quantities_along(run_dir, case)
     values = along.values()
-    for one in QUANTITIES:
+    for one in COMPARED:
         if one.name in values:
             blocks = one.rooted(along.of_blocks(one.name))
             known = record.quantities.get(one.name, UNKNOWN)

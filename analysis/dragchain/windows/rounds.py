@@ -7,11 +7,13 @@ from pathlib import Path
 import numpy as np
 
 from dragchain.arrays import Floats
-from dragchain.report.values import ExtrapolatedQuantity, LoadMap, Need, Reached
+from dragchain.quantities.along import PathQuantities, quantities_along
+from dragchain.quantities.document import ExtrapolatedQuantity, LoadMap, Need, Reached
+from dragchain.quantities.registry import COMPARED, Quantity
 from dragchain.statistics.estimate import Estimate
 from dragchain.tables.by_step import read_table
-from dragchain.tradeoff.measure_run import make_tables, quantities_along, read_outcome
-from dragchain.tradeoff.measures import QUANTITIES, Measurand, PathQuantities, checks_in_words
+from dragchain.tradeoff.measure_run import make_tables, read_outcome
+from dragchain.tradeoff.measures import checks_in_words
 from dragchain.windows.estimate import (
     UNKNOWN,
     Joined,
@@ -143,9 +145,9 @@ def _joined(
     values: Mapping[str, float],
     windows: Sequence[WindowOfRun],
     record: WindowsRecord,
-) -> Iterator[tuple[Measurand, Joined | None]]:
+) -> Iterator[tuple[Quantity, Joined | None]]:
     """Each quantity of the soft run at physical stiffness, None if not all windows have it."""
-    for quantity in QUANTITIES:
+    for quantity in COMPARED:
         if quantity.name not in values:
             continue
         if any(quantity.name not in one.values for one in windows) or len(windows) < _FEWEST:
@@ -157,7 +159,7 @@ def _joined(
             yield quantity, join(_of_windows(quantity, windows), stretches, known)
 
 
-def _of_windows(quantity: Measurand, windows: Sequence[WindowOfRun]) -> Floats:
+def _of_windows(quantity: Quantity, windows: Sequence[WindowOfRun]) -> Floats:
     """A quantity in each window, its square where its blocks hold squares.
 
     In a window, the drag deviates from a mean of its own. What waves longer than its sample add to

@@ -177,10 +177,13 @@ def _draw_tradeoff(tolerance: float = 0.1) -> Figure:
     levels = sorted(rows["youngs_modulus_scale"].unique(), reverse=True)
     shades = matplotlib.colormaps["viridis"](np.linspace(0, 0.85, len(levels)))
     for level, shade, mark in zip(levels, shades, MARKERS, strict=False):
-        own = rows[rows["youngs_modulus_scale"] == level]
-        sides = [own["value"] - own["ci95_low"], own["ci95_high"] - own["value"]]
+        settings = rows[rows["youngs_modulus_scale"] == level]
+        sides = [
+            settings["value"] - settings["ci95_low"],
+            settings["ci95_high"] - settings["value"],
+        ]
         axes.errorbar(
-            1 / own["relative_cost"], 100 * own["value"], [100 * side for side in sides],
+            1 / settings["relative_cost"], 100 * settings["value"], [100 * side for side in sides],
             fmt=mark, color=shade, capsize=2, lw=1, label=f"Young's modulus \u00d7 {level:g}",
         )  # fmt: skip
     best = rows[rows["bound"] < rows["bound"].cummin().shift(fill_value=np.inf)]
@@ -268,7 +271,9 @@ def _draw_windows() -> Figure:
     figure, axes = _panels(7.6, 3.0)
     widths = 100 * rows["stiff_half_width"]
     axes.barh(places, 2 * widths, left=-widths, color=LIGHT, label="reference, 95 % CI")
-    ratios = {one: 100 * (rows[one] / rows["stiff"] - 1) for one in ("soft", "value", *_CI)}
+    ratios = {
+        column: 100 * (rows[column] / rows["stiff"] - 1) for column in ("soft", "value", *_CI)
+    }
     ends = np.sort([ratios[end] for end in _CI], axis=0)
     sides = [ratios["value"] - ends[0], ends[1] - ratios["value"]]
     axes.plot(ratios["soft"], places, "s", color=ORANGE, label="soft run")

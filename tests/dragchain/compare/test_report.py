@@ -24,8 +24,8 @@ from dragchain.cli import main
 from dragchain.compare import report
 from dragchain.compare.report import read_compared, write_comparison
 from dragchain.errors import TableError
-from dragchain.report.values import EXTRAPOLATED, Extrapolated, LoadMap
-from dragchain.run.basis import QUANTITIES
+from dragchain.quantities.document import EXTRAPOLATED, Extrapolated, LoadMap
+from dragchain.quantities.registry import REPORTED
 from dragchain.statistics.estimate import Estimate
 
 DEPTH, SPEED, TOGETHER = 0.8, 0.3, 0.1
@@ -131,7 +131,7 @@ def planted(random: np.random.Generator, levels: list[Any], seeds: int, curved: 
     some: Any = [SimpleNamespace(by_seed=one) for one in cases.values()]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(report, "_standings", lambda one, quantity: one.by_seed)
-        return report.effects_of(some, factors, QUANTITIES[0])
+        return report.effects_of(some, factors, REPORTED[0])
 
 
 @pytest.mark.parametrize(
@@ -195,9 +195,3 @@ def test_a_study_is_not_compared_with_itself(tmp_path: Path) -> None:
     packings = [one for one in study(tmp_path) if "deep-0_fast-0" in one.name]
     with pytest.raises(TableError, match="at least two cases"):
         read_compared(packings * 2)
-
-
-def test_one_case_is_refused(tmp_path: Path) -> None:
-    packings = [one for one in study(tmp_path) if "deep-0_fast-0" in one.name]
-    with pytest.raises(TableError, match="at least two cases"):
-        read_compared(packings)

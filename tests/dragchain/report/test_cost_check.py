@@ -9,11 +9,11 @@ from typing import Any
 import pytest
 from report_files import ASKED, PICTURES, case_json, make_run, process_findings, write_quantities
 
+from dragchain.quantities.document import EXTRAPOLATED, Extrapolated, ExtrapolatedQuantity
+from dragchain.quantities.registry import REPORTED
 from dragchain.report.cases import cases_of, read_study_runs
 from dragchain.report.cost_check import answers, prediction_for, read_advice
 from dragchain.report.study_report import write_study_report
-from dragchain.report.values import EXTRAPOLATED, Extrapolated, ExtrapolatedQuantity
-from dragchain.run.basis import QUANTITIES
 from dragchain.statistics.estimate import Estimate
 from dragdeck.errors import DocumentError
 from dragdeck.records.advice import OptionEntry
@@ -62,7 +62,7 @@ def test_the_report_compares_cost_and_tolerance(run: Path, tmp_path: Path) -> No
 
 def write_physical(folder: Path, **found: tuple[float, float]) -> None:
     """Write ``extrapolated.json`` of a run at the physical modulus: values and half-widths."""
-    labels = {one.name: one.label for one in QUANTITIES}
+    labels = {one.name: one.label for one in REPORTED}
     quantities = (
         ExtrapolatedQuantity(
             name=name, label=labels[name], unit="N", measured=Estimate(value, math.nan, math.nan),

@@ -13,6 +13,7 @@ from dragchain.errors import ExportError
 from dragchain.report import crate
 from dragchain.report.crate import write_crate
 from dragdeck.errors import RejectedRunError
+from dragdeck.shipped import SHIPPED
 
 rocrate = pytest.importorskip("rocrate.rocrate")
 RUNS = [Path(f"results/small/{run}") for run in ("filling/f-1", "drop_test/d-1", "process/p-1")]
@@ -72,6 +73,14 @@ def test_raw_outputs_and_large_files_are_named_only(
         assert not (OUT / str(file)).exists()
         assert (row["bytes"], row["sha256"]) == sums(Path())[str(file)]
     assert (OUT / RUNS[2] / "tables/force.parquet").exists()
+
+
+def test_files_of_dragdeck_have_their_paths_in_it(project: Path) -> None:
+    template = Path("templates/base.in.j2")
+    write_crate(OUT, RUNS, REPORT, inputs=[STUDY, SHIPPED / template])
+    assert str(template) in listed(OUT)
+    assert (OUT / template).read_bytes() == (SHIPPED / template).read_bytes()
+    assert (OUT / STUDY).is_file()
 
 
 def test_what_templates_changed_is_told(project: Path) -> None:

@@ -25,7 +25,7 @@ from dragchain.run.reference import reference_drags
 from dragchain.statistics.estimate import Estimate
 from dragdeck.records.case import CaseOfRun, load_case
 from dragdeck.records.run import figures_of
-from dragdeck.study.drive import Rotation
+from dragdeck.study.drive import Orientations
 from dragdeck.study.reference import Drag, Reference
 
 pytestmark = pytest.mark.slow  # its data take seconds to make
@@ -167,7 +167,7 @@ def test_process_figures_are_whole_pictures(process: Path, drawn: list[Path]) ->
 # --- the network's pictures ------------------------------------------------------------------
 
 
-UPRIGHT = Rotation(np.zeros(1))
+UPRIGHT = Orientations(np.zeros(1))
 
 
 def network_frame(between_n: float, on_side_n: float) -> NetworkFrame:

@@ -160,7 +160,7 @@ def test_a_run_that_was_never_written_points_to_the_run_before_it(
 def test_the_step_that_failed_says_why(
     process: Path, other: Path, tmp_path: Path, log: str, said: str
 ) -> None:
-    (process / "tables" / "figures.json").unlink()
+    (process / "tables" / "findings.json").unlink()
     (process / "logs").mkdir()
     (process / "logs" / log).write_text(
         f"line\ndragchain: it {said}\n  value: 3\n  remedy: do so\n"

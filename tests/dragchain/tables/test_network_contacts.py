@@ -4,7 +4,7 @@ from made_frames import frame, wall
 
 from dragchain.errors import TableError
 from dragchain.tables.network_contacts import KINDS, Corrections, contact_rows, count_corrections
-from dragdeck.physics.coulomb import FrictionLimit
+from dragdeck.study.contact_law import FrictionLimit
 
 PARTICLES = (
     *("particle_id", "x_m", "y_m", "z_m", "radius_m"),

@@ -8,7 +8,7 @@ from made_frames import frame
 from dragchain.errors import TableError
 from dragchain.tables.workpiece_contacts import WallContacts, WorkpieceFrames, join_workpiece_frames
 from dragdeck.dumps.frame import Frame
-from dragdeck.physics.coulomb import FrictionLimit
+from dragdeck.study.contact_law import FrictionLimit
 
 PARTICLES = ("particle_id", "x_m", "y_m", "z_m", "radius_m", "force_x_n", "force_y_n", "force_z_n")
 CONTACTS = (

@@ -10,8 +10,10 @@ import pytest
 from made_run import particles_kept, run_json
 
 from dragchain.errors import TableError
-from dragchain.tradeoff.measure_run import CountedPath, band_pass, write_measures
-from dragchain.tradeoff.measures import QUANTITIES, Measures
+from dragchain.quantities.along import CountedPath, band_pass
+from dragchain.quantities.registry import COMPARED
+from dragchain.tradeoff.measure_run import write_measures
+from dragchain.tradeoff.measures import Measures
 from dragdeck.records.packing import Packing
 
 SPACING, COUNT = 0.1, 600
@@ -81,7 +83,7 @@ def test_a_block_is_whole_wherever_the_table_is_cut(cuts: list[int]) -> None:
 
 
 def test_squares_are_rooted_after_their_mean() -> None:
-    named = {quantity.name: quantity for quantity in QUANTITIES}
+    named = {quantity.name: quantity for quantity in COMPARED}
     blocks = np.array([1.0, 7.0])
     assert named["drag_mean"].of_blocks(blocks) == 4.0
     assert named["drag_std"].of_blocks(blocks) == 2.0
@@ -102,7 +104,7 @@ def test_a_run_by_hand(tiny_run: Path) -> None:
     """One contact of (4 N + 1e5 N/m workpiece_x) / 3, seven frames and 31 samples of the force."""
     found = measured(tiny_run)
     blocks = {name: values[0] for name, values in found.blocks.items()}
-    assert set(blocks) | set(found.single) == {quantity.name for quantity in QUANTITIES}
+    assert set(blocks) | set(found.single) == {quantity.name for quantity in COMPARED}
     assert found.arc_m == pytest.approx(6.2e-6) and found.block_m == found.arc_m
     assert blocks["drag_mean"] == pytest.approx(-1.5)
     assert blocks["drag_std"] == pytest.approx((31**2 - 1) / 12 / 150**2)

@@ -11,9 +11,15 @@ from figure_files import case_json
 from paths import WINDOWS_RECORD
 from report_files import ASKED
 
-from dragchain.report.values import EXTRAPOLATED, Extrapolated, ExtrapolatedQuantity, Need, Reached
+from dragchain.quantities.along import PathQuantities
+from dragchain.quantities.document import (
+    EXTRAPOLATED,
+    Extrapolated,
+    ExtrapolatedQuantity,
+    Need,
+    Reached,
+)
 from dragchain.statistics.estimate import Estimate
-from dragchain.tradeoff.measures import PathQuantities
 from dragchain.windows import extrapolate
 from dragchain.windows.estimate import Round, WindowOfRun
 from dragchain.windows.extrapolate import extrapolate_run

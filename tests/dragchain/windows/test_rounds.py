@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 from paths import WINDOWS_RECORD
 
-from dragchain.tradeoff.measures import PathQuantities
+from dragchain.quantities.along import PathQuantities
 from dragchain.windows.estimate import Round, WindowOfRun, WindowsRecord
 from dragchain.windows.rounds import judged, unsettled
 

@@ -221,7 +221,7 @@ def asking(small: dict[str, Any], write_study: Write, tradeoff: TradeoffRecord) 
 
 
 def test_a_study_that_asks_gets_settings_and_remembers(asking: Case) -> None:
-    assert asking.asked == asked(0.05, quantity=SEVERAL)
+    assert asking.requested == asked(0.05, quantity=SEVERAL)
     assert PROCESS.run_id(asking).startswith("tolerance-0.05-")
     said = process_scene(asking).case
     assert said.fidelity.name == asking.fidelity_name
@@ -233,7 +233,7 @@ def test_a_study_that_asks_gets_settings_and_remembers(asking: Case) -> None:
 
 
 def test_the_question_is_part_of_the_process_alone(asking: Case) -> None:
-    plain = replace(asking, asked=None, advised=None)
+    plain = replace(asking, requested=None, advised=None)
     differing = {
         scene for scene in SCENES if SCENES[scene].digest(plain) != SCENES[scene].digest(asking)
     }

@@ -5,7 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from dragdeck.physics.coulomb import FrictionLimit, within_friction
+from dragdeck.physics.coulomb import within_friction
+from dragdeck.study.contact_law import FrictionLimit
 
 Z = np.array([[0.0, 0.0, 1.0]])
 

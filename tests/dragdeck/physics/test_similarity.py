@@ -8,7 +8,7 @@ from made_study import Made
 
 from dragdeck.cases.bed import softest_scale
 from dragdeck.cases.case import Case
-from dragdeck.physics.contact_mechanics import SOLID_FRACTION_ESTIMATE
+from dragdeck.physics.estimates import SOLID_FRACTION_ESTIMATE
 from dragdeck.physics.rounding import rounded
 from dragdeck.scenes.workpiece import describe
 

@@ -15,7 +15,7 @@ from dragdeck.cases.case import Case, of_each_workpiece
 from dragdeck.errors import InputError
 from dragdeck.project import Project
 from dragdeck.scenes.filling import FILLING
-from dragdeck.scenes.lead import RAMP_STAGES, covered, led, step_at, windows_of
+from dragdeck.scenes.lead import RAMP_STAGES, covered, step_at, windows_of, with_lead
 from dragdeck.scenes.motion import course
 from dragdeck.scenes.process import PROCESS, process_scene
 from dragdeck.scenes.workpiece import reference_height
@@ -57,7 +57,7 @@ def made(small: dict[str, Any], write_study: Callable[..., Path]) -> Make:
 @pytest.mark.parametrize("path", PATHS)
 @pytest.mark.parametrize("more", [{}, {"orientation": "fixed"}, {"spin": {"rpm": 100}}])
 def test_a_run_begins_where_its_course_is(path: str, more: Json, made: Make) -> None:
-    case = led(made(STIFF, path=PATHS[path], **more))
+    case = with_lead(made(STIFF, path=PATHS[path], **more))
     scene, way = process_scene(case, BED), course(case.study, BED)
     (body,), entry = scene.deck.workpieces, scene.deck.entry_step
     place, rotation = way.poses(way.legs[-1], np.array([entry - way.drag.start]))
@@ -69,7 +69,7 @@ def test_a_run_begins_where_its_course_is(path: str, more: Json, made: Make) -> 
 
 def test_a_run_begins_with_an_inclined_workpiece_as_far_as_it_has_spun(made: Make) -> None:
     """The mesh is turned about its axis first, and then with the path."""
-    case = led(made(STIFF, path=PATHS["circle"], tilt_deg=20, spin={"rpm": 100}))
+    case = with_lead(made(STIFF, path=PATHS["circle"], tilt_deg=20, spin={"rpm": 100}))
     scene = process_scene(case, BED)
     way = course(case.study, BED, reference_height(case))
     (body,), entry = scene.deck.workpieces, scene.deck.entry_step
@@ -92,14 +92,14 @@ def test_the_moduli_are_raised_to_those_of_the_run(made: Make, project: Project)
     ratios = [after / before for before, after in pairwise(moduli)]
     assert ratios == pytest.approx([100 ** (1 / RAMP_STAGES)] * (RAMP_STAGES - 1), rel=1e-9)
     assert [float(one) for one in stages[-1][:2]] == [77e9, 210e9]
-    steps = covered(led(case), course(case.study, BED).drag)
+    steps = covered(with_lead(case), course(case.study, BED).drag)
     assert int(stages[-1][2]) == steps.ramp_end < steps.counted < steps.end
     assert text.index("dump write_particles") > text.rindex("youngsModulus")
     assert f'"reset_timestep {steps.entry}"' in text
 
 
 def test_a_lead_is_soft_and_ends_where_the_run_goes_on(made: Make, project: Project) -> None:
-    case = led(made(STIFF))
+    case = with_lead(made(STIFF))
     lead = case.lead
     assert lead is not None
     scene = process_scene(lead, BED)
@@ -120,7 +120,7 @@ def test_a_lead_is_soft_and_ends_where_the_run_goes_on(made: Make, project: Proj
 
 def test_a_run_that_begins_softer_is_filled_like_a_plain_one(made: Make) -> None:
     plain, stiff, soft = made({**STIFF, "soft_start": None}), made(STIFF), made(SOFT)
-    alike = [plain, stiff, led(stiff).lead, soft, *windows_of(soft)]
+    alike = [plain, stiff, with_lead(stiff).lead, soft, *windows_of(soft)]
     fillings = {FILLING.run_id(case) for case in alike if case}
     assert fillings == {FILLING.run_id(plain)}
     assert FILLING.build(soft, None).deck.materials.youngs_modulus_scale == 1
@@ -143,13 +143,13 @@ def test_nothing_is_counted_before_the_bed_has_settled(made: Make) -> None:
     case = made(STIFF, transient_m=0.0)
     scene = process_scene(case, BED)
     drag = scene.case.phases[-1]
-    steps = covered(led(case), course(case.study, BED).drag)
+    steps = covered(with_lead(case), course(case.study, BED).drag)
     counted = drag.start_step + scene.case.statistics.transient_s / scene.deck.timestep_s
     assert counted == pytest.approx(steps.counted) and steps.counted > steps.ramp_end
 
 
 def test_windows_lie_beside_each_other_on_the_counted_path(made: Make) -> None:
-    case = led(made(SOFT))
+    case = with_lead(made(SOFT))
     found = windows_of(case)
     assert 2 <= len(found) <= WINDOWS["most"]
     assert {PROCESS.run_id(one.lead) for one in found if one.lead} == {PROCESS.run_id(case)}

@@ -89,7 +89,7 @@ def test_the_last_pose_is_the_end_of_the_path(
     assert shown[-1, :2] == pytest.approx(end[:2], abs=1e-12)
     drag = course(case.study, BED).drag
     assert drag.speed_m_s == pytest.approx(
-        factor * case.study.motion.axis_speed_m_s, rel=0.6 / (drag.end - drag.start)
+        factor * case.study.motion.nominal_speed_m_s, rel=0.6 / (drag.end - drag.start)
     )
 
 

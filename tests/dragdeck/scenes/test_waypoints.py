@@ -252,7 +252,7 @@ def test_a_stretch_that_is_hardly_meant_gives_a_warning(made: Made) -> None:
 def test_speeds_follow_from_the_times(made: Made) -> None:
     case = made()
     motion, peak = case.study.motion, math.hypot(0.008, 0.001) / 0.2
-    assert motion.axis_speed_m_s == pytest.approx(LENGTH / 0.7)
+    assert motion.nominal_speed_m_s == pytest.approx(LENGTH / 0.7)
     assert motion.path_length_m == pytest.approx(LENGTH)
     assert surface_speed(motion, 0.004) == pytest.approx(peak)
     assert fastest_motion(case) == pytest.approx(0.1)  # the plunge
@@ -367,4 +367,4 @@ def test_a_drag_at_another_pace_and_length(made: Made) -> None:
     own = made(points=[[0, 0, 0], [100, 0, 0], [101, 0.01, 0]], motion={"transient_m": 0.0})
     motion = own.study.motion.at(2.0, 0.004)
     assert motion.path_length_m == pytest.approx(0.004)
-    assert motion.axis_speed_m_s == pytest.approx(2 * own.study.motion.axis_speed_m_s)
+    assert motion.nominal_speed_m_s == pytest.approx(2 * own.study.motion.nominal_speed_m_s)

@@ -26,7 +26,6 @@ from dragdeck.engine.process import command, execute, find_engine
 from dragdeck.engine.run_folder import run
 from dragdeck.errors import InputError
 from dragdeck.physics.contact_mechanics import effective_modulus, pull_off_force
-from dragdeck.physics.coulomb import FrictionLimit
 from dragdeck.project import Project
 from dragdeck.scenes.filling import bond_numbers, filling_scene
 from dragdeck.scenes.process import SCENES, process_scene
@@ -37,6 +36,7 @@ from dragdeck.study.contact_law import (
     Coefficient,
     Contact,
     Floats,
+    FrictionLimit,
     Pair,
     RollingModel,
     added_forces,

@@ -107,7 +107,9 @@ def test_a_study_that_extends_itself_is_offered_others_only(extend: Callable[...
     extend("extends: small\n", "childe")
     with pytest.raises(InputError) as caught:
         load_cases(extend("extends: child\n"))
-    assert caught.value.limit == "did you mean 'childe'? one of: childe, small"
+    offered, _, others = str(caught.value.limit).partition(", small")  # those of dragdeck
+    assert offered == "did you mean 'childe'? one of: childe"
+    assert "child," not in others
 
 
 def test_an_error_names_the_file_and_line_that_has_the_value(extend: Callable[..., Path]) -> None:

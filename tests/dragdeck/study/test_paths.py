@@ -70,7 +70,7 @@ def test_what_a_path_says_of_itself_follows_from_its_poses(path: dict[str, Any])
     own, speeds = way.motion.path, np.linalg.norm(np.diff(places, axis=0), axis=1) / STEP_S
     if "fraction" not in path:  # of recorded paths, lengths are those at the mean speed
         assert speeds.sum() * STEP_S == pytest.approx(own.path_length_m, rel=1e-6)
-        assert speeds.mean() == pytest.approx(way.motion.axis_speed_m_s, rel=1e-4)
+        assert speeds.mean() == pytest.approx(way.motion.nominal_speed_m_s, rel=1e-4)
         assert speeds.max() / speeds.mean() == pytest.approx(own.peak_speed_ratio, rel=1e-4)
     assert speeds.max() == pytest.approx(way.fastest_m_s, rel=1e-6)
     assert places[0, :2] == pytest.approx(own.start_point, abs=1e-15)

@@ -5,7 +5,7 @@ import json
 import os
 import resource
 import shutil
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -19,6 +19,9 @@ from paths import DATA, PROJECT, ROOT
 from attack.calls import Said, call, command, main_of
 from dragdeck.project import Project
 from dragdeck.scenes.process import SCENES
+
+SEED = int(os.environ.get("ATTACK_SEED", "13"))
+"""Of the random choices of the attacks."""
 
 STUDY = "tiny"
 TINY_STUDY = DATA / "tiny_study.yaml"
@@ -56,16 +59,36 @@ class Phase:
 
 
 @dataclass(frozen=True)
-class Ground:
-    """A project in which the tiny study was made command by command, and nothing disturbed."""
+class Undisturbed:
+    """The tiny study as it was made command by command, with what resumed runs must give.
+
+    LIGGGHTS gives the same digits every time from the same start, and others after a resume.
+    What a killed run must give is therefore what the engine gives that is stopped and
+    resumed at the same steps: alone, with every checkpoint kept.
+    """
 
     root: Path
     phases: Mapping[str, Phase]
+
+    @property
+    def cache(self) -> Path:
+        """Folder of the resumed runs."""
+        return self.root.parent
 
     def run(self, place: str) -> str:
         """Path of the one run folder of a scene from the project's folder."""
         (folder,) = (self.root / "results" / STUDY / place).iterdir()
         return str(folder.relative_to(self.root))
+
+    def phase(self, place: str) -> Phase:
+        """The command that runs the engine for a scene."""
+        return self.phases[place.replace("_", " ")]
+
+    def after(self, phase: Phase) -> Sequence[str]:
+        """Files of the project after a phase."""
+        order = [*self.phases]
+        following = order[order.index(phase.name) + 1 :]
+        return self.phases[following[0]].before if following else files_of(self.root)
 
     def copy_before(self, phase: Phase, target: Path) -> Path:
         """A copy of the project as it was before a phase."""
@@ -74,6 +97,36 @@ class Ground:
     def copy(self, target: Path) -> Path:
         """A copy of the finished project."""
         return _copied(self.root, files_of(self.root), target)
+
+    def tables(self, place: str, steps: Sequence[int]) -> Path:
+        """Folder of the tables of a run that was resumed at these steps."""
+        run, name = self.run(place), "-".join([place, "from", "0", *map(str, steps)])
+        with made_once(self.cache / name) as project:
+            if project is not None:
+                self._resume(place, steps, project)
+        return self.cache / name / run / "tables"
+
+    def _resume(self, place: str, steps: Sequence[int], project: Path) -> None:
+        run = self.run(place)
+        folder = self.copy(project) / run
+        shutil.rmtree(folder / "tables")
+        for file in self._checkpoints(place) if steps else ():
+            shutil.copy2(file, folder / file.name)
+        for part, step in enumerate(steps, 2):
+            _engine(folder, part, f"checkpoint.{step}.restart")
+            if place == "filling":  # only the part that ends writes the settled particles
+                (folder / f"particles.{part - 1}.bin").unlink()
+        said = main_of("dragchain", ["tables", run], project)
+        assert said.status == 0, said.text
+
+    def _checkpoints(self, place: str) -> Iterator[Path]:
+        """Every checkpoint of an undisturbed run."""
+        folder = self.cache / f"{place}-checkpoints"
+        with made_once(folder) as project:
+            if project is not None:
+                self.copy_before(self.phase(place), project)
+                _engine(project / self.run(place), 1)
+        return (folder / self.run(place)).glob("checkpoint.*.restart")
 
 
 def files_of(root: Path) -> list[str]:
@@ -117,25 +170,27 @@ def write_study(project: Path, data: object, name: str = STUDY) -> Path:
 # --- making it ----------------------------------------------------------------------
 
 
-def shared_ground(base: Path, worker: str) -> Ground:
-    """The ground that all processes of one test session share; the first one makes it."""
-    folder = (base if worker == "master" else base.parent) / "attack-ground"
-    folder.mkdir(exist_ok=True)
-    with locked(folder / "lock"):
-        record = folder / "phases.json"
-        if not record.is_file():
-            phases = [asdict(phase) for phase in _make(folder / "project")]
-            record.write_text(json.dumps(phases))
-        known = [Phase(**phase) for phase in json.loads(record.read_text())]
-    return Ground(folder / "project", {phase.name: phase for phase in known})
+def undisturbed(folder: Path) -> Undisturbed:
+    """The study that all processes of one test session share; the first one makes it."""
+    record = folder / "project/phases.json"
+    with made_once(folder / "project") as project:
+        if project is not None:
+            record.write_text(json.dumps([asdict(phase) for phase in _make(project)]))
+    phases = [Phase(**phase) for phase in json.loads(record.read_text())]
+    return Undisturbed(folder / "project", {phase.name: phase for phase in phases})
 
 
 @contextmanager
-def locked(file: Path) -> Iterator[None]:
-    """One process at a time."""
-    with file.open("w") as stream:
+def made_once(folder: Path) -> Iterator[Path | None]:
+    """One process at a time: the folder while it is to be made, None when it has been."""
+    with folder.with_suffix(".lock").open("w") as stream:
         fcntl.flock(stream, fcntl.LOCK_EX)
-        yield
+        if (folder / "done").is_file():
+            yield None
+        else:
+            shutil.rmtree(folder, ignore_errors=True)
+            yield folder
+            (folder / "done").touch()
 
 
 def _make(root: Path) -> Iterator[Phase]:
@@ -204,15 +259,16 @@ def size_of(folder: Path) -> int:
 _VOLATILE = {"started", "wall_time_s", "cpu_time_s", "steps_per_s", "versions", "made", "written"}
 
 
-def differences(found: Path, wanted: Path, but: str = "") -> list[str]:
+def differences(found: Path, wanted: Path, names: Iterable[str] | None = None) -> list[str]:
     """What is not the same in two folders of tables, to the last bit of every column.
 
-    `but`: a file that is left out, from the folder.
+    `names`: of the files that are compared, all by default, from the folder.
     """
-    names = [str(file.relative_to(wanted)) for file in sorted(wanted.rglob("*"))]
-    kept = (".parquet", ".json", ".csv")
+    every = (str(file.relative_to(wanted)) for file in wanted.rglob("*"))
     problems = []
-    for name in (name for name in names if name.endswith(kept) and name != but):
+    for name in sorted(every if names is None else names):
+        if not name.endswith((".parquet", ".json", ".csv")):
+            continue
         if not (found / name).is_file():
             problems.append(f"{name} is missing")
         elif not name.endswith(".csv"):
@@ -254,65 +310,6 @@ def resumed_at(run_dir: Path) -> list[int]:
     while len(steps) > 1 and steps[1] == 0:  # a start that left no checkpoint was made again
         steps.pop(0)
     return steps[1:]
-
-
-class CleanRuns:
-    """The same runs by the engine alone: nobody kills it, and it keeps every checkpoint.
-
-    LIGGGHTS gives the same digits every time from the same start, and others after a resume.
-    What a killed run must give is therefore what the engine gives that is stopped and
-    resumed at the same steps.
-    """
-
-    def __init__(self, ground: Ground, cache: Path) -> None:
-        self.ground, self.cache = ground, cache
-
-    def tables(self, place: str, steps: Sequence[int]) -> Path:
-        """Folder of the tables of a run that was resumed at these steps."""
-        run = self.ground.run(place)
-        name = "-".join([place, "from", "0", *map(str, steps)])
-        project = self.cache / name
-        with locked(self.cache / f"{place}.lock"):
-            if not (project / "done").is_file():
-                shutil.rmtree(project, ignore_errors=True)
-                self._make(place, list(steps), project)
-                (project / "done").touch()
-        return project / run / "tables"
-
-    def _make(self, place: str, steps: list[int], project: Path) -> None:
-        run = self.ground.run(place)
-        folder = self.ground.copy(project) / run
-        shutil.rmtree(folder / "tables")
-        kept = self._checkpoints(place) if steps else folder
-        for part, step in enumerate(steps, 2):
-            self._resume(folder, kept, part, step)
-            kept = folder
-            if place == "filling":  # only the part that ends writes the settled particles
-                (folder / f"particles.{part - 1}.bin").unlink()
-        self._analyse(project, run)
-
-    def _checkpoints(self, place: str) -> Path:
-        """A run folder with every checkpoint of an undisturbed run."""
-        project = self.cache / f"{place}-checkpoints"
-        run = self.ground.run(place)
-        if not (project / "done").is_file():
-            shutil.rmtree(project, ignore_errors=True)
-            self.ground.copy_before(self.ground.phases[place.replace("_", " ")], project)
-            _engine(project / run, 1)
-            (project / "done").touch()
-        return project / run
-
-    @staticmethod
-    def _resume(folder: Path, kept: Path, part: int, step: int) -> None:
-        for file in kept.glob("checkpoint.*.restart"):
-            if kept != folder:
-                shutil.copy2(file, folder / file.name)
-        _engine(folder, part, f"checkpoint.{step}.restart")
-
-    @staticmethod
-    def _analyse(project: Path, run: str) -> None:
-        said = main_of("dragchain", ["tables", run], project)
-        assert said.status == 0, said.text
 
 
 def _engine(folder: Path, part: int, source: str | None = None) -> Said:

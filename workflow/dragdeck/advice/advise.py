@@ -98,8 +98,8 @@ class Work:
         entry_s = (
             expected_surface(study) / motion.plunge_speed_m_s + way / motion.approach_speed_m_s
         )
-        process_s = entry_s + motion.path_length_m / motion.axis_speed_m_s + motion.ramp_s / 2
-        facets = sum(workpiece_facets(one) for one in of_each_workpiece(case))
+        process_s = entry_s + motion.path_length_m / motion.nominal_speed_m_s + motion.ramp_s / 2
+        facets = sum(workpiece_facets(workpiece) for workpiece in of_each_workpiece(case))
         return cls(study, tradeoff, expected_time(study), process_s, entry_s, facets)
 
     def steps(self, fidelity: Fidelity, windows: int = 0) -> float:
@@ -123,8 +123,8 @@ class Work:
                     "timestep_fraction": fidelity.windows.timestep_fraction,
                 }
             )
-            own = self.study.model_copy(update={"fidelity": stiff})
-            steps += windows * self._steps(own, window_fraction(study) * drag_s)
+            stiffer = self.study.model_copy(update={"fidelity": stiff})
+            steps += windows * self._steps(stiffer, window_fraction(study) * drag_s)
         return steps
 
     def cpu_time(self, fidelity: Fidelity, windows: int = 0) -> float:
@@ -236,8 +236,8 @@ def consistent(case: Case) -> Fidelity:
 def _remedies(case: Case) -> Iterator[Mapping[str, float]]:
     """What checks that a case's settings do not pass take; the next one may need less after it."""
     stable = stable_step_cautions(case, surely=True)
-    found = chain(filling_cautions(case), process_cautions(case), stable)
-    yield from (one.settings for one in found if one.settings)
+    cautions = chain(filling_cautions(case), process_cautions(case), stable)
+    yield from (caution.settings for caution in cautions if caution.settings)
 
 
 def _with(case: Case, **settings: float | str | SoftStart) -> Case:
@@ -275,7 +275,7 @@ def _step(stable: float) -> float:
     return min(rounded(stable, up=False), LARGEST_TIMESTEP_FRACTION)
 
 
-def process_option(case: Case, asked: Tolerance, tradeoff: TradeoffRecord) -> Option:
+def process_option(case: Case, requested: Tolerance, tradeoff: TradeoffRecord) -> Option:
     """The settings with which a tolerance is met in a case's own scene.
 
     A soft run over the whole path, and windows at the physical modulus until the tolerance is met.
@@ -287,8 +287,8 @@ def process_option(case: Case, asked: Tolerance, tradeoff: TradeoffRecord) -> Op
     plain = work.cpu_time(plain_option(case).fidelity)
     if stiff.soft_start is not None:
         windows = Windows(
-            tolerance=asked.tolerance,
-            quantities=list(asked.quantities),
+            tolerance=requested.tolerance,
+            quantities=list(requested.quantities),
             timestep_fraction=stiff.timestep_fraction,
         )
         windowed = soft.model_copy(update={"windows": windows})
@@ -341,7 +341,7 @@ class Advice:
 
     Attributes
     ----------
-    asked : Tolerance
+    requested : Tolerance
     chosen : Option
     reference : Option
         That costs are compared with; of a drop test, the finest.
@@ -349,7 +349,7 @@ class Advice:
         Why the reference was chosen.
     """
 
-    asked: Tolerance
+    requested: Tolerance
     chosen: Option
     reference: Option
     fallback: str | None = None
@@ -358,8 +358,8 @@ class Advice:
     def for_case(self) -> AdvisedSettings:
         """What ``case.json`` keeps of it."""
         return AdvisedSettings(
-            tolerance=self.asked.tolerance,
-            quantities=self.asked.quantities,
+            tolerance=self.requested.tolerance,
+            quantities=self.requested.quantities,
             error=self.chosen.error,
             relative_cost=self.chosen.relative_cost,
             largest_cost=self.chosen.largest_cost,
@@ -367,13 +367,13 @@ class Advice:
         )
 
 
-def resolve(case: Case, asked: Tolerance, tradeoff: TradeoffRecord | None = None) -> Case:
+def resolve(case: Case, requested: Tolerance, tradeoff: TradeoffRecord | None = None) -> Case:
     """The case with the settings that a tolerance asks for; it remembers the question.
 
     Parameters
     ----------
     case : Case
-    asked : Tolerance
+    requested : Tolerance
     tradeoff : TradeoffRecord, optional
         Instead of `measured_tradeoff`.
 
@@ -382,19 +382,19 @@ def resolve(case: Case, asked: Tolerance, tradeoff: TradeoffRecord | None = None
     InputError
         The quantities do not go together.
     """
-    advice = advised_settings(case, asked, tradeoff or measured_tradeoff())
+    advice = advised_settings(case, requested, tradeoff or measured_tradeoff())
     study = with_option(case.study, advice.chosen)
-    return replace(case, study=study, asked=asked, advised=advice.for_case)
+    return replace(case, study=study, requested=requested, advised=advice.for_case)
 
 
-def advised_settings(case: Case, asked: Tolerance, tradeoff: TradeoffRecord) -> Advice:
+def advised_settings(case: Case, requested: Tolerance, tradeoff: TradeoffRecord) -> Advice:
     """The settings for a tolerance.
 
     Parameters
     ----------
     case : Case
         Its own fidelity does not matter.
-    asked : Tolerance
+    requested : Tolerance
     tradeoff : TradeoffRecord
         Errors of the drop test, and what steps cost.
 
@@ -403,27 +403,31 @@ def advised_settings(case: Case, asked: Tolerance, tradeoff: TradeoffRecord) -> 
     InputError
         The quantities do not go together.
     """
-    if RESTITUTION not in asked.quantities:
-        return Advice(asked, process_option(case, asked, tradeoff), plain_option(case))
-    if len(asked.quantities) > 1:
+    if RESTITUTION not in requested.quantities:
+        return Advice(requested, process_option(case, requested, tradeoff), plain_option(case))
+    if len(requested.quantities) > 1:
         raise InputError(
             "the restitution is a quantity of the drop test, others are of the process",
             file=case.file,
             field="fidelity.quantity",
-            value=", ".join(asked.quantities),
+            value=", ".join(requested.quantities),
             limit=f"{RESTITUTION} alone, or quantities of the process",
             remedy="remove one of them",
         )
     finest = finest_drop(case, tradeoff)
-    good = [one for one in drop_options(case, tradeoff) if (one.error or 0.0) <= asked.tolerance]
+    good = [
+        option
+        for option in drop_options(case, tradeoff)
+        if (option.error or 0.0) <= requested.tolerance
+    ]
     if good:
-        return Advice(asked, min(good, key=lambda one: one.relative_cost), finest)
+        return Advice(requested, min(good, key=lambda option: option.relative_cost), finest)
     why = (
         "no measured time step has an error of the restitution below "
-        f"{shown_share(asked.tolerance)}: the smallest one is used, with "
+        f"{shown_share(requested.tolerance)}: the smallest one is used, with "
         f"{shown_share(finest.error or 0.0)}"
     )
-    return Advice(asked, finest, finest, why)
+    return Advice(requested, finest, finest, why)
 
 
 def shown_share(fraction: float) -> str:

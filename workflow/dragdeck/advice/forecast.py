@@ -40,7 +40,7 @@ def question(case: Case, tolerance: float | None, quantity: str | None) -> Toler
     pydantic.ValidationError
         The command line asks for what no study may.
     """
-    base = case.asked or _DEFAULT_TOLERANCE
+    base = case.requested or _DEFAULT_TOLERANCE
     named = {"tolerance": tolerance, "quantity": quantity}
     given = {name: value for name, value in named.items() if value is not None}
     return Tolerance.model_validate({**base.model_dump(), **given})
@@ -80,7 +80,9 @@ def _forecast(case: Case, role: str, option: Option, results: Path) -> OptionEnt
     about_drop = option.drop_timestep_fraction is not None
     for kind in [DROP_TEST] if about_drop else [FILLING, PROCESS]:
         runs = with_leads([chosen]) if kind is PROCESS else [chosen]
-        scenes = (kind.build(one, None) for one in runs if one.rank_of_window <= FIRST_WINDOWS)
+        scenes = (
+            kind.build(member, None) for member in runs if member.rank_of_window <= FIRST_WINDOWS
+        )
         speeds = measured_speeds(results / kind.name)
         costs = [expected_cost(kind, scene, speeds) for scene in scenes]
         steps[kind.name] = sum(cost.steps for cost in costs)
@@ -113,9 +115,9 @@ def advice_file(case: Case, cases: Sequence[AdvisedCase]) -> AdviceFile:
 
 def advice_tables(case: Case, advice: Advice, advised: AdvisedCase) -> Iterator[Table]:
     """What `./run dragdeck advise` prints of a case: the options, and what must be said of them."""
-    asked = advice.asked
-    what = ", ".join(asked.quantities)
-    title = f"{case.study_name} {case.name}: {what} within {shown_share(asked.tolerance)}"
+    requested = advice.requested
+    what = ", ".join(requested.quantities)
+    title = f"{case.study_name} {case.name}: {what} within {shown_share(requested.tolerance)}"
     table = Table(title=title, title_justify="left")
     for name in ("", "settings", "cost", "steps", "wall time"):
         table.add_column(name)
@@ -152,5 +154,5 @@ def _about(case: Case, advice: Advice, advised: OptionEntry) -> Iterator[tuple[s
     if skin := chosen.skin_m:
         yield "neighbour skin", f"{1e3 * skin:.3g} mm"
     yield "wall time", f"{runs}; speed: {advised.source}"
-    if case.asked is None:
+    if case.requested is None:
         yield "own fidelity", "the study sets no tolerance and keeps its own fidelity"

@@ -57,11 +57,11 @@ def bed_classes(study: Study) -> tuple[BedClass, ...]:
 @lru_cache(maxsize=2)
 def media_classes(media: Media, counts: tuple[int, ...]) -> tuple[BedClass, ...]:
     """`bed_classes` of the media and the number of particles of each class alone."""
-    found = []
+    classes = []
     for (name, part), count in zip(media.parts.items(), counts, strict=True):
         radii = few_sizes(part.radii(count)) if media.clumped else part.radii(count)
-        found.append(BedClass(name, str(part.material), radii, clump_of(part.shape)))
-    return tuple(found)
+        classes.append(BedClass(name, str(part.material), radii, clump_of(part.shape)))
+    return tuple(classes)
 
 
 @lru_cache(maxsize=32)
@@ -103,17 +103,18 @@ class BodySize(BodiesOfRun):
 
 def body_sizes(study: Study) -> list[BodySize]:
     """The particles of a study by class and size, if they are clumps; otherwise none."""
-    found: list[BodySize] = []
+    sizes: list[BodySize] = []
     body = sphere = 1
-    for one in bed_classes(study) if study.media.clumped else ():
-        material, kind = study.materials[one.material], 1 + study.type_names().index(one.material)
-        spheres = np.column_stack([one.clump.offsets, one.clump.radii])
+    for class_ in bed_classes(study) if study.media.clumped else ():
+        material = study.materials[class_.material]
+        kind = 1 + study.type_names().index(class_.material)
+        spheres = np.column_stack([class_.clump.offsets, class_.clump.radii])
         if len(spheres) == 1:
             spheres = np.vstack([spheres, _CORE * spheres])
-        for size, count in zip(*map(np.ndarray.tolist, np.unique(one.radii_m, return_counts=True)),
-                               strict=True):  # fmt: skip
+        rows = map(np.ndarray.tolist, np.unique(class_.radii_m, return_counts=True))
+        for size, count in zip(*rows, strict=True):
             mass, scaled = particle_mass(material, size), size * spheres
-            found.append(
+            sizes.append(
                 BodySize(
                     type=kind,
                     density_kg_m3=material.density_kg_m3,
@@ -122,28 +123,28 @@ def body_sizes(study: Study) -> list[BodySize]:
                     first_sphere=sphere,
                     radius_m=size,
                     mass_kg=mass,
-                    inertia_kg_m2=(mass * size**2 * one.clump.inertia).tolist(),
+                    inertia_kg_m2=(mass * size**2 * class_.clump.inertia).tolist(),
                     offsets_m=scaled[:, :3].tolist(),
                     radii_m=scaled[:, 3].tolist(),
                 )
             )
             body, sphere = body + count, sphere + count * len(spheres)
-    return found
+    return sizes
 
 
 def bed_radii(study: Study) -> Array:
     """Radii of a study's particles, class by class and ascending in each, (count,), m."""
-    return np.concatenate([one.radii_m for one in bed_classes(study)])
+    return np.concatenate([class_.radii_m for class_ in bed_classes(study)])
 
 
 def smallest_radius(study: Study) -> float:
     """Radius of the smallest sphere of the bed, m."""
-    return min(float(one.radii_m[0] * one.clump.radii.min()) for one in bed_classes(study))
+    return min(float(class_.radii_m[0] * class_.clump.radii.min()) for class_ in bed_classes(study))
 
 
 def farthest_point(study: Study) -> float:
     """Distance of the farthest point of a particle of the bed from its centre, m."""
-    return max(float(one.radii_m[-1]) * one.clump.reach for one in bed_classes(study))
+    return max(float(class_.radii_m[-1]) * class_.clump.reach for class_ in bed_classes(study))
 
 
 def typical_reach(study: Study) -> float:
@@ -156,9 +157,11 @@ def bed_rayleigh_time(study: Study) -> float:
     scale = study.chosen_fidelity().youngs_modulus_scale
     return min(
         rayleigh_time(
-            study.materials[one.material], float(one.radii_m[0]) * one.clump.timestep_radius, scale
+            study.materials[class_.material],
+            float(class_.radii_m[0]) * class_.clump.timestep_radius,
+            scale,
         )
-        for one in bed_classes(study)
+        for class_ in bed_classes(study)
     )
 
 
@@ -170,8 +173,8 @@ def bed_volume(study: Study) -> float:
 def bed_density(study: Study) -> float:
     """Mean density of the particles, weighted by volume, kg/m3."""
     classes = bed_classes(study)
-    volumes = [(one.radii_m**3).sum() for one in classes]
-    densities = [study.materials[one.material].density_kg_m3 for one in classes]
+    volumes = [(class_.radii_m**3).sum() for class_ in classes]
+    densities = [study.materials[class_.material].density_kg_m3 for class_ in classes]
     return densities[0] if len(densities) == 1 else float(np.average(densities, weights=volumes))
 
 
@@ -179,7 +182,7 @@ def expected_surface(study: Study) -> float:
     """Height of the settled bed before it exists, m: an estimate."""
     classes, parts = bed_classes(study), study.media.parts.values()
     levels = [part.radii(LEVELS) for part in parts]
-    numbers = np.repeat([len(one.radii_m) for one in classes], LEVELS)
+    numbers = np.repeat([len(class_.radii_m) for class_ in classes], LEVELS)
     solid = study.media.solid_fraction(np.concatenate(levels), numbers)
     return bed_height(bed_volume(study), study.bowl.radius_m, solid)
 

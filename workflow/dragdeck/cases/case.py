@@ -50,7 +50,7 @@ class Case:
         The sweep fields and their values in this case.
     study : Study
         With those values in place; its sweep is empty.
-    asked : Tolerance or None
+    requested : Tolerance or None
         What the settings in `study` were found for, if they were.
     advised : AdvisedSettings or None
         What is expected of them then.
@@ -73,7 +73,7 @@ class Case:
     file: Path
     settings: Mapping[str, Any]
     study: Study
-    asked: Tolerance | None = None
+    requested: Tolerance | None = None
     advised: AdvisedSettings | None = None
     beside: int = 1
     whole: "Case | None" = None
@@ -108,7 +108,7 @@ class Case:
     @property
     def axis_speed_m_s(self) -> float:
         """Speed at which the workpiece's axis is driven along its path, m/s."""
-        return self.study.motion.axis_speed_m_s * self.study.chosen_fidelity().speed_factor
+        return self.study.motion.nominal_speed_m_s * self.study.chosen_fidelity().speed_factor
 
     @property
     def study_name(self) -> str:
@@ -126,10 +126,10 @@ class Case:
     @property
     def fidelity_name(self) -> str:
         """Name of the fidelity; settings without a name are called by their values."""
-        if self.asked is not None:
-            name = f"tolerance-{self.asked.tolerance:g}"
-            default = self.asked.quantity == Tolerance.model_fields["quantity"].default
-            first, *others = self.asked.quantities
+        if self.requested is not None:
+            name = f"tolerance-{self.requested.tolerance:g}"
+            default = self.requested.quantity == Tolerance.model_fields["quantity"].default
+            first, *others = self.requested.quantities
             more = [f"and-{len(others)}-more"] if others else []
             return name if default else "-".join([name, first, *more])
         fidelity = self.study.fidelity

@@ -84,7 +84,11 @@ class Materials:
         moduli = [round_to(scale * modulus, 12) for modulus in self.youngs_moduli_pa]
         tables = [
             replace(
-                table, values=[softened(one, table.modulus_power, scale) for one in table.values]
+                table,
+                values=[
+                    softened(coefficient, table.modulus_power, scale)
+                    for coefficient in table.values
+                ],
             )
             for table in self.law.tables
             if table.modulus_power

@@ -40,7 +40,7 @@ def commands(deck: str) -> Iterator[EngineCommand]:
 
 
 def _commands(text: str, within: str) -> Iterator[EngineCommand]:
-    words = [next(filter(None, found), "") for found in _WORD.findall(text)]
+    words = [next(filter(None, groups), "") for groups in _WORD.findall(text)]
     if words:
         yield EngineCommand(text, words, within)
         for inner in _inner(words):
@@ -143,15 +143,17 @@ def contact_laws(deck: str) -> Iterator[list[str]]:
 
 def law_commands(deck: str) -> list[str]:
     """What sets the contact law in a deck: its commands, those of walls without their shapes."""
-    found = []
+    law_lines = []
     for command in commands(deck):
         kind = command.words[3:4]
         if command.words[0] in ("pair_style", "pair_coeff") or kind == ["property/global"]:
-            found.append(" ".join(command.words))
+            law_lines.append(" ".join(command.words))
         elif command.words[0] == "fix" and kind and kind[0].startswith("wall/gran"):
             text = " ".join(command.words[3:])
-            found.append(re.sub(r"(primitive type|mesh n_meshes) .*?(?=store_force |$)", "", text))
-    return list(dict.fromkeys(found))
+            law_lines.append(
+                re.sub(r"(primitive type|mesh n_meshes) .*?(?=store_force |$)", "", text)
+            )
+    return list(dict.fromkeys(law_lines))
 
 
 def _inner(words: list[str]) -> Iterator[str]:

@@ -84,7 +84,7 @@ class ColumnsFile(Document):
     @field_validator("outputs")
     @classmethod
     def _named(cls, outputs: Mapping[str, OutputOfRun]) -> Mapping[str, OutputOfRun]:
-        return {name: one.model_copy(update={"name": name}) for name, one in outputs.items()}
+        return {name: output.model_copy(update={"name": name}) for name, output in outputs.items()}
 
 
 @dataclass(frozen=True)
@@ -283,11 +283,11 @@ TOUCHES = ("touch_particles", "touch_contacts")
 
 def first_touch(first: int, last: int, several: bool) -> tuple[Output, ...]:
     """Contacts on the workpiece, and their particles, at every step of a part of the drag."""
-    found = (workpiece_particles(1, first, last), workpiece_contacts(1, first, last, several))
+    layouts = (workpiece_particles(1, first, last), workpiece_contacts(1, first, last, several))
     why = "the same at every step of a part of the drag, for touches.parquet"
     return tuple(
-        replace(one, name=name, purpose=why, waits=True, rows_per_particle=0.05)
-        for name, one in zip(TOUCHES, found, strict=True)
+        replace(layout, name=name, purpose=why, waits=True, rows_per_particle=0.05)
+        for name, layout in zip(TOUCHES, layouts, strict=True)
     )
 
 

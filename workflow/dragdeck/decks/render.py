@@ -121,14 +121,14 @@ def overriding(scene: AnyScene, templates: jinja2.Environment) -> set[str]:
 
 def effective(scene: AnyScene, templates: jinja2.Environment) -> set[str]:
     """Those of `overriding` without which the deck of the scene would be another one."""
-    whole, found = _rendered(scene, templates), set()
+    whole, names = _rendered(scene, templates), set()
     for name in overriding(scene, templates):
         try:
             changed = _rendered(scene, without(templates, name)) != whole
         except InputError:  # the others need it
             changed = True
-        found |= {name} if changed else set()
-    return found
+        names |= {name} if changed else set()
+    return names
 
 
 def idle(names: Iterable[str], templates: jinja2.Environment) -> Iterator[InputError]:
@@ -144,8 +144,8 @@ def idle(names: Iterable[str], templates: jinja2.Environment) -> Iterator[InputE
 
 def _added_forces(text: str) -> list[str]:
     """What the contact laws of a deck add to the force that limits friction."""
-    found = (contact_law.added_forces(law) for law in contact_laws(text))
-    return list(dict.fromkeys(force for each in found for force in each))
+    forces = (contact_law.added_forces(law) for law in contact_laws(text))
+    return list(dict.fromkeys(force for each in forces for force in each))
 
 
 def of_its_templates(
@@ -158,7 +158,11 @@ def of_its_templates(
     unchanged = {
         " ".join(["pair_style gran model", law.model, *options]),
         " ".join(["wall/gran model", law.model, "store_force yes", *options]),
-        *(one for one in law_commands(original) if one.startswith(("fix ", "pair_coeff"))),
+        *(
+            command
+            for command in law_commands(original)
+            if command.startswith(("fix ", "pair_coeff"))
+        ),
     }
     changed = tuple(command for command in law_commands(text) if command not in unchanged)
     known = _added_forces(original)  # each has its formula in dragdeck.study.contact_law
@@ -180,14 +184,14 @@ def changed_scripts(text: str, scene: AnyScene, templates: jinja2.Environment) -
         except InputError:  # the rest needs it
             return True
 
-    found = []
+    changed = []
     for name in sorted(overriding(scene, templates)):
         if changes(without(templates, name)):
             blocks = own_blocks(templates, name)
             named = [block for block in blocks if changes(without_block(templates, name, block))]
-            found.append(f"{name} ({', '.join(named)})" if named else name)
+            changed.append(f"{name} ({', '.join(named)})" if named else name)
     names = _used(scene, templates)
-    return *found, *(f"templates/{name} of the project" for name in edited(templates, names))
+    return *changed, *(f"templates/{name} of the project" for name in edited(templates, names))
 
 
 def write_workpiece(
@@ -212,9 +216,9 @@ def write_workpiece(
     outputs = {each.name: each.as_part() for each in scene.deck.outputs}
     forces = [outputs.pop(name) for name in list(outputs) if name.startswith(WORKPIECE_FORCE)]
     columns = ColumnsFile(outputs={**outputs, WORKPIECE_FORCE: forces[number - 1]})
-    own = of_its_templates(deck_text(scene, templates), scene, templates)
+    changed = of_its_templates(deck_text(scene, templates), scene, templates)
     texts = {
-        CASE_FILE: scene.case.model_copy(update=own).as_text(),
+        CASE_FILE: scene.case.model_copy(update=changed).as_text(),
         COLUMNS_FILE: columns.as_text(),
         **scene.texts(),
         **{
@@ -249,8 +253,8 @@ def write_run(scene: AnyScene, folder: Path, templates: jinja2.Environment) -> l
     source = folder / scene.deck.source
     if scene.deck.source not in texts and source.is_file():
         checksums[scene.deck.source] = file_checksum(source)
-    own = {"files": checksums, **of_its_templates(texts[DECK_FILE], scene, templates)}
-    texts[CASE_FILE] = scene.case.model_copy(update=own).as_text()
+    written = {"files": checksums, **of_its_templates(texts[DECK_FILE], scene, templates)}
+    texts[CASE_FILE] = scene.case.model_copy(update=written).as_text()
     for name, text in texts.items():
         write_text(folder / name, text)
     return [folder / name for name in texts]

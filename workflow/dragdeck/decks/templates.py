@@ -1,14 +1,13 @@
 """The templates of input scripts: what they may use, and whether a study's own fit the project's.
 
-A template is data: it runs in Jinja's sandbox, within limits of time and memory, and each value
-that it inserts passes `quoted`.
+A template is data: it runs in Jinja's sandbox for a limited time, and each value that it
+inserts passes `quoted`.
 """
 
 import contextlib
 import hashlib
 import math
 import re
-import resource
 import signal
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -17,7 +16,6 @@ from pathlib import Path
 from typing import Any
 
 import jinja2
-import psutil
 from jinja2 import nodes
 from jinja2.exceptions import SecurityError
 from jinja2.runtime import BlockReference, Context, Macro
@@ -39,8 +37,8 @@ _SHIPPED = Path(__file__).parents[1] / "data" / "templates.csv"
 _BASE = "base"
 """Prefix of the project's own templates, which a study's may replace."""
 
-_MOST_SECONDS, _MOST_BYTES = 3.0, 2**30
-"""Limits of rendering a script, far above its need: CPU time (s) and memory (bytes)."""
+_MOST_SECONDS = 3.0
+"""Limit of the CPU time of rendering a script, far above its need, s."""
 
 
 _FAILURES: Mapping[type[BaseException], tuple[str, str]] = {
@@ -48,7 +46,7 @@ _FAILURES: Mapping[type[BaseException], tuple[str, str]] = {
         "the template extends or calls itself endlessly",
         'extend "base/<name>" instead',
     ),
-    MemoryError: ("the template requires more memory than allowed", "make it smaller"),
+    MemoryError: ("the template requires more memory than there is", "make it smaller"),
     TimeoutError: (f"the template takes longer than {_MOST_SECONDS:g} s", "make it smaller"),
     SecurityError: (
         "is not allowed: ",
@@ -99,7 +97,7 @@ def environment(project: Path, study: Path | None = None) -> jinja2.Environment:
             jinja2.PrefixLoader({_BASE: jinja2.FileSystemLoader(str(project))}),
         ]
     )
-    found = _Sandbox(
+    sandbox = _Sandbox(
         loader=loader,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
@@ -109,12 +107,12 @@ def environment(project: Path, study: Path | None = None) -> jinja2.Environment:
         finalize=_inserted,
     )
     for name in _TRUSTING:
-        del found.filters[name]
-    found.filters.update(num=exact_number, nums=numbers, comment=comment)
+        del sandbox.filters[name]
+    sandbox.filters.update(num=exact_number, nums=numbers, comment=comment)
     if folders and study is not None:
         with template_errors(study):
-            _check_own(found, study, project)
-    return found
+            _check_own(sandbox, study, project)
+    return sandbox
 
 
 def exact_number(value: float) -> str:
@@ -163,7 +161,7 @@ def _inserted(context: Context, value: object) -> Markup:
 
 @contextlib.contextmanager
 def template_errors(template: Path | str) -> Iterator[None]:
-    """Limit what templates take, and turn what they raise into an error with file and line.
+    """Limit the time of templates, and turn what they raise into an error with file and line.
 
     Parameters
     ----------
@@ -176,7 +174,7 @@ def template_errors(template: Path | str) -> Iterator[None]:
         Whatever went wrong in the template.
     """
     try:
-        with _limited():
+        with _timed():
             yield
     except InputError:
         raise
@@ -201,23 +199,19 @@ def _place(error: Exception, template: Path | str) -> tuple[Path | str, str | No
 
 
 @contextlib.contextmanager
-def _limited() -> Iterator[None]:
-    """Let no template run for ever or fill the memory."""
+def _timed() -> Iterator[None]:
+    """Let no template run for ever: rendering would end without a word."""
 
     def stop(number: int, frame: object) -> None:
         raise TimeoutError
 
-    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
-    most = psutil.Process().memory_info().vms + _MOST_BYTES
     before = signal.signal(signal.SIGVTALRM, stop)
     try:
-        resource.setrlimit(resource.RLIMIT_AS, (most if soft < 0 else min(soft, most), hard))
         signal.setitimer(signal.ITIMER_VIRTUAL, _MOST_SECONDS, 1.0)
         yield
     finally:
         signal.setitimer(signal.ITIMER_VIRTUAL, 0)
         signal.signal(signal.SIGVTALRM, before)
-        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
 
 
 _REFERENCES = (nodes.Extends, nodes.FromImport, nodes.Import, nodes.Include)
@@ -231,8 +225,8 @@ def used(templates: jinja2.Environment, *names: str) -> list[str]:
     InputError
         One of them names a template that there is not.
     """
-    found = list(names)
-    for current in found:
+    used_names = list(names)
+    for current in used_names:
         for node in _parsed(templates, current).find_all(_REFERENCES):
             for name in _named(node):
                 if not _is_there(templates, name):
@@ -243,9 +237,9 @@ def used(templates: jinja2.Environment, *names: str) -> list[str]:
                         field=f"line {node.lineno}",
                         remedy=remedy,
                     )
-                if name not in found:
-                    found.append(name)
-    return found
+                if name not in used_names:
+                    used_names.append(name)
+    return used_names
 
 
 def _named(reference: nodes.Node) -> list[str]:
@@ -298,9 +292,9 @@ def own_blocks(templates: jinja2.Environment, name: str) -> list[str]:
 
 def without_block(templates: jinja2.Environment, name: str, block: str) -> jinja2.Environment:
     """The same templates, but one of them does not override a block."""
-    found = templates.overlay()
-    found.get_template(name).blocks.pop(block)
-    return found
+    copy = templates.overlay()
+    copy.get_template(name).blocks.pop(block)
+    return copy
 
 
 def edited(templates: jinja2.Environment, names: Iterable[str]) -> list[str]:
@@ -333,9 +327,9 @@ def _parsed(templates: jinja2.Environment, name: str) -> nodes.Template:
     assert templates.loader is not None
     file = name
     try:
-        source, found, _ = templates.loader.get_source(templates, name)
-        file = found or name
-        return _tree(templates, source, name, found)
+        source, name_of_file, _ = templates.loader.get_source(templates, name)
+        file = name_of_file or name
+        return _tree(templates, source, name, name_of_file)
     except (RecursionError, UnicodeDecodeError) as error:
         problem = "not UTF-8 text" if isinstance(error, ValueError) else "nested too deeply"
         raise InputError(problem, file=file, remedy="see docs/reference/templates.md") from None
@@ -363,17 +357,17 @@ def _check_own(templates: jinja2.Environment, study: Path, project: Path) -> Non
     files = {str(file.relative_to(study)) for file in study.rglob("[!.]*") if file.is_file()}
     known = {str(file.relative_to(project)) for file in project.rglob("*.j2")}
     reached = set(used(templates, *sorted(files & known)))
-    found = [
+    problems = [
         InputError("no input script uses this file", file=study / name, limit=choices(name, known))
         for name in sorted(files - reached)
     ]
     for name in sorted(known):
         if (study / name).is_dir() or ((study / name).is_symlink() and not (study / name).exists()):
-            found.append(InputError("this is not a file", file=study / name))
+            problems.append(InputError("this is not a file", file=study / name))
     for name in sorted(files & reached):
-        found += _idle_parts(templates, name)
-    if found:
-        raise together(found)
+        problems += _idle_parts(templates, name)
+    if problems:
+        raise together(problems)
 
 
 def _idle_parts(templates: jinja2.Environment, name: str) -> Iterator[InputError]:

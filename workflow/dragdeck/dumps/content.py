@@ -93,11 +93,11 @@ class Cursor:
     def lines(self, count: int) -> Iterator[bytes]:
         """The next lines in pieces of whole ones; the last line may be cut at the end."""
         while count and (held := self.next_bytes()):
-            found = held.count(b"\n")
-            if found > count:
+            whole_lines = held.count(b"\n")
+            if whole_lines > count:
                 ends = np.flatnonzero(np.frombuffer(held, np.uint8) == ord("\n"))
                 piece = self._stream.read(int(ends[count - 1]) + 1)
-            elif found:
+            elif whole_lines:
                 piece = self._stream.read(held.rindex(b"\n") + 1)
             else:
                 piece = self._stream.readline(_LONGEST_LINE)

@@ -103,13 +103,13 @@ def _text_head(at: Cursor) -> tuple[int, int, list[int]]:
     at.item("BOX BOUNDS")
     for _ in range(3):
         at.line("the bounds of the box")
-    found = at.item("ENTRIES" if at.layout.kind == "local" else "ATOMS").split()[2:]
+    names = at.item("ENTRIES" if at.layout.kind == "local" else "ATOMS").split()[2:]
     header = at.layout.header
-    if sorted(found) != sorted(header):
+    if sorted(names) != sorted(header):
         at.fail(
-            f"the header names the columns {' '.join(found)}", f"{' '.join(header)} in any order"
+            f"the header names the columns {' '.join(names)}", f"{' '.join(header)} in any order"
         )
-    return step, rows, [found.index(name) for name in header]
+    return step, rows, [names.index(name) for name in header]
 
 
 def _row_lines(at: Cursor, rows: int) -> Iterator[bytes]:
@@ -120,8 +120,8 @@ def _row_lines(at: Cursor, rows: int) -> Iterator[bytes]:
             lines = piece.split(b"\n")
             row = next((n for n, line in enumerate(lines) if line.startswith(b"ITEM: ")), None)
             if row is not None:
-                found = lines[row][:119] + b"\n"
-                at.fail(f"row {done + row}: found {found!r}", f"{at.width} numbers")
+                shown = lines[row][:119] + b"\n"
+                at.fail(f"row {done + row}: found {shown!r}", f"{at.width} numbers")
         done, whole = done + piece.count(b"\n"), piece.endswith(b"\n")
         yield piece
     if done < rows or not whole:
@@ -171,16 +171,16 @@ def print_rows(at: Cursor, most: int = _BLOCK_ROWS) -> Iterator[PrintRows]:
     if not at.next_bytes():
         return
     header = list(at.layout.header)
-    found = at.line("a header line").lstrip("# ").split()
-    if found != header:
-        at.fail(f"the header is {' '.join(found)[:200]!r}", f"{' '.join(header)!r}")
+    columns = at.line("a header line").lstrip("# ").split()
+    if columns != header:
+        at.fail(f"the header is {' '.join(columns)[:200]!r}", f"{' '.join(header)!r}")
     at.offset = at.place
     yield PrintRows(b"", np.empty((at.width, 0)), at.offset)
     names = rb"[ \t]+".join(re.escape(name.encode()) for name in header)
     titles = re.compile(rb"^[# ]*" + names + rb"\s*?\n", re.MULTILINE)
     while text := b"".join(at.lines(most)):
         end = text.rfind(b"\n") + 1
-        places = [0, *(place for one in titles.finditer(text) for place in one.span()), end]
+        places = [0, *(place for edge in titles.finditer(text) for place in edge.span()), end]
         start = at.offset
         for first, last in zip(places[::2], places[1::2], strict=True):
             at.offset = start + first

@@ -69,8 +69,8 @@ def _one_by_one(text: bytes, width: int) -> Cells:
         except ValueError:
             numbers = []
         if len(numbers) != width or b"_" in line:
-            found = line[:120] + b"\n"
-            raise WrongRow(row, f"found {found!r}", f"{width} numbers")
+            shown = line[:120] + b"\n"
+            raise WrongRow(row, f"found {shown!r}", f"{width} numbers")
         rows.append(numbers)
     return np.ascontiguousarray(np.array(rows, dtype=np.float64).reshape(-1, width).T)
 

@@ -83,8 +83,8 @@ def read_prints(file: Path, layout: Layout, *, block_rows: int = 20_000) -> Iter
                 jumps = np.diff(rows.cells[0], prepend=last_step)
                 if (jumps <= 0).any():
                     row = int(np.flatnonzero(jumps <= 0)[0])
-                    found = f"the steps go back to {int(rows.cells[0, row])}"
-                    raise WrongRow(row, found, "rising steps")
+                    problem = f"the steps go back to {int(rows.cells[0, row])}"
+                    raise WrongRow(row, problem, "rising steps")
             except WrongRow as wrong:
                 at.frame += wrong.row
                 at.offset += len(first_rows(rows.text, wrong.row))
@@ -139,8 +139,8 @@ def dump_files(source: Path | str) -> list[Path]:
         files = [source] if source.is_file() else []
     else:
         name = re.compile(re.escape(before) + r"([0-9]+)" + re.escape(after))
-        found = [(name.fullmatch(file.name), file) for file in source.parent.glob(source.name)]
-        files = [file for _, file in sorted((int(m.group(1)), file) for m, file in found if m)]
+        matches = [(name.fullmatch(file.name), file) for file in source.parent.glob(source.name)]
+        files = [file for _, file in sorted((int(m.group(1)), file) for m, file in matches if m)]
     if not files:
         raise DumpError(source, "there is no such file", remedy="check the name of the dump")
     return files

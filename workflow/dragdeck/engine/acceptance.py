@@ -6,13 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
+from dragdeck.arrays import Floats, Ints
 from dragdeck.decks import CASE_FILE, PACKING_FILE
 from dragdeck.decks.outputs import WORKPIECE_FORCE, OutputOfRun
 from dragdeck.engine import log
 from dragdeck.engine.checkpoints import is_whole
 from dragdeck.engine.completeness import coverage, part_files, some_frames
-from dragdeck.physics.contact_mechanics import Floats, stability_number
-from dragdeck.physics.rigid import Ints, RigidBodies, pose
+from dragdeck.physics.contact_mechanics import stability_number
+from dragdeck.physics.rigid import RigidBodies, pose
 from dragdeck.physics.run_limits import SPEED_FACTOR
 from dragdeck.records.case import CaseOfRun
 from dragdeck.records.run import (
@@ -125,7 +126,7 @@ def _at_rest(screen: str) -> AcceptanceCheck:
 
 def _steady(samples: Sequence[log.Sample], asked: SteadyCriterion) -> AcceptanceCheck:
     """Whether the mean kinetic energy of a particle stays, from its first third to its last."""
-    energies = [one.mean_energy_j for one in samples if one.step > asked.from_step]
+    energies = [sample.mean_energy_j for sample in samples if sample.step > asked.from_step]
     third = len(energies) // 3
     drift = math.nan
     if third:
@@ -201,18 +202,18 @@ def _complete(
     folder: Path, name: str, output: OutputOfRun, parts: Sequence[RunPart]
 ) -> AcceptanceCheck:
     """Whether every promised step is there, in whichever part, and nothing else."""
-    found = coverage(folder, output, parts)
+    cover = coverage(folder, output, parts)
     (file,) = part_files(folder, {name: output}, parts[-1:])
-    passed, seen = False, f"to step {found.last}"
-    promised = output.last_step is not None and found.gap is None
+    passed, seen = False, f"to step {cover.last}"
+    promised = output.last_step is not None and cover.gap is None
     if not file.is_file() and not promised:  # a part from a checkpoint at the end writes nothing
         seen = f"no {file.name}"
-    elif found.problem:
-        seen = f"{file.name}, {found.problem}"
-    elif not found.steps:
+    elif cover.problem:
+        seen = f"{file.name}, {cover.problem}"
+    elif not cover.steps:
         seen = f"{file.name} is empty"
-    elif found.gap is not None:
-        seen = f"step {found.gap} is missing"
+    elif cover.gap is not None:
+        seen = f"step {cover.gap} is missing"
     else:
         passed = True
     limit = "every frame complete" if output.last_step is None else f"to step {output.last_step}"
@@ -227,13 +228,13 @@ def _stable_timestep(
     names = ("x_m", "y_m", "z_m", "radius_m", "particle_id")
     wanted = [particles.columns.index(name) for name in names]
     frames = some_frames(folder, particles, parts, _FRAMES)
-    found = [_stability_number(case, rows[:, wanted]) for rows in frames]
-    number, reason, limit = float(np.median(found or [0.0])), case.unsafe_timestep, "1"
+    numbers = [_stability_number(case, rows[:, wanted]) for rows in frames]
+    number, reason, limit = float(np.median(numbers or [0.0])), case.unsafe_timestep, "1"
     if number > 1:
         stable = f"{number**-2:.2g} times the time step is stable"
         limit = f"1; exceeded on purpose: {reason}" if reason else f"1; {stable}"
-    seen = f"stability number {number:.3g} of the contacts, median of {len(found)} frames"
-    passed, known = number <= 1 or bool(reason), found and math.isfinite(number)
+    seen = f"stability number {number:.3g} of the contacts, median of {len(numbers)} frames"
+    passed, known = number <= 1 or bool(reason), numbers and math.isfinite(number)
     return _check(
         "stable_timestep", "stable time step", passed, seen, limit,
         number=number if known else None,
@@ -247,8 +248,14 @@ def _stability_number(case: CaseOfRun, rows: Floats) -> float:
     rows = rows[np.argsort(rows[:, 4])] if case.bodies else rows
     ids = rows[:, 4].astype(np.int64)
     ids = case.body_of(ids) if case.bodies else ids
-    bodies = [*(one.name for one in case.classes), "bowl"] if case.classes else ["particle", "bowl"]
-    constants = [[one.contact_moduli[body] for body in bodies] for one in case.classes or (case,)]
+    bodies = (
+        [*(class_.name for class_ in case.classes), "bowl"]
+        if case.classes
+        else ["particle", "bowl"]
+    )
+    constants = [
+        [class_.contact_moduli[body] for body in bodies] for class_ in case.classes or (case,)
+    ]
     of_case = case.density_of(ids), case.bowl.radius_m, constants, case.timestep_s
     rigid = _rigid(case, rows[:, :3], ids) if case.bodies else None
     return stability_number(rows[:, :3], rows[:, 3], *of_case, case.class_of(ids), rigid)
@@ -257,12 +264,12 @@ def _stability_number(case: CaseOfRun, rows: Floats) -> float:
 def _rigid(case: CaseOfRun, places_m: Floats, body_id: Ints) -> RigidBodies:
     """The bodies of (N,) spheres in the order of their ids."""
     centres, masses, roots = [], [], []
-    for one in case.bodies:
-        centre, turned = pose(np.array(one.offsets_m), one.by_particle(places_m))
+    for body in case.bodies:
+        centre, turned = pose(np.array(body.offsets_m), body.by_particle(places_m))
         axes = turned.as_matrix()
         centres.append(centre)
-        masses.append(np.full(one.count, one.mass_kg))
-        roots.append(axes / np.sqrt(one.inertia_kg_m2) @ axes.transpose(0, 2, 1))
+        masses.append(np.full(body.count, body.mass_kg))
+        roots.append(axes / np.sqrt(body.inertia_kg_m2) @ axes.transpose(0, 2, 1))
     return RigidBodies(body_id - 1, *map(np.concatenate, (centres, masses, roots)))
 
 

@@ -101,8 +101,8 @@ def newest_checkpoint(
 
 def _checksum_in(file: Path) -> str | None:
     """The checksum in a checkpoint's name; None before it was checked."""
-    found = _NAME.fullmatch(file.name)
-    return found.group(2) if found else None
+    match = _NAME.fullmatch(file.name)
+    return match.group(2) if match else None
 
 
 def _checksum(file: Path) -> str:
@@ -159,8 +159,8 @@ def _lengths(stream: BinaryIO, end: int, least: int, most: int) -> list[int]:
     content = _read(stream, end - 4 - 8 * most, 8 * len(lengths))
     if not content:  # cut meanwhile
         return []
-    found: list[int] = lengths[np.frombuffer(content, "<i4")[::2] == lengths].tolist()
-    return found[::-1]
+    whole_lengths: list[int] = lengths[np.frombuffer(content, "<i4")[::2] == lengths].tolist()
+    return whole_lengths[::-1]
 
 
 def _particles(stream: BinaryIO, begin: int, doubles: int) -> int:

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
+from dragdeck.arrays import Floats
 from dragdeck.decks.outputs import OutputOfRun
 from dragdeck.dumps.content import Cursor
 from dragdeck.dumps.grammar import WholeFrames, frame_cells, whole_frames
-from dragdeck.physics.contact_mechanics import Floats
 from dragdeck.records.run import RunPart
 
 

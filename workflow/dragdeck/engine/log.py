@@ -52,8 +52,8 @@ class Loop:
 
 def loops(screen: str) -> list[Loop]:
     """The ``run`` commands that ended, in order."""
-    found = re.findall(r"^Loop time of (\S+) on \d+ procs for (\d+) steps", screen, re.MULTILINE)
-    return [Loop(float(seconds), int(steps)) for seconds, steps in found]
+    times = re.findall(r"^Loop time of (\S+) on \d+ procs for (\d+) steps", screen, re.MULTILINE)
+    return [Loop(float(seconds), int(steps)) for seconds, steps in times]
 
 
 def decomposition(screen: str) -> Decomposition | None:

@@ -224,8 +224,10 @@ class PartOfRun:
         """Note the checks, and that the run is complete or failed."""
         passed, told = all(check.passed for check in checks), causes(checks)
         checks = [
-            one.model_copy(update={"remedy": REMEDIES.get(one.code)}) if one in told else one
-            for one in checks
+            check.model_copy(update={"remedy": REMEDIES.get(check.code)})
+            if check in told
+            else check
+            for check in checks
         ]
         self._update(state="complete" if passed else "failed", checks=checks)
         if not passed:

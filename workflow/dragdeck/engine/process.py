@@ -108,20 +108,20 @@ def _version(path: str) -> str:
         timeout=60,
         env=_environment(words),
     )
-    found = re.search(r"LIGGGHTS[^\n]*?(\d+)\.(\d+)\.(\d+)", shown.stdout)
+    match = re.search(r"LIGGGHTS[^\n]*?(\d+)\.(\d+)\.(\d+)", shown.stdout)
     oldest = ".".join(map(str, OLDEST_VERSION))
-    if found is None:
+    if match is None:
         raise EngineError(
             f"{path} is not recognised as LIGGGHTS\n"
             f"  limit:  LIGGGHTS {oldest} or newer\n  remedy: correct {ENGINE_VARIABLE}"
         )
-    version = tuple(int(part) for part in found.groups())
+    version = tuple(int(part) for part in match.groups())
     if version < OLDEST_VERSION:
         raise EngineError(
-            f"{path} is too old\n  value:  {'.'.join(found.groups())}\n"
+            f"{path} is too old\n  value:  {'.'.join(match.groups())}\n"
             f"  limit:  {oldest} or newer\n  remedy: install a newer one"
         )
-    return ".".join(found.groups())
+    return ".".join(match.groups())
 
 
 def command(engine: Engine, deck: str, ranks: int, part: int, source: Path | None) -> list[str]:
@@ -143,8 +143,8 @@ def command(engine: Engine, deck: str, ranks: int, part: int, source: Path | Non
         words += ["-var", "resume", "1", "-var", "from", source.name]
     if ranks == 1:
         return words
-    if own := _own_launcher():
-        return [*own, "-n", str(ranks), *words]
+    if launcher_words := _own_launcher():
+        return [*launcher_words, "-n", str(ranks), *words]
     launcher = shutil.which("mpirun")
     if launcher is None:
         raise EngineError(
@@ -240,8 +240,8 @@ def _environment(words: list[str]) -> dict[str, str]:
     hold a lone engine in a Slurm step for a rank that ``srun`` started, and look for the
     others; ``mpirun`` would ask Slurm for nodes, and our ranks stay on this one.
     """
-    own = words[:1] == _own_launcher()[:1]
-    hidden = () if own else _QUEUE_VARIABLES
+    launched = words[:1] == _own_launcher()[:1]
+    hidden = () if launched else _QUEUE_VARIABLES
     seen = {name: value for name, value in os.environ.items() if not name.startswith(hidden)}
     allowed = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
     return {**seen, "OMP_NUM_THREADS": "1", **(allowed if os.geteuid() == 0 else {})}
@@ -317,12 +317,12 @@ def is_held(folder: Path) -> bool:
 
 def _engines_in(folder: Path) -> list[psutil.Process]:
     """Processes of this machine that run the deck of a folder."""
-    found = []
+    engines = []
     for process in psutil.process_iter():
         with contextlib.suppress(psutil.Error, OSError):
             if DECK_FILE in process.cmdline() and Path(process.cwd()).samefile(folder):
-                found.append(process)
-    return found
+                engines.append(process)
+    return engines
 
 
 def end_tree(top: psutil.Process) -> None:

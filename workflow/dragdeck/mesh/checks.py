@@ -105,15 +105,15 @@ def check(
     InputError
         For all errors found.
     """
-    found = findings(mesh, workpiece=workpiece, surroundings=surroundings)
+    problems = findings(mesh, workpiece=workpiece, surroundings=surroundings)
     errors = [
         InputError(problem, file=file, field=field, value=value, limit=limit, remedy=remedy)
-        for problem, value, limit, remedy, severity in found
+        for problem, value, limit, remedy, severity in problems
         if severity == "error"
     ]
     if errors:
         raise together(errors)
-    return found
+    return problems
 
 
 def findings(
@@ -133,15 +133,15 @@ def findings(
     broken = _empty(mesh) or _no_lengths(mesh)
     if broken:
         return broken
-    found = _implausible_size(mesh, surroundings) if surroundings else []
-    found += _degenerate(mesh) + _duplicates(mesh)
+    problems = _implausible_size(mesh, surroundings) if surroundings else []
+    problems += _degenerate(mesh) + _duplicates(mesh)
     sound = mesh.nondegenerate_faces(height=NODE_PRECISION_M) & mesh.unique_faces()
-    found += _sharp_angles(mesh, sound) + _overlaps(mesh, sound)
-    found += _crowded_edges(mesh)
+    problems += _sharp_angles(mesh, sound) + _overlaps(mesh, sound)
+    problems += _crowded_edges(mesh)
     if workpiece:
-        found += (_open_edges(mesh) + _several_bodies(mesh)) or _turned_normals(mesh)
-        found += _merged_nodes(mesh) + _lost_volume(mesh)
-    return sorted(found, key=lambda finding: finding.severity)
+        problems += (_open_edges(mesh) + _several_bodies(mesh)) or _turned_normals(mesh)
+        problems += _merged_nodes(mesh) + _lost_volume(mesh)
+    return sorted(problems, key=lambda finding: finding.severity)
 
 
 def _facets(
@@ -228,13 +228,13 @@ def _overlaps(mesh: Trimesh, sound: NDArray[np.bool_]) -> list[Finding]:
     """Find facets of one plane on the same side of the edge that they share."""
     nodes = np.asarray(mesh.vertices)
     start, end = (nodes[row] for row in mesh.face_adjacency_edges.T)
-    one, other = (nodes[row] - start for row in mesh.face_adjacency_unshared.T)
+    first, other = (nodes[row] - start for row in mesh.face_adjacency_unshared.T)
     edge = end - start
     # the cosine between edge x one and edge x other, by Lagrange's identity
     length = _dot(edge, edge)
-    along_one, along_other = _dot(edge, one), _dot(edge, other)
-    product = length * _dot(one, other) - along_one * along_other
-    squares = (length * _dot(one, one) - along_one**2) * (
+    along_one, along_other = _dot(edge, first), _dot(edge, other)
+    product = length * _dot(first, other) - along_one * along_other
+    squares = (length * _dot(first, first) - along_one**2) * (
         length * _dot(other, other) - along_other**2
     )
     with np.errstate(divide="ignore", invalid="ignore"):  # of facets without area
@@ -247,8 +247,8 @@ def _overlaps(mesh: Trimesh, sound: NDArray[np.bool_]) -> list[Finding]:
     return _facets(bad, problem, limit, "repair the mesh: one surface, without folds")
 
 
-def _dot(one: Floats, other: Floats) -> Floats:
-    return np.asarray(np.einsum("kc,kc->k", one, other))
+def _dot(first: Floats, other: Floats) -> Floats:
+    return np.asarray(np.einsum("kc,kc->k", first, other))
 
 
 def _edge_use(mesh: Trimesh) -> Integers:

@@ -175,8 +175,8 @@ def fit_clump(corners: Floats, count: int) -> Clump:
     mesh = body(corners)
     samples = np.asarray(sample_surface(mesh, _SAMPLES, seed=1)[0])
     starts, deepest = _inscribed(mesh, count)
-    found = [_fitted(samples, *start, _LARGEST * deepest) for start in starts]
-    fits = [(part * offsets, radii) for offsets, radii in found for part in _DRAWN]
+    candidates = [_fitted(samples, *start, _LARGEST * deepest) for start in starts]
+    fits = [(part * offsets, radii) for offsets, radii in candidates for part in _DRAWN]
     joined = [fit for fit in fits if _pieces(fit[0], _MARGIN * fit[1]) == 1]
     offsets, radii = min(
         joined or fits, key=lambda fit: float((_outside(samples, *fit) ** 2).sum())
@@ -190,13 +190,13 @@ def fit_clump(corners: Floats, count: int) -> Clump:
     left = _outside(samples, offsets, radii)
     union = points[_outside(points, offsets, radii) < 0]
     square = cell * np.einsum("pi,pj->ij", union, union)
-    tensor, own = np.trace(square) * np.eye(3) - square, np.asarray(mesh.moment_inertia)
+    tensor, inertia = np.trace(square) * np.eye(3) - square, np.asarray(mesh.moment_inertia)
     clump = Clump(
         offsets=offsets,
         radii=radii,
-        inertia=np.diag(own) / volume,
+        inertia=np.diag(inertia) / volume,
         volume_error=len(union) * cell / volume - 1,
-        inertia_error=float(np.linalg.norm(tensor - own, 2) / np.linalg.norm(own, 2)),
+        inertia_error=float(np.linalg.norm(tensor - inertia, 2) / np.linalg.norm(inertia, 2)),
         surface_rms=float(np.sqrt((left**2).mean())),
         left_out=float(left.max()),
         stands_out=float(-left.min()),
@@ -261,10 +261,10 @@ def _inscribed(mesh: Trimesh, count: int) -> tuple[list[tuple[Floats, Floats]], 
 
 def _outside(points: Floats, offsets: Floats, radii: Floats) -> Floats:
     """Distance of (N, 3) points from the union of spheres; negative within."""
-    found = np.full(len(points), np.inf)
+    distance = np.full(len(points), np.inf)
     for centre, radius in zip(offsets, radii, strict=True):
-        np.minimum(found, np.linalg.norm(points - centre, axis=1) - radius, out=found)
-    return found
+        np.minimum(distance, np.linalg.norm(points - centre, axis=1) - radius, out=distance)
+    return distance
 
 
 def _fitted(
@@ -273,21 +273,21 @@ def _fitted(
     """Spheres whose union comes as near to points of a surface as it can from this start."""
     from scipy.optimize import least_squares
 
-    def split(found: Floats) -> tuple[Floats, Floats]:
-        spheres = found.reshape(-1, 4)
+    def split(solution: Floats) -> tuple[Floats, Floats]:
+        spheres = solution.reshape(-1, 4)
         return spheres[:, :3], spheres[:, 3]
 
-    def distances(found: Floats) -> tuple[Floats, Floats, Floats]:
-        centres, sizes = split(found)
+    def distances(solution: Floats) -> tuple[Floats, Floats, Floats]:
+        centres, sizes = split(solution)
         away = samples[:, None] - centres[None]
         length = np.linalg.norm(away, axis=2)
         return away, length, length - sizes
 
-    def residuals(found: Floats) -> Floats:
-        return np.asarray(distances(found)[2].min(axis=1))
+    def residuals(solution: Floats) -> Floats:
+        return np.asarray(distances(solution)[2].min(axis=1))
 
-    def slopes(found: Floats) -> Floats:
-        away, length, left = distances(found)
+    def slopes(solution: Floats) -> Floats:
+        away, length, left = distances(solution)
         rows, nearest = np.arange(len(samples)), left.argmin(axis=1)
         slope = np.zeros((len(samples), len(radii), 4))
         slope[rows, nearest, :3] = -away[rows, nearest] / length[rows, nearest, None]

@@ -83,7 +83,7 @@ class EngineMesh:
 
         centres, bounds = self._spheres
         sizes = np.ceil(np.log2(bounds)).astype(np.int64)
-        found = np.full(len(points), np.inf)
+        distance = np.full(len(points), np.inf)
         for size in np.unique(sizes):
             facets = np.flatnonzero(sizes == size)
             tree, within = KDTree(centres[facets]), reach + 2.0**size
@@ -91,13 +91,13 @@ class EngineMesh:
                 some = KDTree(points[begin : begin + _AT_ONCE])
                 pairs = some.sparse_distance_matrix(tree, within, output_type="ndarray")
                 rows = begin + pairs["i"]
-                np.minimum.at(found, rows, self._distances(points[rows], facets[pairs["j"]]))
-        return np.where(found < reach, found, np.inf)
+                np.minimum.at(distance, rows, self._distances(points[rows], facets[pairs["j"]]))
+        return np.where(distance < reach, distance, np.inf)
 
     def _distances(self, points: Floats, facets: Integers) -> Floats:
         """(K,): the distance of each point from its facet; inf if it is at an inactive part."""
         corners, rows = self.corners[facets], np.arange(len(facets))
-        edges, lengths = (one[facets] for one in self._edges)
+        edges, lengths = (part[facets] for part in self._edges)
         to = points[:, None] - corners
         along = np.einsum("kec,kec->ke", to, edges)
         cosine = np.einsum("kc,kc->k", edges[:, 0], edges[:, 2])
@@ -265,7 +265,8 @@ def overlooked(mesh: Trimesh, radius_m: float, seed: int = 1) -> Overlooked:
     whole = replace(turned, edge_active=all_active, corner_active=all_active)
     at_edge = points[whole.nearest(points, radius_m) > (1 - 1e-6) * distance]
     lost = [
-        int(np.isinf(one.nearest(at_edge, radius_m)).sum()) for one in (EngineMesh.of(mesh), turned)
+        int(np.isinf(engine_mesh.nearest(at_edge, radius_m)).sum())
+        for engine_mesh in (EngineMesh.of(mesh), turned)
     ]
     return Overlooked(len(at_edge), *lost)
 
@@ -300,13 +301,13 @@ def report(
         f"{file.name}: {len(mesh.faces):,} facets, {_not_third(mesh):,} with an obtuse corner that "
         "is not the third"
     ]
-    found, spheres = overlooked(mesh, radius_m), f"spheres with a radius of {1e3 * radius_m:g} mm"
-    if found.positions:
+    places, spheres = overlooked(mesh, radius_m), f"spheres with a radius of {1e3 * radius_m:g} mm"
+    if places.positions:
         lines += [
-            f"contacts at convex edges that LIGGGHTS overlooks ({found.positions:,} positions, "
+            f"contacts at convex edges that LIGGGHTS overlooks ({places.positions:,} positions, "
             f"{spheres}):",
-            f"  as written: {_percent(found.as_written, found.positions)}",
-            f"  turned:     {_percent(found.turned, found.positions)}",
+            f"  as written: {_percent(places.as_written, places.positions)}",
+            f"  turned:     {_percent(places.turned, places.positions)}",
         ]
     else:
         lines.append("no convex edges, so that no contact is overlooked there")

@@ -84,10 +84,10 @@ def read(
 def _read_step(path: Path, unit: str, size_m: float | None, edge_size_m: float | None) -> Trimesh:
     assert size_m is not None, "a study with a STEP part states the size of its facets"
     _refuse_missing(path)
-    one = UNITS[unit]
-    found = mesh_step(path, unit, size_m / one, (edge_size_m or size_m) / one)
-    mesh = weld(surface(one * np.array(found["points"]), found["triangles"]))
-    mesh.metadata[CAD_VOLUME] = one**3 * found["volume"]
+    unit_m = UNITS[unit]
+    meshed = mesh_step(path, unit, size_m / unit_m, (edge_size_m or size_m) / unit_m)
+    mesh = weld(surface(unit_m * np.array(meshed["points"]), meshed["triangles"]))
+    mesh.metadata[CAD_VOLUME] = unit_m**3 * meshed["volume"]
     return mesh
 
 

@@ -230,9 +230,9 @@ def _side(sides: int, corner_radius_m: float, length_m: float, facet_size_m: flo
     points = np.concatenate([_ring(sides, corner_radius_m, z_m=z_m) for z_m in heights])
     lower = np.arange(levels * sides).reshape(levels, sides)
     beside = np.roll(lower, -1, axis=1)
-    one = np.stack([lower, beside, beside + sides], axis=-1)
+    lower_half = np.stack([lower, beside, beside + sides], axis=-1)
     other = np.stack([lower, beside + sides, lower + sides], axis=-1)
-    return surface(points, np.stack([one, other], axis=2))
+    return surface(points, np.stack([lower_half, other], axis=2))
 
 
 def _turned(mesh: Trimesh) -> Trimesh:

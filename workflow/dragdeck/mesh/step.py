@@ -62,10 +62,10 @@ def mesh_step(path: Path, unit: str, size: float, edge_size: float) -> step_mesh
         done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, check=False)
         if done.returncode or not answer.is_file():
             raise _broken(path, done.returncode, done.stderr.decode("ascii", "replace"))
-        found: Any = json.loads(answer.read_text(encoding="ascii"))
-    if "refused" in found:
-        raise _refused(path, *found["refused"])
-    meshed: step_mesher.Meshed = found
+        content: Any = json.loads(answer.read_text(encoding="ascii"))
+    if "refused" in content:
+        raise _refused(path, *content["refused"])
+    meshed: step_mesher.Meshed = content
     return meshed
 
 

@@ -69,12 +69,12 @@ def main(file: str, answer: str, unit: str, size: str, edge_size: str) -> None:
         Target edge length of the facets, and of those at sharp edges, in that unit.
     """
     resource.setrlimit(resource.RLIMIT_CPU, (CPU_LIMIT_S, CPU_LIMIT_S))
-    found: Meshed | dict[str, tuple[object, ...]]
+    meshed: Meshed | dict[str, tuple[object, ...]]
     try:
-        found = _mesh(_gmsh(), file, unit, float(size), float(edge_size))
+        meshed = _mesh(_gmsh(), file, unit, float(size), float(edge_size))
     except Refusal as refusal:
-        found = {"refused": refusal.args}
-    Path(answer).write_text(json.dumps(found), encoding="ascii")
+        meshed = {"refused": refusal.args}
+    Path(answer).write_text(json.dumps(meshed), encoding="ascii")
 
 
 def _gmsh() -> Any:
@@ -124,7 +124,7 @@ def _solid(gmsh: Any, file: str) -> int:
 def _refuse_too_many(gmsh: Any, size: float, edge_size: float, sharp: list[int]) -> None:
     """Refuse sizes that make too many facets; beside an edge, ``1 / size^2`` is integrated."""
     area, length = (
-        sum(gmsh.model.occ.getMass(dimension, one) for one in ones)
+        sum(gmsh.model.occ.getMass(dimension, entity) for entity in ones)
         for dimension, ones in ((2, [face for _, face in gmsh.model.getEntities(2)]), (1, sharp))
     )
     facets = (area / size**2 + 2 * _GROWTH * length * (1 / edge_size - 1 / size)) / 0.433
@@ -138,7 +138,7 @@ def _refuse_too_many(gmsh: Any, size: float, edge_size: float, sharp: list[int])
 def _set_sizes(gmsh: Any, size: float, edge_size: float) -> None:
     gmsh.option.setNumber("Mesh.MeshSizeMax", size)
     finer = edge_size < size
-    sharp = [one for _, one in gmsh.model.getEntities(1) if finer and _is_sharp(gmsh, one)]
+    sharp = [curve for _, curve in gmsh.model.getEntities(1) if finer and _is_sharp(gmsh, curve)]
     _refuse_too_many(gmsh, size, edge_size, sharp)
     if not sharp:
         return
@@ -159,10 +159,10 @@ def _is_sharp(gmsh: Any, curve: int) -> bool:
         return False
     start, end = gmsh.model.getParametrizationBounds(1, curve)
     middle = gmsh.model.getValue(1, curve, (start + end) / 2)
-    one, other = (
+    first, other = (
         gmsh.model.getNormal(face, gmsh.model.getParametrization(2, face, middle)) for face in faces
     )
-    return bool(np.dot(one, other) < np.cos(np.radians(_SHARP_DEG)))
+    return bool(np.dot(first, other) < np.cos(np.radians(_SHARP_DEG)))
 
 
 def _surface(gmsh: Any) -> tuple[list[list[float]], list[list[int]]]:

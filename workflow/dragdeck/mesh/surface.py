@@ -123,10 +123,10 @@ def _one_side(mesh: Trimesh) -> Trimesh | None:
     from trimesh.grouping import group_rows
 
     edges = group_rows(mesh.edges_sorted, require_count=2)
-    one, other = mesh.edges_face[edges].T
+    first, other = mesh.edges_face[edges].T
     count = len(mesh.faces)
     turned = count * (mesh.edges[edges[:, 0], 0] == mesh.edges[edges[:, 1], 0])
-    pairs = np.column_stack([one, other + turned, one + count, other + count - turned])
+    pairs = np.column_stack([first, other + turned, first + count, other + count - turned])
     label = connected_component_labels(pairs.reshape(-1, 2), node_count=2 * count)
     as_is, other_way = label.reshape(2, -1)
     if as_is[0] == other_way[0]:

@@ -55,13 +55,13 @@ def expected_cost(kind: SceneType, scene: StudyScene, speeds: Sequence[tuple[int
 
 def measured_speeds(results: Path) -> list[tuple[int, float]]:
     """Particles and steps per second of each complete run in a folder."""
-    found = []
+    speeds = []
     for file in results.glob("*/run.json"):
         with suppress(OSError, ValueError, LookupError, TypeError):  # damaged: tells nothing
             speed = json.loads(file.read_text(encoding="utf-8"))["steps_per_s"]
             media = json.loads(file.with_name("case.json").read_text(encoding="utf-8"))["media"]
-            found += [(int(media.get("spheres", media["count"])), float(speed))] if speed else []
-    return found
+            speeds += [(int(media.get("spheres", media["count"])), float(speed))] if speed else []
+    return speeds
 
 
 def price_of(name: str, tradeoff: TradeoffRecord | None) -> str:
@@ -123,7 +123,10 @@ def scene_lines(
         ("costs", [f"about {each} (speed {cost.basis})"]),
         ("models", scene.models),
     ]
-    rows += [("leaves out", scene.leaves_out), ("warning", [str(one) for one in scene.warnings])]
+    rows += [
+        ("leaves out", scene.leaves_out),
+        ("warning", [str(warning) for warning in scene.warnings]),
+    ]
     rows.append(("modulus", [reduced] if reduced else []))
     for name, texts in rows:
         if joined := "; ".join(texts):

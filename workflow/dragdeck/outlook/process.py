@@ -49,8 +49,8 @@ def _gap(case: Case, gap_m: float) -> str:
 
 def _between(case: Case) -> list[tuple[str, str]]:
     """The least gap between two of several workpieces."""
-    found = closest(of_each_workpiece(case), expected_bed(case.study))
-    return [("gap between workpieces", _gap(case, found[0]))] if found else []
+    nearest = closest(of_each_workpiece(case), expected_bed(case.study))
+    return [("gap between workpieces", _gap(case, nearest[0]))] if nearest else []
 
 
 def _rotation(case: Case) -> list[tuple[str, str]]:

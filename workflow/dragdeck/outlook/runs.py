@@ -13,7 +13,7 @@ from dragdeck.engine.status import RunStatus, run_status
 from dragdeck.errors import InputError
 from dragdeck.outlook.explain import Cost, expected_cost, measured_speeds
 from dragdeck.scenes.filling import FILLING
-from dragdeck.scenes.lead import led
+from dragdeck.scenes.lead import with_lead
 from dragdeck.scenes.scene import SceneType, StudyScene
 
 WAITING = RunStatus("waiting")
@@ -120,12 +120,12 @@ class StudyRun:
 
 def alike_but_for_seed(runs: Mapping[Path, Case]) -> list[dict[Path, Case]]:
     """Runs by their folders, those that differ in the seed alone together: they cost the same."""
-    found: dict[str, dict[Path, Case]] = {}
+    groups: dict[str, dict[Path, Case]] = {}
     for folder, case in runs.items():
         but_for_the_seed = case.study.model_copy(update={"seed": 0}).model_dump_json()
-        covers = led(case).stretch
-        found.setdefault(f"{but_for_the_seed} {covers.end - covers.begin:.6f}", {})[folder] = case
-    return list(found.values())
+        covers = with_lead(case).stretch
+        groups.setdefault(f"{but_for_the_seed} {covers.end - covers.begin:.6f}", {})[folder] = case
+    return list(groups.values())
 
 
 def written(kind: SceneType, scene: StudyScene) -> tuple[dict[str, OutputOfRun], int]:
@@ -160,7 +160,7 @@ def expected_runs(
         ranks = 1 if kind.single_particle else first.ranks
         for folder, case in group.items():
             after = folder.parents[1] / FILLING.name / FILLING.run_id(case)
-            if kind.needs_bed and (lead := led(case).lead):
+            if kind.needs_bed and (lead := with_lead(case).lead):
                 after = folder.parents[1] / kind.name / kind.run_id(lead)
             yield StudyRun(kind.name, folder, after if kind.needs_bed else None, ranks, cost, size)
 
@@ -199,7 +199,7 @@ def time_left(runs: Sequence[StudyRun], cores: int) -> float:
 def done_fraction(runs: Sequence[StudyRun]) -> float:
     """How much of the expected CPU time of runs is behind them."""
     work = [run.cost.wall_time_s * run.ranks for run in runs]
-    done = sum(run.fraction * one for run, one in zip(runs, work, strict=True))
+    done = sum(run.fraction * share for run, share in zip(runs, work, strict=True))
     return done / sum(work) if sum(work) else 1.0
 
 

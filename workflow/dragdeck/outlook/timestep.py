@@ -161,19 +161,19 @@ def largest_of_case(case: Case, kind: SceneType) -> float:
 def timestep_notes(case: Case, kind: SceneType, scene: StudyScene) -> list[tuple[str, str]]:
     """What ``check`` and ``explain`` say of a scene's time step: a heading and a text each."""
     step = scene.deck.timestep_s
-    found = [(pair.bodies, str(pair)) for pair in outlook(case, kind, step)]
+    pairs = [(pair.bodies, str(pair)) for pair in outlook(case, kind, step)]
     fraction, source = safe_fraction(case, kind)
     factor = stability_map().safety_factor
-    own = step / scene.case.rayleigh_time_s
-    verdict = "within" if own <= factor * fraction * (1 + 1e-9) else "ABOVE"
+    step_fraction = step / scene.case.rayleigh_time_s
+    verdict = "within" if step_fraction <= factor * fraction * (1 + 1e-9) else "ABOVE"
     text = (
-        f"{100 * own:.3g} % is {verdict} {100 * factor * fraction:.3g} %: "
+        f"{100 * step_fraction:.3g} % is {verdict} {100 * factor * fraction:.3g} %: "
         f"{factor:g} (safety factor) times the {100 * fraction:.3g} % measured to be "
         f"safe ({source})"
     )
     if kind.needs_bed:
         text += "; of a drag, the stable step decides"
-    return [*found, ("safe step", text)]
+    return [*pairs, ("safe step", text)]
 
 
 # --- stability of contacts -----------------------------------------------------------------------
@@ -224,11 +224,11 @@ def stable_step_cautions(case: Case, surely: bool = False) -> Iterator[Caution]:
 
 def stable_step_note(case: Case) -> tuple[str, str]:
     """What ``check`` and ``explain`` say of it: a heading and a text."""
-    own, limit = case.study.chosen_fidelity().timestep_fraction, stable_fraction(case)
-    verdict = "below" if own < limit else "NOT BELOW"
+    fraction, limit = case.study.chosen_fidelity().timestep_fraction, stable_fraction(case)
+    verdict = "below" if fraction < limit else "NOT BELOW"
     runs = stable_step_law().runs
     return "stable step", (
-        f"{100 * own:.3g} % is {verdict} {100 * limit:.3g} %, at which the contacts of this "
+        f"{100 * fraction:.3g} % is {verdict} {100 * limit:.3g} %, at which the contacts of this "
         f"packing become unstable (law of {runs} runs)"
     )
 

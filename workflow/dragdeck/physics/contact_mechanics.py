@@ -8,37 +8,40 @@ import math
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass
 from functools import partial
-from typing import TypeVar
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dragdeck.arrays import Floats, Ints
+from dragdeck.physics.estimates import COORDINATION_ESTIMATE, SOLID_FRACTION_ESTIMATE
 from dragdeck.physics.rigid import Levers, RigidBodies
-from dragdeck.study.shapes import SOLID_FRACTION_ESTIMATE
-from dragdeck.study.workpiece import Material
 
 Size = TypeVar("Size", float, NDArray[np.float64])
 
-COORDINATION_ESTIMATE = 5.0
-"""Contacts of a particle in a poured bed with friction, an estimate used only for expectations."""
+
+class Solid(Protocol):
+    """An elastic material."""
+
+    @property
+    def youngs_modulus_pa(self) -> float:
+        """Young's modulus, Pa."""
+
+    @property
+    def poissons_ratio(self) -> float:
+        """Poisson's ratio."""
+
+    @property
+    def density_kg_m3(self) -> float:
+        """Density of the solid, kg/m3."""
 
 
-@dataclass(frozen=True)
-class Elastic:
-    """Elastic constants of a material: Young's modulus, Pa, and Poisson's ratio."""
-
-    youngs_modulus_pa: float
-    poissons_ratio: float
-
-
-def shear_modulus(material: Material | Elastic, scale: float = 1.0) -> float:
+def shear_modulus(material: Solid, scale: float = 1.0) -> float:
     """Shear modulus G = E / (2 (1 + nu)), Pa, with E scaled by `scale`."""
     return scale * material.youngs_modulus_pa / (2 * (1 + material.poissons_ratio))
 
 
-def effective_modulus(
-    first: Material | Elastic, second: Material | Elastic, scale: float = 1.0
-) -> float:
+def effective_modulus(first: Solid, second: Solid, scale: float = 1.0) -> float:
     """Effective modulus of a contact, Pa (Johnson 1985, Contact Mechanics, eq. 4.21 ff.)."""
     compliance = sum(
         (1 - material.poissons_ratio**2) / (scale * material.youngs_modulus_pa)
@@ -56,15 +59,13 @@ def pull_off_force(slope_n_m: float, modulus_pa: float, reduced_radius_m: float)
     return slope_n_m**3 / (12 * modulus_pa**2 * reduced_radius_m)
 
 
-def effective_shear(
-    first: Material | Elastic, second: Material | Elastic, scale: float = 1.0
-) -> float:
+def effective_shear(first: Solid, second: Solid, scale: float = 1.0) -> float:
     """Effective shear modulus of a contact, Pa: 1 / G* sums (2 - nu) / G (Mindlin 1949)."""
     bodies = (first, second)
     return 1 / sum((2 - body.poissons_ratio) / shear_modulus(body, scale) for body in bodies)
 
 
-def rayleigh_time(material: Material, radius_m: float, scale: float = 1.0) -> float:
+def rayleigh_time(material: Solid, radius_m: float, scale: float = 1.0) -> float:
     """Travel time of a Rayleigh wave over half the circumference of a particle, s.
 
     ``pi R sqrt(rho / G) / (0.1631 nu + 0.8766)``, as in LIGGGHTS' ``fix check/timestep/gran``
@@ -75,7 +76,7 @@ def rayleigh_time(material: Material, radius_m: float, scale: float = 1.0) -> fl
     return math.pi * radius_m * wave / (0.1631 * material.poissons_ratio + 0.8766)
 
 
-def particle_mass(material: Material, radius_m: float) -> float:
+def particle_mass(material: Solid, radius_m: float) -> float:
     """Mass of a particle, kg."""
     return sphere_mass(radius_m, material.density_kg_m3)
 
@@ -173,7 +174,7 @@ def bed_overlap(modulus_pa: float, pressure_pa: float) -> float:
     return hertz_overlap(force, 0.25, modulus_pa)  # of particles with a diameter of 1
 
 
-def stiffness_number(material: Material, pressure_pa: float) -> float:
+def stiffness_number(material: Solid, pressure_pa: float) -> float:
     """How stiff particles are against the pressure on them: (E / ((1 - nu^2) p))^(2/3).
 
     Agnolin and Roux 2007, Physical Review E 76, 061302: its inverse goes as the
@@ -219,9 +220,6 @@ ENGINE_HARD_PA = 1e9
 
 # --- the contact network of a packing ------------------------------------------------------------
 
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 _TOLERANCE = 1e-3
 """Relative error of the largest eigenvalue, far below its scatter from frame to frame."""
@@ -306,12 +304,18 @@ def stability_number(
     if rigid is not None:
         of_bodies = np.append(1 / rigid.mass_kg, 0.0)
         inverse_mass = of_bodies[owner]
-    own = np.zeros(len(radius_m), dtype=np.int64) if classes is None else classes
+    number = np.zeros(len(radius_m), dtype=np.int64) if classes is None else classes
     laws = np.array(
-        [[(*astuple(one), damping_ratio(one.restitution)) for one in row] for row in constants]
+        [
+            [
+                (*astuple(pair_constants), damping_ratio(pair_constants.restitution))
+                for pair_constants in row
+            ]
+            for row in constants
+        ]
     )
-    partner = np.append(own, len(constants))[bodies[1]]  # the bowl comes after the classes
-    modulus, shear, _, friction, ratio = laws[own[bodies[0]], partner].T
+    partner = np.append(number, len(constants))[bodies[1]]  # the bowl comes after the classes
+    modulus, shear, _, friction, ratio = laws[number[bodies[0]], partner].T
     contact_radius = np.sqrt(overlap / curvature[bodies].sum(axis=0))
     stiffness = np.stack([2 * modulus, 8 * shear * (friction > 0)]) * contact_radius
     damping = 2 * math.sqrt(5 / 6) * ratio * np.sqrt(stiffness / inverse_mass[bodies].sum(axis=0))
@@ -365,10 +369,10 @@ def largest_eigenvalue(
         apart = moved[b] - moved[a] + np.cross(normal, turned[a] + turned[b])
         along = (apart * normal).sum(axis=1, keepdims=True) * normal
         force = ahead * along + across * (apart - along)
-        torque, found = np.cross(force, normal), np.zeros_like(scale)
-        np.add.at(found, a, np.hstack([-force, torque]))
-        np.add.at(found, b, np.hstack([force, torque]))
-        return np.asarray((found * scale).ravel())
+        torque, accelerations = np.cross(force, normal), np.zeros_like(scale)
+        np.add.at(accelerations, a, np.hstack([-force, torque]))
+        np.add.at(accelerations, b, np.hstack([force, torque]))
+        return np.asarray((accelerations * scale).ravel())
 
     def act_by_levers(levers: Levers, shape: Floats) -> Floats:
         moved, turned = np.hsplit(shape.reshape(scale.shape), 2)
@@ -377,11 +381,11 @@ def largest_eigenvalue(
         apart = moved[b] + np.cross(turned[b], arm_b) - moved[a] - np.cross(turned[a], arm_a)
         along = (apart * normal).sum(axis=1, keepdims=True) * normal
         force = ahead * along + across * (apart - along)
-        found = np.zeros_like(scale)
-        np.add.at(found, a, np.hstack([-force, -np.cross(arm_a, force)]))
-        np.add.at(found, b, np.hstack([force, np.cross(arm_b, force)]))
-        torque = np.einsum("nij,nj->ni", levers.roots, found[:, 3:])
-        return np.hstack([found[:, :3] * scale[:, :3], torque]).ravel()
+        accelerations = np.zeros_like(scale)
+        np.add.at(accelerations, a, np.hstack([-force, -np.cross(arm_a, force)]))
+        np.add.at(accelerations, b, np.hstack([force, np.cross(arm_b, force)]))
+        torque = np.einsum("nij,nj->ni", levers.roots, accelerations[:, 3:])
+        return np.hstack([accelerations[:, :3] * scale[:, :3], torque]).ravel()
 
     acts = act if levers is None else partial(act_by_levers, levers)
     operator = LinearOperator((scale.size, scale.size), matvec=acts, dtype=np.float64)

@@ -1,56 +1,8 @@
 """Coulomb's limit of friction, to which the forces in dumps of contacts are cut."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-
 import numpy as np
 
-from dragdeck.study.contact_law import Floats, coefficients
-from dragdeck.study.media import Ints, class_numbers
-
-
-@dataclass(frozen=True)
-class FrictionLimit:
-    """What limits the tangential forces of particles on one body.
-
-    Attributes
-    ----------
-    friction : float or ndarray
-        Coefficient of friction: one, or one per class of particles, (C,), and per class of the
-        other particle, (C, C); after `at`, one per contact.
-    attractive : mapping
-        Coefficients that add an attractive force by name, as simulated; likewise.
-    wall : bool
-        Whether the body is a wall; otherwise it is another particle.
-    first_ids : sequence of int
-        First particle of each class, if there are several.
-    """
-
-    friction: Floats | float
-    attractive: Mapping[str, Floats | float] = field(default_factory=dict)
-    wall: bool = True
-    first_ids: Sequence[int] = ()
-
-    def at(self, particle_id: Ints, other_id: Ints) -> "FrictionLimit":
-        """What limits (N,) contacts; the ids of the other body count if it is a particle."""
-        if not self.first_ids:
-            return self
-        first, second = (class_numbers(ids, self.first_ids) for ids in (particle_id, other_id))
-        place = first if self.wall else (first, second)
-        attractive = {name: np.asarray(values)[place] for name, values in self.attractive.items()}
-        return FrictionLimit(np.asarray(self.friction)[place], attractive, self.wall)
-
-    def attraction_n(self, reduced_radius_m: Floats, overlap_m: Floats) -> Floats:
-        """Magnitude of the attractive forces of (N,) contacts, N.
-
-        The reduced radius R* is that of the particle at a wall.
-        """
-        total = np.zeros_like(overlap_m)
-        for name, value in self.attractive.items():
-            attraction = coefficients()[name].attraction
-            assert attraction is not None, name
-            total += attraction(value, reduced_radius_m, np.maximum(overlap_m, 0.0), self.wall)
-        return total
+from dragdeck.arrays import Floats
 
 
 def within_friction(

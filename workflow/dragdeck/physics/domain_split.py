@@ -104,8 +104,8 @@ def split(ranks: int, filled: FilledBowl) -> Split:
     A flat wide bowl is split along the floor, a tall column along its height, if the box
     has not much room above it.
     """
-    found = [_split(grid, filled) for grid in _grids(ranks)]
-    return min(found, key=lambda one: (float(f"{one.largest:.6g}"), one.grid[2], -one.grid[0]))
+    splits = [_split(grid, filled) for grid in _grids(ranks)]
+    return min(splits, key=lambda part: (float(f"{part.largest:.6g}"), part.grid[2], -part.grid[0]))
 
 
 def _grids(ranks: int) -> Iterator[Counts]:
@@ -118,12 +118,12 @@ def _grids(ranks: int) -> Iterator[Counts]:
 
 def _split(grid: Counts, filled: FilledBowl) -> Split:
     """What a grid gives each rank."""
-    own, known = (
+    most, known = (
         filled.particles
         * np.outer(_floor_fractions(grid, filled, reach), _height_fractions(grid[2], filled, reach))
         for reach in (0.0, filled.reach_m)
     )
-    return Split(grid, float(known.max()), own.ravel().tolist())
+    return Split(grid, float(known.max()), most.ravel().tolist())
 
 
 def _floor_fractions(grid: Counts, filled: FilledBowl, reach_m: float) -> _Fractions:
@@ -155,17 +155,18 @@ def _edges(count: int, low: float, high: float) -> _Fractions:
     return np.linspace(low, high, count + 1)
 
 
-def rank_warnings(found: Split) -> list[Caution]:
+def rank_warnings(domain_split: Split) -> list[Caution]:
     """What a user should know of a split before the run; a single rank has none."""
-    ranks, text = len(found.particles), ""
-    if found.idle:
+    ranks, text = len(domain_split.particles), ""
+    if domain_split.idle:
         text = (
-            f"{found.idle} of {ranks} MPI ranks would have no particle, in a grid of "
-            f"{' x '.join(map(str, found.grid))}: use another number (fidelity.ranks)"
+            f"{domain_split.idle} of {ranks} MPI ranks would have no particle, in a grid of "
+            f"{' x '.join(map(str, domain_split.grid))}: use another number (fidelity.ranks)"
         )
-    elif found.most_over_mean > _MOST_OVER_MEAN:
+    elif domain_split.most_over_mean > _MOST_OVER_MEAN:
         text = (
-            f"the fullest of {ranks} MPI ranks would have {found.most_over_mean:.2g} times the "
+            f"the fullest of {ranks} MPI ranks would have "
+            f"{domain_split.most_over_mean:.2g} times the "
             f"mean number of particles, more than {_MOST_OVER_MEAN:g}: a number with more factors "
             "splits more evenly (fidelity.ranks)"
         )

@@ -11,8 +11,8 @@ from functools import cached_property
 
 import numpy as np
 
+from dragdeck.arrays import Floats, Ints
 from dragdeck.errors import InputError
-from dragdeck.study.media import Array, Ints
 
 _SPACING = 1.2
 """Lattice spacing over the largest diameter: room to jitter, and to fall."""
@@ -66,9 +66,9 @@ class Particles:
     """
 
     classes: Ints
-    radii_m: Array
-    positions_m: Array
-    velocities_m_s: Array
+    radii_m: Floats
+    positions_m: Floats
+    velocities_m_s: Floats
 
     @cached_property
     def top_m(self) -> float:
@@ -81,7 +81,7 @@ class Particles:
         return float(np.linalg.norm(self.velocities_m_s, axis=1).max())
 
 
-def pour(classes_m: Sequence[Array], bowl_radius_m: float, seed: int) -> Particles:
+def pour(classes_m: Sequence[Floats], bowl_radius_m: float, seed: int) -> Particles:
     """Place particles on a jittered lattice inside a cylinder, in random order.
 
     Parameters
@@ -106,7 +106,9 @@ def pour(classes_m: Sequence[Array], bowl_radius_m: float, seed: int) -> Particl
     velocities[:, 2] = -np.abs(velocities[:, 2])  # none leaves through the top
     order = random.permutation(len(radii))
     positions = sites + random.uniform(-jitter, jitter, sites.shape)
-    of_class = np.repeat(np.arange(len(classes_m)), [len(one) for one in classes_m])[order]
+    of_class = np.repeat(
+        np.arange(len(classes_m)), [len(class_radii) for class_radii in classes_m]
+    )[order]
     by_class = np.argsort(of_class, kind="stable")
     return Particles(
         classes=of_class[by_class],
@@ -121,7 +123,7 @@ _INSERTED_FRACTION = 0.2
 half of where random sequential addition of spheres ends, 0.38."""
 
 
-def room_to_insert(reaches_m: Array, bowl_radius_m: float) -> float:
+def room_to_insert(reaches_m: Floats, bowl_radius_m: float) -> float:
     """Height of the space in a bowl in which clumps can be inserted at random, m.
 
     Parameters
@@ -150,16 +152,16 @@ def room_to_insert(reaches_m: Array, bowl_radius_m: float) -> float:
 
 def primes(seed: int, count: int) -> list[int]:
     """Different primes above 10000, as LIGGGHTS wants its seeds."""
-    found: list[int] = []
+    numbers: list[int] = []
     candidate = int(np.random.default_rng(seed).integers(10_000, 10_000_000))
-    while len(found) < count:
+    while len(numbers) < count:
         candidate += 1
         if all(candidate % divisor for divisor in range(2, math.isqrt(candidate) + 1)):
-            found.append(candidate)
-    return found
+            numbers.append(candidate)
+    return numbers
 
 
-def _sites(count: int, bowl_radius_m: float, largest_m: float) -> Array:
+def _sites(count: int, bowl_radius_m: float, largest_m: float) -> Floats:
     """The lowest `count` points of a square lattice in the bowl, (count, 3)."""
     step = 2 * _SPACING * largest_m
     room = largest_m * (1 + math.sqrt(2) * (_SPACING - 1))  # the jitter is along x and along y
@@ -174,7 +176,7 @@ def _sites(count: int, bowl_radius_m: float, largest_m: float) -> Array:
             remedy="use smaller particles or a wider bowl",
         )
     line = np.arange(-np.floor(reach / step), np.floor(reach / step) + 1) * step
-    rows: list[Array] = []
+    rows: list[Floats] = []
     for y in line:  # no more rows of the lowest layer than there are particles for
         x = line[line**2 + y**2 <= reach**2]
         rows.append(np.column_stack([x, np.full(len(x), y)]))

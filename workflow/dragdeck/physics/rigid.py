@@ -6,13 +6,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from dragdeck.arrays import Floats, Ints
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -27,8 +25,8 @@ class Levers:
         Inverse square roots of the tensors of inertia of the bodies, 1/(kg^0.5 m).
     """
 
-    arms_m: Array
-    roots: Array
+    arms_m: Floats
+    roots: Floats
 
 
 @dataclass(frozen=True)
@@ -47,12 +45,12 @@ class RigidBodies:
     """
 
     of_sphere: Ints
-    centre_m: Array
-    mass_kg: Array
-    roots: Array
+    centre_m: Floats
+    mass_kg: Floats
+    roots: Floats
 
 
-def pose(offsets_m: Array, centres_m: Array) -> tuple[Array, Rotation]:
+def pose(offsets_m: Floats, centres_m: Floats) -> tuple[Floats, Rotation]:
     """Centres of mass, (N, 3), and orientations of bodies whose spheres are at (N, K, 3) points.
 
     Parameters

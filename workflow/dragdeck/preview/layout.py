@@ -128,14 +128,14 @@ def layout(case: Case) -> CaseLayout:
         bowl_height_m=study.bowl.height_m,
         surface_m=level,
         bowl_turn=int(np.sign(study.motion.bowl_rad_s)),
-        workpieces=[_moving(one) for one in of_each_workpiece(case)],
+        workpieces=[_moving(workpiece) for workpiece in of_each_workpiece(case)],
     )
 
 
 def _moving(case: Case) -> MovingWorkpiece:
     way = course(case.study, expected_bed(case.study), reference_height(case))
     moving = way.driven.superposed.values()
-    turn = sum(float(one.turn(way.drag, np.ones(1))[0]) for one in moving)
+    turn = sum(float(motion.turn(way.drag, np.ones(1))[0]) for motion in moving)
     return MovingWorkpiece(
         mesh=workpiece_mesh(case),
         radius_m=workpiece_radius(case),

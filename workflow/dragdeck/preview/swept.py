@@ -58,8 +58,8 @@ def swept_volume(mesh: "Trimesh", poses: Floats) -> "Trimesh":
     grid = _grid(shape, origin, cell)
     grid["distance"] = least.ravel(order="F")
     level = max(0.0, cell - thickness / 2)
-    found = _as_mesh(grid.contour([level], "distance", method="flying_edges"))
-    return drawn(facing_out(found) or found)
+    contour = _as_mesh(grid.contour([level], "distance", method="flying_edges"))
+    return drawn(facing_out(contour) or contour)
 
 
 def drawn(mesh: "Trimesh") -> "Trimesh":
@@ -101,8 +101,8 @@ def _distances(mesh: "Trimesh", cell: float) -> tuple[Floats, Floats]:
     shape = np.ceil(mesh.extents / cell).astype(int) + 2 * _MARGIN + 1
     origin = mesh.bounds[0] - _MARGIN * cell
     grid = _grid(shape, origin, cell).compute_implicit_distance(_as_data(mesh))
-    found = grid["implicit_distance"]
-    return origin, np.asarray(found).reshape(shape, order="F")
+    distance = grid["implicit_distance"]
+    return origin, np.asarray(distance).reshape(shape, order="F")
 
 
 def _dip(
@@ -119,7 +119,7 @@ def _dip(
     block = tuple(slice(a, b) for a, b in zip(low, high, strict=True))
     points = origin + cell * np.indices(least[block].shape).reshape(3, -1).T + cell * low
     places = (points - pose[:3, 3]) @ pose[:3, :3]
-    found = map_coordinates(
+    dips = map_coordinates(
         distance, ((places - start) / cell).T, order=1, cval=_MARGIN * cell
     ).reshape(least[block].shape)
-    least[block] = np.minimum(least[block], found)
+    least[block] = np.minimum(least[block], dips)

@@ -7,14 +7,14 @@ from typing import Literal
 import numpy as np
 from pydantic import JsonValue, PositiveFloat, PositiveInt
 
+from dragdeck.arrays import Floats, Ints, class_numbers
 from dragdeck.documents import Part, omitted
 from dragdeck.errors import DocumentError, choices
-from dragdeck.physics.contact_mechanics import ContactConstants, Floats
+from dragdeck.physics.contact_mechanics import ContactConstants
 from dragdeck.physics.run_limits import RunLimits
 from dragdeck.records.advised import AdvisedSettings
 from dragdeck.records.run import CaseFile, CountOfRun, RanksOfRun, SettlingCriterion
 from dragdeck.study.drive import PathEntry, SuperposedEntry
-from dragdeck.study.media import Ints, class_numbers
 from dragdeck.study.reference import Reference
 from dragdeck.study.removal import Removal
 
@@ -303,19 +303,19 @@ class CaseOfRun(CaseFile):
 
     def class_of(self, particle_id: Ints) -> Ints:
         """Number of the class of (N,) particles in `classes`; 0 if there are none."""
-        return class_numbers(particle_id, [one.first_id for one in self.classes])
+        return class_numbers(particle_id, [class_.first_id for class_ in self.classes])
 
     def body_of(self, sphere_id: Ints) -> Ints:
         """Ids of the bodies of (N,) spheres of clumps; ids below 1, of walls, stay."""
-        first = np.array([one.first_sphere for one in self.bodies])
+        first = np.array([body.first_sphere for body in self.bodies])
         size = np.maximum(np.searchsorted(first, sphere_id, side="right") - 1, 0)
-        many = np.array([len(one.radii_m) for one in self.bodies])[size]
-        first_id = np.array([one.first_id for one in self.bodies])[size]
+        many = np.array([len(body.radii_m) for body in self.bodies])[size]
+        first_id = np.array([body.first_id for body in self.bodies])[size]
         return np.where(sphere_id > 0, first_id + (sphere_id - first[size]) // many, sphere_id)
 
     def density_of(self, particle_id: Ints) -> Floats:
         """Density of (N,) particles, kg/m3."""
-        densities = [one.density_kg_m3 for one in self.classes] or [self.media.density_kg_m3]
+        densities = [class_.density_kg_m3 for class_ in self.classes] or [self.media.density_kg_m3]
         return np.array(densities)[self.class_of(particle_id)]
 
 

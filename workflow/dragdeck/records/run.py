@@ -243,7 +243,9 @@ class AcceptanceCheck(Part):
 def causes(checks: Sequence[AcceptanceCheck]) -> Sequence[AcceptanceCheck]:
     """The checks that did not pass; where LIGGGHTS stopped with an error, that one alone."""
     failed = [check for check in checks if not check.passed]
-    stopped = [one for one in failed if one.code == "no_engine_error" and one.reason == "other"]
+    stopped = [
+        check for check in failed if check.code == "no_engine_error" and check.reason == "other"
+    ]
     return stopped or failed
 
 

@@ -26,6 +26,7 @@ from dragdeck.mesh.files import stl_text
 from dragdeck.mesh.shapes import tube
 from dragdeck.mesh.surface import surface
 from dragdeck.physics.contact_mechanics import ENGINE_SOFTEST_PA, fall_time
+from dragdeck.physics.estimates import SOLID_FRACTION_ESTIMATE
 from dragdeck.physics.packing import pour
 from dragdeck.physics.rounding import rounded
 from dragdeck.records.calibration import AngleRun
@@ -34,7 +35,6 @@ from dragdeck.scenes.scene import case_of_study, material_table
 from dragdeck.study.calibration import Drum, Repose
 from dragdeck.study.media import Array
 from dragdeck.study.model import Fidelity, Study
-from dragdeck.study.shapes import SOLID_FRACTION_ESTIMATE
 
 STIFFNESS = 1e4
 """Young's modulus over density, gravity, and radius of the cylinder or drum: soft, but the angles
@@ -201,7 +201,7 @@ def _drum(study: Study, rig: Drum) -> _Placed:
     ring = (radius - size) * np.stack([np.cos(angle), np.sin(angle)])
     radii = np.random.default_rng(study.seed).permutation(bed_radii(study))
     step = 2.01 * float(radii.max())
-    x, z_free = (np.arange(step / 2 - one, one - step / 2, step) for one in (radius, half))
+    x, z_free = (np.arange(step / 2 - length, length - step / 2, step) for length in (radius, half))
     sites = np.stack(np.meshgrid(x, x, z_free)).reshape(3, -1).T
     sites = sites[np.hypot(*sites[:, :2].T) < radius - 2 * size - step / 2]
     if len(sites) < len(radii) or not len(rows):

@@ -38,7 +38,7 @@ class DropFidelity:
     youngs_modulus_scale : float
         Factor on every Young's modulus, dimensionless.
     timestep_s : float, optional
-        Time step, s; None: the study's `drop.timestep_fraction` of the Rayleigh time.
+        Time step, s; None: the study's `drop_test.timestep_fraction` of the Rayleigh time.
     """
 
     youngs_modulus_scale: float = 1.0

@@ -45,7 +45,6 @@ from dragdeck.physics.contact_mechanics import (
     sphere_mass,
     wedge_ratio,
 )
-from dragdeck.physics.coulomb import FrictionLimit
 from dragdeck.physics.domain_split import FilledBowl, Split, rank_warnings, split
 from dragdeck.physics.packing import Bed, Particles, pour, primes, room_to_insert
 from dragdeck.physics.rounding import rounded
@@ -62,6 +61,7 @@ from dragdeck.scenes.scene import (
     media_of_run,
 )
 from dragdeck.study.base import Json, without_fields
+from dragdeck.study.contact_law import FrictionLimit
 from dragdeck.study.media import MOST_SIZES, Media
 from dragdeck.study.model import Study
 from dragdeck.study.shapes import SOLID_FRACTION_STD
@@ -212,7 +212,7 @@ def _start(study: Study) -> _Start:
     if not study.media.clumped:
         particles = first_particles(study)
         return _Start(particles.top_m, particles.fastest_m_s)
-    reaches = [one.radii_m * one.clump.reach for one in bed_classes(study)]
+    reaches = [class_.radii_m * class_.clump.reach for class_ in bed_classes(study)]
     return _Start(room_to_insert(np.concatenate(reaches), study.bowl.radius_m), 0.0)
 
 
@@ -226,7 +226,7 @@ def first_particles(study: Study) -> Particles:
 def _first_particles(
     media: Media, counts: tuple[int, ...], bowl_radius_m: float, seed: int
 ) -> Particles:
-    return pour([one.radii_m for one in media_classes(media, counts)], bowl_radius_m, seed)
+    return pour([class_.radii_m for class_ in media_classes(media, counts)], bowl_radius_m, seed)
 
 
 def _check_capacity(case: Case) -> None:
@@ -262,7 +262,9 @@ def _check_cells(case: Case) -> None:
     InputError
     """
     study = case.study
-    largest = max(float(one.radii_m[-1] * one.clump.radii.max()) for one in bed_classes(study))
+    largest = max(
+        float(class_.radii_m[-1] * class_.clump.radii.max()) for class_ in bed_classes(study)
+    )
     box = 4 * box_half_width(study) ** 2 * (box_top(study) + study.media.typical_radius_m)
     cells = box / (largest + skin(study) / 2) ** 3
     if cells * _CELL_BYTES > _MOST_CELL_BYTES:
@@ -373,8 +375,8 @@ def bond_numbers(study: Study) -> dict[str, float]:
         ("workpiece", study.workpiece.material, math.inf),
     ]
     pairs = [*combinations_with_replacement(particles, 2), *product(particles, walls)]
-    displaced, found = buoyancy_density(study), {}
-    for (one, material, radius), (other, against, far) in pairs:
+    displaced, numbers = buoyancy_density(study), {}
+    for (body, material, radius), (other, against, far) in pairs:
         kinds = [study.materials[name] for name in (material, against)]
         reduced = 1 / (1 / radius + 1 / far)
         limit = FrictionLimit(0.0, study.pair(material, against).attractive(), math.isinf(far))
@@ -384,8 +386,8 @@ def bond_numbers(study: Study) -> dict[str, float]:
             for size, kind in zip((radius, far), kinds, strict=True)
         )
         largest = pull_off_force(slope, effective_modulus(kinds[0], kinds[1]), reduced)
-        found[f"{one}-{other}"] = largest / (mass * study.gravity_m_s2)
-    return found
+        numbers[f"{body}-{other}"] = largest / (mass * study.gravity_m_s2)
+    return numbers
 
 
 _DEAR = 10.0
@@ -396,21 +398,23 @@ def _class_cautions(study: Study) -> Iterator[Caution]:
     """A warning for each class whose small particles make a run many times dearer."""
     classes = bed_classes(study) if study.media.classes else ()
     times = [
-        rayleigh_time(study.materials[one.material], one.radii_m[0] * one.clump.timestep_radius)
-        for one in classes
+        rayleigh_time(
+            study.materials[class_.material], class_.radii_m[0] * class_.clump.timestep_radius
+        )
+        for class_ in classes
     ]
-    spheres = [len(one.radii_m) * len(one.clump.radii) for one in classes]
+    spheres = [len(class_.radii_m) * len(class_.clump.radii) for class_ in classes]
     total = sum(spheres)
-    for at, one in enumerate(classes):
+    for at, class_ in enumerate(classes):
         others = [time for number, time in enumerate(times) if number != at]
         if not others or total == spheres[at]:
             continue
         dearer = total / (total - spheres[at]) * min(others) / min(times)
         if dearer >= _DEAR:
-            share = (one.radii_m**3).sum() / (bed_radii(study) ** 3).sum()
+            share = (class_.radii_m**3).sum() / (bed_radii(study) ** 3).sum()
             yield Caution(
                 "class",
-                f"class {one.name} ({100 * share:.2g} % of the volume) makes the runs about "
+                f"class {class_.name} ({100 * share:.2g} % of the volume) makes the runs about "
                 f"{dearer:.2g} times as long, by its number and its Rayleigh time: without it they "
                 f"would take {100 / dearer:.2g} % of that",
             )
@@ -425,15 +429,15 @@ def _size_cautions(study: Study) -> Iterator[Caution]:
     """A warning where small particles can be held between large ones, or one and a wall."""
     classes = bed_classes(study) if not study.media.clumped else ()
     walls = {"the bowl": study.bowl.material, "the workpiece": study.workpiece.material}
-    found = []
+    size_pairs = []
     for small, large in product(classes, classes):
         ratio = float(large.radii_m[-1] / small.radii_m[0])
         friction = study.pair(small.material, large.material).friction
-        found.append((wedge_ratio(friction, wall=False) / ratio, ratio, "another large one"))
+        size_pairs.append((wedge_ratio(friction, wall=False) / ratio, ratio, "another large one"))
         for wall, material in walls.items():
             least = min(friction, study.pair(small.material, material).friction)
-            found.append((wedge_ratio(least, wall=True) / ratio, ratio, wall))
-    held = [one for one in found if one[0] < 1 and one[1] > _NEVER_HELD]
+            size_pairs.append((wedge_ratio(least, wall=True) / ratio, ratio, wall))
+    held = [pair for pair in size_pairs if pair[0] < 1 and pair[1] > _NEVER_HELD]
     if held:
         part, ratio, partner = min(held)
         yield Caution(
@@ -443,7 +447,7 @@ def _size_cautions(study: Study) -> Iterator[Caution]:
             "LIGGGHTS squeezes it in as it rolls (docs/development/liggghts.md): leave out the "
             "fines, or compare with a run at a quarter of the fidelity.timestep_fraction",
         )
-    elif found and (widest := max(ratio for _, ratio, _ in found)) > _WIDEST:
+    elif size_pairs and (widest := max(ratio for _, ratio, _ in size_pairs)) > _WIDEST:
         yield Caution(
             "size_ratio",
             f"diameters differ by a factor of {widest:.3g}: above {_WIDEST:g}, nothing was "
@@ -481,7 +485,7 @@ def _particles_data(study: Study, top_m: float, types: int) -> str:
     box = ((-side, side), (-side, side), (-study.media.typical_radius_m, top_m))
     if study.media.clumped:
         return data_file("the empty box", types, box, [])
-    particles, names = first_particles(study), [one.material for one in bed_classes(study)]
+    particles, names = first_particles(study), [class_.material for class_ in bed_classes(study)]
     kinds = [1 + study.type_names().index(name) for name in names]
     densities = [study.materials[name].density_kg_m3 for name in names]
     columns = (

@@ -59,7 +59,7 @@ class Covered:
     counted: int
 
 
-def led(case: Case) -> Case:
+def with_lead(case: Case) -> Case:
     """The case with what its process covers, and with its lead, as its fidelity says."""
     study, chosen = case.study, case.study.chosen_fidelity()
     if case.stretch != Stretch():
@@ -73,7 +73,7 @@ def led(case: Case) -> Case:
         return case
     begin = _entry_fraction(study)
     whole = replace(case.all_workpieces, stretch=Stretch(0.0, begin, (begin,)), part=LEAD)
-    lead = replace(whole, study=whole.study.at_start(), asked=None, advised=None)
+    lead = replace(whole, study=whole.study.at_start(), requested=None, advised=None)
     return replace(case, stretch=Stretch(begin), lead=lead)
 
 
@@ -84,7 +84,7 @@ def windows_of(case: Case) -> list[Case]:
     and samples a stretch. Any number of the first ones is spread over the path. Those of a further
     workpiece are those of the run, seen from it.
     """
-    lead, found = led(case.all_workpieces), []
+    lead, windows = with_lead(case.all_workpieces), []
     if lead.study.chosen_fidelity().windows is None:
         return []
     study = _window_study(lead.study)
@@ -94,8 +94,8 @@ def windows_of(case: Case) -> list[Case]:
         stretch = Stretch(begin, min(begin + length, 1.0))
         window = replace(lead, study=study, stretch=stretch, lead=lead)
         window = replace(window, part=f"window-{number + 1}", rank_of_window=rank)
-        found.append(of_each_workpiece(window)[case.number - 1] if case.number else window)
-    return found
+        windows.append(of_each_workpiece(window)[case.number - 1] if case.number else window)
+    return windows
 
 
 def _too_short(case: Case) -> InputError:
@@ -133,8 +133,8 @@ def covered_fraction(study: Study) -> float:
 
 def with_leads(cases: Iterable[Case]) -> list[Case]:
     """Cases, each after the case of its lead and before its windows."""
-    every = (one for case in cases for one in (led(case).lead, case, *windows_of(case)))
-    return [one for one in every if one is not None]
+    every = (part for case in cases for part in (with_lead(case).lead, case, *windows_of(case)))
+    return [part for part in every if part is not None]
 
 
 def mark_file(number: int) -> str:
@@ -148,21 +148,21 @@ def covered(case: Case, drag: Drive) -> Covered:
     Parameters
     ----------
     case : Case
-        As `led` returns it.
+        As `with_lead` returns it.
     drag : Drive
         The whole drag.
     """
     study, stretch = case.study, case.stretch
     end = drag.end if stretch.end == 1 else step_at(stretch.end, drag)
     uncounted = _until_counted(study)
-    own = drag.start + math.ceil(uncounted / drag.timestep_s)
+    counted = drag.start + math.ceil(uncounted / drag.timestep_s)
     if not stretch.begin:
-        return Covered(0, end, 0, own)
+        return Covered(0, end, 0, counted)
     entry = step_at(stretch.begin, drag)
     ramp, settling = (math.ceil(time / drag.timestep_s) for time in _before_counted(study))
     ramp_end = entry + RAMP_STAGES * math.ceil(ramp / RAMP_STAGES)
     settled = ramp_end + settling
-    return Covered(entry, end, ramp_end, max(settled, own))
+    return Covered(entry, end, ramp_end, max(settled, counted))
 
 
 def step_at(fraction: float, drag: Drive) -> int:
@@ -176,7 +176,7 @@ def stops(case: Case, drag: Drive, steps: Covered, materials: Materials) -> Iter
     Parameters
     ----------
     case : Case
-        As `led` returns it.
+        As `with_lead` returns it.
     drag : Drive
     steps : Covered
     materials : Materials

@@ -18,7 +18,7 @@ from dragdeck.cases.case import Case
 from dragdeck.decks.deck import Deck, Properties
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import round_to
-from dragdeck.study.drive import Drive, EngineMotion, Floats, Rotation, rotation_vector
+from dragdeck.study.drive import Drive, EngineMotion, Floats, Orientations, rotation_vector
 from dragdeck.study.driven import DrivenMotion
 from dragdeck.study.model import Motion, Study
 from dragdeck.study.paths.path import Point, Vector
@@ -112,7 +112,7 @@ def surface_speed(motion: Motion, radius_m: float) -> float:
     radius_m : float
         Of the workpiece.
     """
-    axis = motion.axis_speed_m_s * motion.path.peak_speed_ratio
+    axis = motion.nominal_speed_m_s * motion.path.peak_speed_ratio
     return axis + added_speed(motion, radius_m, 1.0)
 
 
@@ -127,10 +127,12 @@ def added_speed(motion: Motion, radius_m: float, factor: float) -> float:
     factor : float
         On the study's own speeds.
     """
-    turning = motion.path.turning_rad_s if motion.leans else 0.0
+    turning = motion.path.turning_rad_s if motion.inclined else 0.0
     arm = math.hypot(radius_m, deepest(motion))
     moving = motion.superposed(factor).values()
-    return turning * factor * arm + sum(one.surface_speed_m_s(radius_m) for one in moving)
+    return turning * factor * arm + sum(
+        superposed_motion.surface_speed_m_s(radius_m) for superposed_motion in moving
+    )
 
 
 def path_heights(motion: Motion) -> tuple[float, float]:
@@ -141,7 +143,7 @@ def path_heights(motion: Motion) -> tuple[float, float]:
 
 def vertical_range(motion: Motion) -> tuple[float, float]:
     """Lowest and highest height of the tip above the immersion depth, m; 0 is within."""
-    reach = sum(one.vertical_reach_m for one in motion.superposed().values())
+    reach = sum(superposed.vertical_reach_m for superposed in motion.superposed().values())
     low, high = path_heights(motion)
     return low - reach, high + reach
 
@@ -202,15 +204,15 @@ class Course:
         """The drag in steps."""
         return self.driven.drive
 
-    def poses(self, leg: Leg, steps: Floats) -> tuple[Floats, Rotation]:
+    def poses(self, leg: Leg, steps: Floats) -> tuple[Floats, Orientations]:
         """Places, (N, 3), and orientations after (N,) steps from the beginning of a leg."""
-        begun, one = np.array(self.start_m), np.ones(1)
+        begun, single = np.array(self.start_m), np.ones(1)
         for before in self.legs[: self.legs.index(leg)]:
-            begun = before.straight_on(begun, before.steps * one)[0]
+            begun = before.straight_on(begun, before.steps * single)[0]
         if leg.name == "drag":
             places = self.driven.places(steps, begun)
             return places, self.driven.rotation(steps, self.turn_rad)
-        return leg.straight_on(begun, steps), Rotation(np.full(len(steps), self.turn_rad))
+        return leg.straight_on(begun, steps), Orientations(np.full(len(steps), self.turn_rad))
 
 
 def driven(study: Study, start: int = 0) -> DrivenMotion:
@@ -238,13 +240,13 @@ def course(study: Study, bed: Bed, reference_m: float = 0.0) -> Course:
     motion, timestep = study.motion, bed_timestep(study, "timestep_fraction")
     clear = round_to(bed.top_m + study.media.typical_radius_m, 6)
     dive = clear - (bed.surface_m - motion.immersion_depth_m + motion.path.start_height_m)
-    found, begun, period = list[Leg](), 0, output_periods(study, timestep).network
+    legs, begun, period = list[Leg](), 0, output_periods(study, timestep).network
     for name, duration, velocity in _entry(motion, dive, study.chosen_fidelity().speed_factor):
-        found.append(_in_periods(name, begun, duration, velocity, timestep, period))
-        begun = found[-1].end_step
+        legs.append(_in_periods(name, begun, duration, velocity, timestep, period))
+        begun = legs[-1].end_step
     way = driven(study, begun)
     drive, path = way.drive, motion.path
-    found.append(
+    legs.append(
         Leg(
             name="drag",
             start_step=drive.start,
@@ -255,9 +257,9 @@ def course(study: Study, bed: Bed, reference_m: float = 0.0) -> Course:
         )
     )
     start = (*plunge_point(motion), clear + reference_m)
-    has_front = isinstance(study.workpiece.shape, MeshShape) or motion.leans
+    has_front = isinstance(study.workpiece.shape, MeshShape) or motion.inclined
     turn = path.direction_rad if has_front else 0.0  # a mesh looks along +x in its own file
-    return Course(start_m=start, turn_rad=turn, legs=found, driven=way)
+    return Course(start_m=start, turn_rad=turn, legs=legs, driven=way)
 
 
 def _entry(
@@ -378,21 +380,23 @@ def moved_workpiece(case: Case, motion: Course, mesh: str, entry_step: int) -> M
         Step of the drag at which it starts; 0: it starts with the plunge.
     """
     ending = f"_{case.number}" if case.number > 1 else ""
-    place, turn, own = motion.start_m, motion.turn_rad, None
+    place, turn, tilt = motion.start_m, motion.turn_rad, None
     legs = motion.legs[-1:] if entry_step else motion.legs
     if entry_step:
         places, rotation = motion.poses(legs[-1], np.array([entry_step - motion.drag.start]))
         x, y, z = places[0].tolist()
         place, turn = (x, y, z), float(rotation.turn_rad[0])
-        own = rotation.own
+        tilt = rotation.own
     moving = motion.driven.superposed_on_engine()
     return MovedWorkpiece(
         ending=ending,
         mesh=mesh,
         start_m=place,
         turn_deg=math.degrees(turn),
-        own_turn=() if own is None else _axis_and_angle(own[0]),
+        own_turn=() if tilt is None else _axis_and_angle(tilt[0]),
         legs=[replace(leg, motion=leg.motion.ending(ending)) for leg in legs],
         driven=motion.driven,
-        superposed={name: one.ending(ending) for name, one in moving.items()},
+        superposed={
+            name: superposed_motion.ending(ending) for name, superposed_motion in moving.items()
+        },
     )

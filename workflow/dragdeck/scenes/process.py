@@ -36,7 +36,7 @@ from dragdeck.scenes.filling import (
     partners_in_bed,
     rank_split,
 )
-from dragdeck.scenes.lead import Covered, covered, led, mark_file, stops
+from dragdeck.scenes.lead import Covered, covered, mark_file, stops, with_lead
 from dragdeck.scenes.motion import (
     Course,
     Periods,
@@ -99,21 +99,26 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         The workpiece does not fit between path and bowl, would reach below the
         floor, or has a mesh that cannot be used.
     """
-    whole = led(case.all_workpieces)
+    whole = with_lead(case.all_workpieces)
     each = of_each_workpiece(whole)
-    study, counts = whole.study, [workpiece_facets(one) for one in each]
+    study, counts = whole.study, [workpiece_facets(workpiece) for workpiece in each]
     fidelity, facets = study.chosen_fidelity(), study.bowl_facet_size_m is not None
     bed = bed or expected_bed(study)
     dt, top = bed_timestep(study, "timestep_fraction"), box_top(study)
     periods, meshes = output_periods(study, dt), _mesh_files(each)
     check_apart(each, bed)
-    courses, moved = [course(one.study, bed, reference_height(one)) for one in each], []
+    courses, moved = (
+        [course(workpiece.study, bed, reference_height(workpiece)) for workpiece in each],
+        [],
+    )
     drag = courses[0].drag
     steps = covered(whole, drag)
-    for one, way in zip(each, courses, strict=True):
-        check_fit(one, bed.lowest_m, dt)
-        moved.append(moved_workpiece(one, way, meshes[one.study.workpiece.shape], steps.entry))
-        check_headroom(one, way.start_m[2] + bed.margin_m - reference_height(one), top)
+    for workpiece, way in zip(each, courses, strict=True):
+        check_fit(workpiece, bed.lowest_m, dt)
+        moved.append(
+            moved_workpiece(workpiece, way, meshes[workpiece.study.workpiece.shape], steps.entry)
+        )
+        check_headroom(workpiece, way.start_m[2] + bed.margin_m - reference_height(workpiece), top)
     types, parts = study.type_names(), rank_split(whole)
     materials = material_table(study, types, fidelity.youngs_modulus_scale, whole)
     touches = study.outputs.first_touch_fraction if steps.end == drag.end else 0.0
@@ -133,7 +138,13 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         rayleigh_time_s=bed_rayleigh_time(study),
         neighbours=max(ENGINE_NEIGHBOURS, _bowl_neighbours(study), *counts),
         outputs=_outputs(
-            periods, drag, steps, [one.name for one in moved], facets, touches, study.media.clumped
+            periods,
+            drag,
+            steps,
+            [body.name for body in moved],
+            facets,
+            touches,
+            study.media.clumped,
         ),
         thermo_steps=periods.network,
         checkpoint_steps=_checkpoint_steps(study, steps.end - steps.entry),
@@ -149,11 +160,13 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         entry_step=steps.entry,
     )
     number = max(case.number, 1) - 1
-    own = {WORKPIECE_MESH: partial(_stl, each[number])}
+    files = {WORKPIECE_MESH: partial(_stl, each[number])}
     fastest = max(map(_fastest, each, courses))
     limits = bed_limits(study, top, fastest)
     jam = any(may_jam(body, bed.surface_m) for body in each)
-    models = {body.mesh: partial(_stl, one) for one, body in zip(each, moved, strict=True)}
+    models = {
+        body.mesh: partial(_stl, body_case) for body_case, body in zip(each, moved, strict=True)
+    }
     return Scene(
         deck=deck,
         case=_process_case(
@@ -167,7 +180,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         ),
         steps=steps.end - steps.entry,
         facets=sum(counts),
-        files=own if number else {**models, **_bowl_files(study, top)},
+        files=files if number else {**models, **_bowl_files(study, top)},
         models=_models(study),
         leaves_out=_leaves_out(study),
         warnings=[*_cautions(each), *rank_warnings(parts)],
@@ -176,18 +189,18 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
 
 def _cautions(each: Sequence[Case]) -> Iterator[Caution]:
     """What a user should know of each workpiece; it is named where not all of them are meant."""
-    found: dict[str, tuple[Caution, list[str]]] = {}
-    for number, one in enumerate(each, 1):
-        for caution in process_cautions(one):
-            found.setdefault(str(caution), (caution, []))[1].append(str(number))
-    for caution, numbers in found.values():
+    by_text: dict[str, tuple[Caution, list[str]]] = {}
+    for number, workpiece in enumerate(each, 1):
+        for caution in process_cautions(workpiece):
+            by_text.setdefault(str(caution), (caution, []))[1].append(str(number))
+    for caution, numbers in by_text.values():
         owners = f"workpiece {', '.join(numbers)}: " if len(numbers) < len(each) else ""
         yield replace(caution, text=f"{owners}{caution}")
 
 
 def _mesh_files(each: Sequence[Case]) -> Mapping[Shape, str]:
     """File of the mesh of each shape."""
-    shapes = dict.fromkeys(one.study.workpiece.shape for one in each)
+    shapes = dict.fromkeys(workpiece.study.workpiece.shape for workpiece in each)
     return {
         shape: f"workpiece_{number}.stl" if number > 1 else WORKPIECE_MESH
         for number, shape in enumerate(shapes, 1)
@@ -277,7 +290,7 @@ def _process_case(
         numbers=describe(case),
         surface_m=surface_m,
         workpiece=WorkpieceOfRun(
-            kind="mesh" if motion.leans else study.workpiece.shape.kind,
+            kind="mesh" if motion.inclined else study.workpiece.shape.kind,
             radius_m=workpiece_reach(case),
             length_m=workpiece_length(case),
             mesh=WORKPIECE_MESH,
@@ -322,10 +335,10 @@ def _wake_from(each: Sequence[Case], number: int) -> float | None:
     around, ahead = path.revolution_m, path.ahead_deg
     if around is None or ahead is None:
         return None
-    others = (one.study.motion.path.ahead_deg or 0.0 for one in each)
+    others = (workpiece.study.motion.path.ahead_deg or 0.0 for workpiece in each)
     gap = min((other - ahead - 1e-6) % 360 + 1e-6 for other in others)
-    found = around * gap / 360
-    return round_to(found, 9) if found < path.path_length_m * (1 - 1e-6) else None
+    distance = around * gap / 360
+    return round_to(distance, 9) if distance < path.path_length_m * (1 - 1e-6) else None
 
 
 def _fastest(case: Case, way: Course) -> float:
@@ -377,7 +390,7 @@ def _models(study: Study) -> dict[str, str]:
 def _leaves_out(study: Study) -> dict[str, LeftOut]:
     _, absent = coefficient_words(study.pairs.values())
     workpiece, network = study.outputs.workpiece_contacts_hz, study.outputs.network_hz
-    found = {
+    reasons = {
         **liquid_leaves_out(study),
         "positions, torques, areas of contacts": LeftOut(
             "the particles of the same step have the positions; no report uses the rest",
@@ -390,19 +403,19 @@ def _leaves_out(study: Study) -> dict[str, LeftOut]:
         **{words: LeftOut("not given in the study") for words in absent},
     }
     if network < workpiece:
-        found[f"network at {workpiece:g} Hz"] = LeftOut(
+        reasons[f"network at {workpiece:g} Hz"] = LeftOut(
             "force chains do not require this rate", "network_rate"
         )
     if study.bowl_facet_size_m is None:
-        found["facets of the bowl"] = LeftOut(
+        reasons["facets of the bowl"] = LeftOut(
             "slower; no report uses contacts per facet of the bowl", "bowl_facets"
         )
     shape = study.workpiece.shape
     if isinstance(shape, CylinderShape) and shape.facet_length_m > shape.facet_size_m:
-        found["short facets along the workpiece"] = LeftOut(
+        reasons["short facets along the workpiece"] = LeftOut(
             "a straight side needs none", "workpiece_short_facets"
         )
-    return found
+    return reasons
 
 
 def _partners(case: Case) -> list[tuple[str, str, float]]:
@@ -412,8 +425,8 @@ def _partners(case: Case) -> list[tuple[str, str, float]]:
 
 def _stretches(case: Case) -> Json:
     """What a run covers, unless that is all, and from which run it goes on."""
-    found = {} if case.stretch == Stretch() else {"stretch": asdict(case.stretch)}
-    return {**found, "lead": PROCESS.run_id(case.lead)} if case.lead else found
+    content = {} if case.stretch == Stretch() else {"stretch": asdict(case.stretch)}
+    return {**content, "lead": PROCESS.run_id(case.lead)} if case.lead else content
 
 
 _NOT_READ = ("drop_test", "fidelity.windows")
@@ -422,12 +435,12 @@ _NOT_READ = ("drop_test", "fidelity.windows")
 
 def _content(case: Case) -> Json:
     """What a process depends on."""
-    case = led(case)
+    case = with_lead(case)
     study = case.study
     content = without_fields(
         study.of_runs(study.bowl.material, study.workpiece.material), *_NOT_READ
     )
-    shapes = [one.study.workpiece.shape for one in of_each_workpiece(case)]
+    shapes = [workpiece.study.workpiece.shape for workpiece in of_each_workpiece(case)]
     files = [mesh_file(case, shape) for shape in shapes if isinstance(shape, MeshShape)]
     checksums = [file_checksum(file) for file in dict.fromkeys(files)]
     mesh = {"mesh": " ".join(checksums)} if checksums else {}

@@ -119,8 +119,8 @@ class SceneType:
         All workpieces share a run; what is made for each but the first is named by its number.
         """
         whole = case.all_workpieces
-        found = f"{slug(self.slug(whole))[:_LONGEST_SLUG]}-{digest(self.content(whole))}"
-        return f"{found}.{case.number}" if self.needs_bed and case.number > 1 else found
+        full_name = f"{slug(self.slug(whole))[:_LONGEST_SLUG]}-{digest(self.content(whole))}"
+        return f"{full_name}.{case.number}" if self.needs_bed and case.number > 1 else full_name
 
     def digest(self, case: Case) -> str:
         """Hash of all that the run's files say, remarks included.
@@ -132,7 +132,11 @@ class SceneType:
         if self.needs_bed:
             asked = case.advised and case.advised.model_dump(mode="json")
             values = without_fields(study.plain(), *_NOT_SAID)
-            said |= {**values, "asked": asked, "assumptions": [dict(one) for one in assumed(study)]}
+            said |= {
+                **values,
+                "asked": asked,
+                "assumptions": [dict(assumption) for assumption in assumed(study)],
+            }
         else:
             said |= without_fields(study.plain(), *_NOT_SAID, *_OF_PROCESS)
         return digest(said)
@@ -147,7 +151,7 @@ def case_of_study(
     rayleigh_time_s: float,
     *,
     settings: Json | None = None,
-    **own: Any,
+    **parts: Any,
 ) -> C:
     """The content of ``case.json`` of a run of a study's case.
 
@@ -196,7 +200,7 @@ def case_of_study(
         "reference": study.reference,
         "versions": {"dragdeck": __version__},
     }
-    return kind(**{**entries, **own})
+    return kind(**{**entries, **parts})
 
 
 def media_of_run(study: Study, buoyancy_kg_m3: float = 0.0) -> MediaOfRun:
@@ -245,24 +249,24 @@ def liquid_leaves_out(study: Study) -> dict[str, LeftOut]:
 
 def _classes(study: Study, scale: float) -> tuple[ClassOfRun, ...]:
     """The classes of the media; none where there is one only."""
-    found, first = [], 1
-    for one in bed_classes(study) if study.media.classes else ():
-        found.append(
+    classes, first = [], 1
+    for class_ in bed_classes(study) if study.media.classes else ():
+        classes.append(
             ClassOfRun(
-                name=one.name,
-                material=one.material,
+                name=class_.name,
+                material=class_.material,
                 first_id=first,
-                count=len(one.radii_m),
-                volume_m3=float((4 / 3 * np.pi * one.radii_m**3).sum()),
-                radius_mean_m=float(one.radii_m.mean()),
-                radius_std_m=float(one.radii_m.std()),
-                density_kg_m3=study.materials[one.material].density_kg_m3,
-                contact_moduli=_contact_moduli(study, one.material, scale),
-                attractive=_attractive(study, one.material, scale),
+                count=len(class_.radii_m),
+                volume_m3=float((4 / 3 * np.pi * class_.radii_m**3).sum()),
+                radius_mean_m=float(class_.radii_m.mean()),
+                radius_std_m=float(class_.radii_m.std()),
+                density_kg_m3=study.materials[class_.material].density_kg_m3,
+                contact_moduli=_contact_moduli(study, class_.material, scale),
+                attractive=_attractive(study, class_.material, scale),
             )
         )
-        first += len(one.radii_m)
-    return tuple(found)
+        first += len(class_.radii_m)
+    return tuple(classes)
 
 
 def _bodies(study: Study) -> dict[str, str]:
@@ -279,8 +283,8 @@ def _bodies(study: Study) -> dict[str, str]:
 def _attractive(study: Study, material: str, scale: float) -> dict[str, dict[str, float]]:
     """Attractive coefficients of particles of a material by what they touch, as simulated."""
     pairs = {body: study.pair(material, other) for body, other in _bodies(study).items()}
-    found = {body: pair.softened(scale).attractive() for body, pair in pairs.items()}
-    return {body: values for body, values in found.items() if values}
+    forces = {body: pair.softened(scale).attractive() for body, pair in pairs.items()}
+    return {body: values for body, values in forces.items() if values}
 
 
 def _contact_moduli(study: Study, material: str, scale: float) -> dict[str, ContactConstants]:
@@ -304,7 +308,7 @@ _OF_A_KIND = ("motion.path.", "workpiece.shape.")
 def assumed(study: Study) -> list[AssumptionOfRun]:
     """What a study assumes, with the values."""
     values = flat(study.plain())
-    found = [
+    assumptions = [
         AssumptionOfRun(field=entry.field, value=values.get(entry.field), why=entry.why)
         for entry in study.assumptions
         if entry.field in values or not entry.field.startswith(_OF_A_KIND)
@@ -312,8 +316,8 @@ def assumed(study: Study) -> list[AssumptionOfRun]:
     if reason := study.accepted.unsafe_timestep:
         step = study.chosen_fidelity().timestep_fraction
         why = f"a step that may be too long, accepted on purpose: {reason}"
-        found.append(AssumptionOfRun(field="fidelity.timestep_fraction", value=step, why=why))
-    return found
+        assumptions.append(AssumptionOfRun(field="fidelity.timestep_fraction", value=step, why=why))
+    return assumptions
 
 
 def material_table(

@@ -124,7 +124,7 @@ def reference_height(case: Case) -> float:
 
 def dip(case: Case) -> float:
     """How far a workpiece that leans on its path reaches below its lowest point at the start, m."""
-    if not case.study.motion.path.leans:
+    if not case.study.motion.path.inclined:
         return 0.0
     return max(0.0, *(float(-points[:, 2].min()) for points in _postures(case)))
 
@@ -134,10 +134,10 @@ def _postures(case: Case) -> Iterator[NDArray[np.float64]]:
     mesh, motion = workpiece_mesh(case), case.study.motion
     way = DrivenMotion.of(motion, bed_timestep(case.study, "timestep_fraction"), 1.0)
     since = np.linspace(0.0, way.drive.steps, _LOOKS)
-    own = motion.path.own(way.drive, since)
+    rotations = motion.path.own(way.drive, since)
     if motion.turns_about_inclined_axis:
-        own = by_vector(np.linspace(0.0, math.tau, 25)[:, None] * way.drive.own_axis)
-    for rotation in np.eye(3)[None] if own is None else own:
+        rotations = by_vector(np.linspace(0.0, math.tau, 25)[:, None] * way.drive.own_axis)
+    for rotation in np.eye(3)[None] if rotations is None else rotations:
         yield mesh.vertices @ rotation.T
 
 
@@ -145,8 +145,11 @@ def workpiece_warnings(case: Case) -> list[Caution]:
     """What is doubtful in the mesh of the user's, what was repaired, and what makes it slow."""
     shape, said = case.study.workpiece.shape, []
     if isinstance(shape, MeshShape):
-        mesh, found = _of_case(case, shape)
-        said = [f"{shape.file}: {one.problem}: {one.value} ({one.remedy})" for one in found]
+        mesh, problems = _of_case(case, shape)
+        said = [
+            f"{shape.file}: {problem.problem}: {problem.value} ({problem.remedy})"
+            for problem in problems
+        ]
         said += _gaps(mesh, shape, case.study.media.typical_radius_m)
     return [*(Caution("mesh", text) for text in said), *_too_fine(case)]
 
@@ -204,7 +207,7 @@ def simulated_mesh(case: Case) -> "Trimesh":
         A facet reaches from the bed out of the box.
     """
     mesh, motion = workpiece_mesh(case), case.study.motion
-    if motion.path.leans or motion.turns_about_inclined_axis:
+    if motion.path.inclined or motion.turns_about_inclined_axis:
         return mesh
     half_width_m = box_half_width(case.study)
     outside = np.hypot(*mesh.triangles_center[:, :2].T) + farthest_reach(motion) > half_width_m
@@ -245,13 +248,13 @@ def workpiece_radius(case: Case) -> float:
     if isinstance(shape, CylinderShape):
         return cylinder_radius(shape.radius_m, _generated_length(case), shape.facet_size_m)
     mesh, _ = _of_case(case, shape)
-    below = points_below(mesh, mesh.bounds[1, 2] if motion.leans else deepest(motion))
+    below = points_below(mesh, mesh.bounds[1, 2] if motion.inclined else deepest(motion))
     return float(np.hypot(*below[:, :2].T).max())
 
 
 def workpiece_reach(case: Case) -> float:
     """Radius of the upright cylinder about the tip around what is in the bed, m."""
-    if not case.study.motion.leans:
+    if not case.study.motion.inclined:
         return workpiece_radius(case)
     return float(np.hypot(*_in_bed(case)).max())
 
@@ -276,14 +279,16 @@ def farthest_surface(case: Case) -> float:
 def _in_bed(case: Case) -> NDArray[np.float64]:
     """X and y, (2, N), of the corners of what is in the bed, its front along +x, m."""
     mesh, height = workpiece_mesh(case), deepest(case.study.motion) - reference_height(case)
-    found = [points_below(surface(points, mesh.faces), height)[:, :2] for points in _postures(case)]
-    return np.concatenate(found).T
+    outlines = [
+        points_below(surface(points, mesh.faces), height)[:, :2] for points in _postures(case)
+    ]
+    return np.concatenate(outlines).T
 
 
 def fastest_surface(case: Case) -> float:
     """Highest speed of the workpiece's surface in the drag, at the study's own speed, m/s."""
     motion = case.study.motion
-    turns = motion.superposed() or motion.path.leans
+    turns = motion.superposed() or motion.path.inclined
     return surface_speed(motion, workpiece_radius(case) if turns else 0.0)
 
 
@@ -306,10 +311,10 @@ def _from_file(
     file: Path, shape: MeshShape, surroundings: Surroundings
 ) -> "tuple[Trimesh, list[Finding]]":
     mesh = _read(file, shape)
-    found = check(mesh, file=file, field="workpiece.shape", surroundings=surroundings)
+    problems = check(mesh, file=file, field="workpiece.shape", surroundings=surroundings)
     turned = facing_out(mesh)
     assert turned is not None, "the check refuses a surface with one side"
-    return place(turned, shape.offset_m), found
+    return place(turned, shape.offset_m), problems
 
 
 @lru_cache(maxsize=8)
@@ -390,14 +395,14 @@ def check_fit(case: Case, surface_m: float, timestep_s: float) -> None:
         Names every field that has to change.
     """
     gaps = clearances(case, surface_m)
-    found = [
+    problems = [
         *_beside(case, gaps.wall_m),
         *_below(case, gaps.tip_m),
         *_up_and_down(case, gaps.tip_m),
         *_per_step(case, timestep_s),
     ]
-    if found:
-        raise together(found)
+    if problems:
+        raise together(problems)
 
 
 def check_apart(each: Sequence[Case], bed: Bed) -> None:
@@ -408,9 +413,9 @@ def check_apart(each: Sequence[Case], bed: Bed) -> None:
     InputError
         Names the two workpieces that come closest.
     """
-    found, diameter = closest(each, bed), _largest_particle(each[0])
-    if found is not None and found[0] < diameter:
-        gap, first, second = found
+    pair, diameter = closest(each, bed), _largest_particle(each[0])
+    if pair is not None and pair[0] < diameter:
+        gap, first, second = pair
         problem = "collide" if gap <= 0 else "come so close that a particle touches both"
         raise InputError(
             f"workpieces {first} and {second} {problem}",
@@ -429,8 +434,8 @@ def closest(each: Sequence[Case], bed: Bed) -> tuple[float, int, int] | None:
     """
     if len(each) < 2:
         return None
-    reaches = [workpiece_reach(one) for one in each]
-    ways = [_way(one, bed) for one in each]
+    reaches = [workpiece_reach(workpiece) for workpiece in each]
+    ways = [_way(workpiece, bed) for workpiece in each]
     return min(
         (float(np.hypot(*(ways[a] - ways[b]).T).min()) - reaches[a] - reaches[b], a + 1, b + 1)
         for a, b in combinations(range(len(each)), 2)
@@ -537,8 +542,12 @@ def _up_and_down(case: Case, tip_m: float) -> Iterator[InputError]:
     depth, (low, high) = motion.immersion_depth_m, vertical_range(motion)
     low -= dip(case)
     deepest = min(depth + tip_m - _largest_particle(case), workpiece_length(case))
-    moving = ["path"] if any(path_heights(motion)) or motion.path.leans else []
-    moving += [name for name, one in motion.superposed().items() if one.vertical_reach_m]
+    moving = ["path"] if any(path_heights(motion)) or motion.path.inclined else []
+    moving += [
+        name
+        for name, superposed_motion in motion.superposed().items()
+        if superposed_motion.vertical_reach_m
+    ]
     problems = (
         (depth <= deepest < depth - low, "takes the workpiece too deep", deepest - depth),
         (high >= depth, "takes the workpiece out of the packing", depth),
@@ -657,13 +666,13 @@ def describe(case: Case) -> dict[str, float]:
     motion = study.motion
     speed = fastest_surface(case)
     rate = speed / diameter
-    added = speed / motion.axis_speed_m_s - 1
+    added = speed / motion.nominal_speed_m_s - 1
     superposed = {"superposed_speed": added} if motion.superposed() or added > 1e-9 else {}
-    own = weight_acceleration(study)
+    acceleration = weight_acceleration(study)
     optional = {
-        "bowl_froude_number": motion.bowl_rad_s**2 * study.bowl.radius_m / own,
+        "bowl_froude_number": motion.bowl_rad_s**2 * study.bowl.radius_m / acceleration,
         "tilt_deg": abs(motion.tilt_deg or 0.0),
-        "submerged_weight_ratio": own / study.gravity_m_s2 if study.compound else 0.0,
+        "submerged_weight_ratio": acceleration / study.gravity_m_s2 if study.compound else 0.0,
         "further_workpieces": float(len(of_each_workpiece(case.all_workpieces)) - 1),
     }
     names = study.media.main_material, study.workpiece.material

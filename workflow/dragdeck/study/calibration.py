@@ -6,8 +6,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from dragdeck.physics.estimates import SOLID_FRACTION_ESTIMATE
 from dragdeck.study.base import Line, Model, Number, Positive, Whole
-from dragdeck.study.shapes import SOLID_FRACTION_ESTIMATE
 
 NARROWEST = 5
 """Least diameter of a cylinder or drum, over that of a particle: narrower ones jam."""

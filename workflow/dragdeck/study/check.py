@@ -92,8 +92,8 @@ def _pairs(study: Study) -> _Found:
             yield field, problem, "a damping ratio above 0, such as 0.3"
         if model != "epsd" and pair.rolling_damping:
             yield field, f"the rolling model {model} has no damping", "contact.rolling_model epsd"
-    for one, other in product(study.media.materials, study.type_names()):
-        key, back = f"{one}-{other}", f"{other}-{one}"
+    for first, other in product(study.media.materials, study.type_names()):
+        key, back = f"{first}-{other}", f"{other}-{first}"
         if key in every and not {key, back} & set(study.pairs):
             yield (
                 "pairs",
@@ -131,10 +131,10 @@ def _crowd(study: Study) -> _Found:
         return
     part = media.parts[name]
     field = f"media.classes.{name}" if name else "media"
-    own = f"{spheres[name]:.3g} of them in class {name}" if name else "all of one class"
+    amount = f"{spheres[name]:.3g} of them in class {name}" if name else "all of one class"
     yield (
         f"{field}.sieve" if part.sieve else field,
-        f"the media would be {total:.3g} spheres in LIGGGHTS, {own}{part.most_numerous()}",
+        f"the media would be {total:.3g} spheres in LIGGGHTS, {amount}{part.most_numerous()}",
         f"{most:.3g}: a total smaller by a factor of {total / most:.3g}, or larger particles; "
         "fines can be left out, with their fraction of the mass",
     )
@@ -162,8 +162,8 @@ def _angles(study: Study) -> _Found:
     if angles and media.classes:
         yield "calibration.angles", "the media have several classes", "media of one class"
     elif angles:
-        found = angles.problems(media.typical_radius_m, media.mean_volume_m3, study.gravity_m_s2)
-        yield from ((f"calibration.angles.{field}", what, limit) for field, what, limit in found)
+        problems = angles.problems(media.typical_radius_m, media.mean_volume_m3, study.gravity_m_s2)
+        yield from ((f"calibration.angles.{field}", what, limit) for field, what, limit in problems)
 
 
 def _shape(study: Study) -> _Found:
@@ -188,7 +188,7 @@ def _shape(study: Study) -> _Found:
 def _motion(study: Study) -> _Found:
     """Statistics need a frame of the contact network after all that they leave out."""
     motion, problem = study.motion, "no path is left for the statistics"
-    length, speed = motion.path_length_m, motion.axis_speed_m_s
+    length, speed = motion.path_length_m, motion.nominal_speed_m_s
     frame = speed / study.outputs.network_hz
     if length < frame * (1 - 1e-9):
         problem = "not one frame of the contact network is written during the drag"
@@ -202,9 +202,12 @@ def _motion(study: Study) -> _Found:
             "two frames of the contact network (outputs.network_hz)"
         )
         yield "motion.transient_m", problem, limit
-    own = {"": motion.ramp_s} if motion.ramp_s else {}
-    moving = {f"{name}.": one.ramp_s for name, one in motion.superposed().items()}
-    for name, ramp in {**own, **moving}.items():
+    ramps = {"": motion.ramp_s} if motion.ramp_s else {}
+    moving = {
+        f"{name}.": superposed_motion.ramp_s
+        for name, superposed_motion in motion.superposed().items()
+    }
+    for name, ramp in {**ramps, **moving}.items():
         if motion.passed_m(ramp) > most:
             longest = most / speed + motion.ramp_s / 2 if name else 2 * most / speed
             limit = f"at most {longest:.3g} s; or use a longer path"
@@ -280,10 +283,10 @@ def _search(search: Search, study: Study) -> _Found:
         yield "search", "a search is of one workpiece", "a study without workpieces"
     removal, touches = study.removal, bool(study.outputs.first_touch_fraction)
     target = bool(removal and removal.target_depth_m)
-    for name, one in search.measures.items():
-        if lacking := one.lacks(removal is not None, target, touches):
+    for name, measure in search.measures.items():
+        if lacking := measure.lacks(removal is not None, target, touches):
             limit = f"a study with {lacking}, or another quantity"
-            yield f"search.{name}.quantity", f"no run has {one.quantity}", limit
+            yield f"search.{name}.quantity", f"no run has {measure.quantity}", limit
     for field in search.vary:
         if field.split(".")[0] in (*OF_NO_RUN, "fidelity", "fidelities", "seed", "outputs"):
             yield f"search.vary.{field}", "it is no setting of the machine", "another field"
@@ -296,10 +299,10 @@ def _search(search: Search, study: Study) -> _Found:
     known = {**BUILT_IN_FIDELITIES, **study.fidelities}
     yield from _known("search.confirm", search.confirm, known, "unknown fidelity")
     if search.confirm in known and not isinstance(study.fidelity, Tolerance):
-        own, confirm = study.chosen_fidelity(), known[search.confirm]
+        fidelity, confirm = study.chosen_fidelity(), known[search.confirm]
         scale, speed = confirm.youngs_modulus_scale, confirm.speed_factor
-        softer = scale < 1 and scale <= own.youngs_modulus_scale
-        if softer or speed > own.speed_factor:
+        softer = scale < 1 and scale <= fidelity.youngs_modulus_scale
+        if softer or speed > fidelity.speed_factor:
             problem = f"{search.confirm} is no more accurate than the settings of the search"
             limit = "a fidelity with a larger youngs_modulus_scale and no larger speed_factor"
             yield "search.confirm", problem, limit
@@ -335,7 +338,7 @@ def _signal(study: Study, file: Path) -> Iterator[InputError]:
         field, problem = "reference.signal.low_pass_hz", "the simulated force is sampled too slowly"
         limit = f"at most {most:g} Hz, a fifth of outputs.workpiece_force_hz"
         yield InputError(problem, field=field, value=signal.low_pass_hz, limit=limit)
-    transient_s = motion.uncounted_m / motion.axis_speed_m_s + motion.ramp_s / 2
+    transient_s = motion.uncounted_m / motion.nominal_speed_m_s + motion.ramp_s / 2
     field = "reference.signal.file"
     try:
         measured_signal(recorded_file(signal.file, file, field), signal, transient_s)
@@ -374,21 +377,21 @@ def validate(data: Json, file: Path | str, *, whole: bool = False) -> Study:
         Names every problem with its line, field, value, limit and a remedy.
     """
     data, places, unread = with_recording(data, Path(file))
-    found, study = list(unread.values()), None
+    problems, study = list(unread.values()), None
     try:
         study = Study.model_validate(data)
     except ValidationError as error:
-        found += [one for one in _problems(error) if one.field not in _named(unread)]
-    wrong = {error.field for error in found}
+        problems += [problem for problem in _problems(error) if problem.field not in _named(unread)]
+    wrong = {error.field for error in problems}
     implied = study.motion.path.implied if study else {}
     doubts = [row for row in implausible({**data, **implied}) if row[0].field not in wrong]
-    found += [error for error, _ in doubts]
+    problems += [error for error, _ in doubts]
     known = {error.field for error, refused in doubts if refused}
     others = [*contradictions(study, whole), *_signal(study, Path(file))] if study else []
     more = [error for error in others if error.field not in known]
     if study is None or more or any(refused for _, refused in doubts):
         meshes = mesh_errors(data, Path(file)) if whole else ()
-        raise _of_file([*found, *more, *meshes], file, places)
+        raise _of_file([*problems, *more, *meshes], file, places)
     return study
 
 
@@ -399,25 +402,27 @@ def _named(unread: Iterable[str]) -> set[str]:
 
 def warnings(study: Study) -> list[Caution]:
     """What a valid study hardly means, one line each."""
-    found = [
+    cautions = [
         Caution(
-            "implausible", f"{one.field} {one.value:g} {one.problem}; {one.remedy}; {one.limit}"
+            "implausible",
+            f"{caution.field} {caution.value:g} {caution.problem}; {caution.remedy}; "
+            f"{caution.limit}",
         )
-        for one, _ in implausible({**study.plain(), **study.motion.path.implied})
+        for caution, _ in implausible({**study.plain(), **study.motion.path.implied})
     ]
     chosen = {"youngs_modulus_scale", "timestep_fraction", "soft_start"}
-    own, draft = study.fidelity, BUILT_IN_FIDELITIES["draft"]
-    if isinstance(own, Fidelity) and not own.model_fields_set & chosen:
+    fidelity, draft = study.fidelity, BUILT_IN_FIDELITIES["draft"]
+    if isinstance(fidelity, Fidelity) and not fidelity.model_fields_set & chosen:
         text = (
             "fidelity is a block without youngs_modulus_scale and timestep_fraction: it replaces "
             "any named fidelity, and means the stiffness and time step of reference; to keep those "
             f"of draft, add youngs_modulus_scale: {draft.youngs_modulus_scale:g} and "
             f"timestep_fraction: {draft.timestep_fraction:g} to it"
         )
-        found.append(Caution("fidelity", text))
+        cautions.append(Caution("fidelity", text))
     if study.removal:
-        found += [Caution("trials", text) for text in disagreements(study.removal)]
-    return found
+        cautions += [Caution("trials", text) for text in disagreements(study.removal)]
+    return cautions
 
 
 _FORMS = ("a-name", "a-list", "a-number", "a-word", "settings", "a-tolerance", "[key]")
@@ -460,11 +465,11 @@ def explained(error: ValidationError, file: Path | str) -> InputError:
     return _of_file(_problems(error), file, {})
 
 
-def _of_file(found: list[InputError], file: Path | str, places: Places) -> InputError:
-    for error in found:
+def _of_file(errors: list[InputError], file: Path | str, places: Places) -> InputError:
+    for error in errors:
         here = error.file or file, error.line, error.field
         error.file, error.line, error.field = here if error.line else places.get(error.field, here)
-    return located(together(found))
+    return located(together(errors))
 
 
 def _problems(error: ValidationError) -> list[InputError]:

@@ -8,21 +8,20 @@ numbers that scenes are compared by, and the range of the advisor.
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from itertools import pairwise
 from typing import Annotated, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
+from dragdeck.arrays import Floats, Ints, class_numbers
 from dragdeck.study.base import Model, Number
 
 _PUSHING = ("hertz", "hertz/stiffness", "hooke", "hooke/stiffness")
 """Normal models whose force, in LIGGGHTS, is the one to which Coulomb's limit refers."""
 
-Floats = NDArray[np.float64]
 Attraction = Callable[[Floats | float, Floats, Floats, bool], Floats]
 """Attractive force of (N,) contacts, N, from the coefficient, reduced radii and overlaps, m, to
 which it is proportional, and whether the other body is a wall."""
@@ -170,6 +169,50 @@ def coefficients() -> Mapping[str, Coefficient]:
     }
 
 
+@dataclass(frozen=True)
+class FrictionLimit:
+    """What limits the tangential forces of particles on one body.
+
+    Attributes
+    ----------
+    friction : float or ndarray
+        Coefficient of friction: one, or one per class of particles, (C,), and per class of the
+        other particle, (C, C); after `at`, one per contact.
+    attractive : mapping
+        Coefficients that add an attractive force by name, as simulated; likewise.
+    wall : bool
+        Whether the body is a wall; otherwise it is another particle.
+    first_ids : sequence of int
+        First particle of each class, if there are several.
+    """
+
+    friction: Floats | float
+    attractive: Mapping[str, Floats | float] = field(default_factory=dict)
+    wall: bool = True
+    first_ids: Sequence[int] = ()
+
+    def at(self, particle_id: Ints, other_id: Ints) -> "FrictionLimit":
+        """What limits (N,) contacts; the ids of the other body count if it is a particle."""
+        if not self.first_ids:
+            return self
+        first, second = (class_numbers(ids, self.first_ids) for ids in (particle_id, other_id))
+        place = first if self.wall else (first, second)
+        attractive = {name: np.asarray(values)[place] for name, values in self.attractive.items()}
+        return FrictionLimit(np.asarray(self.friction)[place], attractive, self.wall)
+
+    def attraction_n(self, reduced_radius_m: Floats, overlap_m: Floats) -> Floats:
+        """Magnitude of the attractive forces of (N,) contacts, N.
+
+        The reduced radius R* is that of the particle at a wall.
+        """
+        total = np.zeros_like(overlap_m)
+        for name, value in self.attractive.items():
+            attraction = coefficients()[name].attraction
+            assert attraction is not None, name
+            total += attraction(value, reduced_radius_m, np.maximum(overlap_m, 0.0), self.wall)
+        return total
+
+
 def present(pairs: Iterable[Pair]) -> Mapping[str, Coefficient]:
     """The coefficients that some pair has."""
     every = list(pairs)
@@ -213,16 +256,16 @@ def added_forces(law: Sequence[str]) -> list[str]:
     if not gran or "model" not in words[:-1]:
         return [" ".join(words)]
     normal, *models = words[words.index("model") + 1 :]
-    found = [] if normal in _PUSHING else [normal]
+    forces = [] if normal in _PUSHING else [normal]
     named = dict(pairwise(models))
     if named.get("cohesion", "off") != "off":
-        found.append(f"cohesion {named['cohesion']}")
+        forces.append(f"cohesion {named['cohesion']}")
     if named.get("tangential_reduce", "off") != "off":
-        found.append("tangential_reduce on")
+        forces.append("tangential_reduce on")
     rows = (row.model for row in coefficients().values() if row.attraction)
     law_words = f"{' '.join(words)} "
-    found += [model for model in rows if f"{model} " in law_words and model not in found]
-    return found
+    forces += [model for model in rows if f"{model} " in law_words and model not in forces]
+    return forces
 
 
 def modelled(law: Iterable[str]) -> set[str]:

@@ -232,7 +232,10 @@ def rotating_by(names: Sequence[str]) -> dict[str, str]:
 
 
 def rates_about_axes(matrix: Floats, drive: Drive) -> tuple[float, float, float]:
-    """Angular speeds about x, y and z that make a rotation, (3, 3), in a step, rad/s."""
+    """Angular speeds about x, y and z that make a rotation, (3, 3), in a step, rad/s.
+
+    Not by scipy's Euler angles, whose error of 1e-16 is not small beside the turn of a step.
+    """
     x = math.atan2(-matrix[1, 2], matrix[2, 2])
     y, z = math.asin(matrix[0, 2]), math.atan2(-matrix[0, 1], matrix[0, 0])
     return x / drive.timestep_s, y / drive.timestep_s, z / drive.timestep_s
@@ -262,25 +265,20 @@ def about_vertical(rate_rad_s: Floats | float, arm_m: Floats) -> Floats:
 
 def by_vector(vector_rad: Floats) -> Floats:
     """Matrices, (..., 3, 3), of rotation vectors, (..., 3): axis times angle."""
-    angle = np.linalg.norm(vector_rad, axis=-1)[..., None, None]
-    x, y, z = np.moveaxis(vector_rad, -1, 0)
-    none = np.zeros_like(x)
-    cross = np.stack([none, -z, y, z, none, -x, -y, x, none], axis=-1)
-    cross = cross.reshape(*cross.shape[:-1], 3, 3)
-    half = np.sinc(angle / (2 * np.pi)) ** 2 / 2  # (1 - cos a) / a^2
-    return np.asarray(np.eye(3) + np.sinc(angle / np.pi) * cross + half * cross @ cross)
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_rotvec(vector_rad).as_matrix())
 
 
 def rotation_vector(matrix: Floats) -> Floats:
     """Rotation vector, (3,), of a matrix, (3, 3), by less than half a turn."""
-    odd = (matrix - matrix.T) / 2
-    across = np.array([odd[2, 1], odd[0, 2], odd[1, 0]])
-    angle = np.arctan2(np.linalg.norm(across), (np.trace(matrix) - 1) / 2)
-    return np.asarray(across / np.sinc(angle / np.pi))
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_matrix(matrix).as_rotvec())
 
 
 @dataclass(frozen=True)
-class Rotation:
+class Orientations:
     """N orientations of a workpiece: from its own frame, +x its front and z up, to the bowl's.
 
     Attributes
@@ -297,8 +295,8 @@ class Rotation:
     @property
     def matrices(self) -> Floats:
         """The rotations as matrices, (N, 3, 3)."""
-        own = np.eye(3) if self.own is None else self.own
-        columns = np.moveaxis(np.broadcast_to(own, (len(self.turn_rad), 3, 3)), -1, 0)
+        matrix = np.eye(3) if self.own is None else self.own
+        columns = np.moveaxis(np.broadcast_to(matrix, (len(self.turn_rad), 3, 3)), -1, 0)
         return np.stack([rotated(column, self.turn_rad) for column in columns], axis=-1)
 
     @property
@@ -316,8 +314,8 @@ class Rotation:
 
     def into(self, vectors: Floats) -> Floats:
         """Vectors of the bowl's frame, (N, 3), in the workpiece's own."""
-        found = rotated(vectors, -self.turn_rad)
-        return found if self.own is None else np.einsum("nji,nj->ni", self.own, found)
+        turned = rotated(vectors, -self.turn_rad)
+        return turned if self.own is None else np.einsum("nji,nj->ni", self.own, turned)
 
 
 # --- a quantity in stages: one value after another, the last of which stays ----------------------
@@ -335,7 +333,7 @@ def chain(
     start : int
         The step at which the first stage begins.
     stages : iterable
-        StepCounts of each stage, and its value.
+        Number of steps of each stage, and its value.
     per_formula : int
         Stages that one formula adds: many would be too long a line, and few are slower.
     """
@@ -410,7 +408,7 @@ def stage_at(steps: StepCounts, lengths: Sequence[int]) -> NDArray[np.int64]:
         Counted from the start of the drag. Those before it belong to the first stage, those
         after it to the last one.
     lengths : sequence of int
-        StepCounts of each stage.
+        Number of steps of each stage.
     """
     stage = np.searchsorted(np.cumsum(lengths), steps, side="left")
     return np.minimum(stage, len(lengths) - 1)

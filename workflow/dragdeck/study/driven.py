@@ -10,8 +10,8 @@ from dragdeck.study.drive import (
     Drive,
     EngineMotion,
     Floats,
+    Orientations,
     PathEntry,
-    Rotation,
     SmoothStart,
     StepCounts,
     SuperposedEntry,
@@ -43,7 +43,7 @@ class DrivenMotion:
         start : int
             Step at which the drag begins.
         """
-        length, asked = motion.path_length_m, motion.axis_speed_m_s * speed_factor
+        length, asked = motion.path_length_m, motion.nominal_speed_m_s * speed_factor
         begin = SmoothStart(round(motion.ramp_s / speed_factor / timestep_s))
         steps = max(1, round(length / asked / timestep_s + begin.steps / 2))
         return cls(
@@ -62,7 +62,7 @@ class DrivenMotion:
     @property
     def factor(self) -> float:
         """Its speed over the study's own: about the speed factor."""
-        return self.drive.speed_m_s / self.motion.axis_speed_m_s
+        return self.drive.speed_m_s / self.motion.nominal_speed_m_s
 
     @cached_property
     def superposed(self) -> Mapping[str, SuperposedMotion]:
@@ -77,7 +77,7 @@ class DrivenMotion:
     @property
     def turns(self) -> bool:
         """Whether the workpiece turns in the frame of its path."""
-        moving = any(one.turns for one in self.superposed.values())
+        moving = any(superposed.turns for superposed in self.superposed.values())
         return moving or self.motion.path.own(self.drive, np.zeros(1)) is not None
 
     @property
@@ -88,29 +88,29 @@ class DrivenMotion:
     def places(self, since: StepCounts, begun: Floats) -> Floats:
         """Places of the reference point, (N, 3), after (N,) steps from where it begins, m."""
         place = self.motion.path.places(self.drive, since, begun)
-        for one in self.superposed.values():
-            place = place + one.shift(self.drive, since)
+        for superposed in self.superposed.values():
+            place = place + superposed.shift(self.drive, since)
         return place
 
-    def rotation(self, since: StepCounts, start_rad: float) -> Rotation:
+    def rotation(self, since: StepCounts, start_rad: float) -> Orientations:
         """Orientations after (N,) steps of a workpiece whose front begins in a direction."""
         path = self.motion.path
         turn = start_rad + path.turn(self.drive, since)
-        return self._rotated(since, Rotation(turn, path.own(self.drive, since)))
+        return self._rotated(since, Orientations(turn, path.own(self.drive, since)))
 
-    def rotation_along(self, since: StepCounts, direction_rad: Floats) -> Rotation:
+    def rotation_along(self, since: StepCounts, direction_rad: Floats) -> Orientations:
         """Orientations after (N,) steps, at (N,) directions of motion."""
         return self._rotated(since, self._by_path(since, direction_rad))
 
-    def _by_path(self, since: StepCounts, direction_rad: Floats) -> Rotation:
+    def _by_path(self, since: StepCounts, direction_rad: Floats) -> Orientations:
         path = self.motion.path
         first = np.full_like(direction_rad, path.direction_rad)
         turn = direction_rad if path.turns(self.drive.orientation) else first
-        return Rotation(turn, path.own(self.drive, since))
+        return Orientations(turn, path.own(self.drive, since))
 
-    def _rotated(self, since: StepCounts, rotation: Rotation) -> Rotation:
-        for one in self.superposed.values():
-            rotation = one.rotated(self.drive, since, rotation)
+    def _rotated(self, since: StepCounts, rotation: Orientations) -> Orientations:
+        for superposed in self.superposed.values():
+            rotation = superposed.rotated(self.drive, since, rotation)
         return rotation
 
     def directions(self, since: StepCounts, ref_xy_m: Floats) -> Floats:
@@ -126,11 +126,11 @@ class DrivenMotion:
         point_m, ref_m : (N, 3) ndarray
             The points, and the reference point, after these steps, m.
         """
-        found = self.motion.path.velocity(self.drive, since, point_m, ref_m)
+        velocity = self.motion.path.velocity(self.drive, since, point_m, ref_m)
         before = self._by_path(since, self.directions(since, ref_m[:, :2]))
-        for one in self.superposed.values():
-            found = found + one.velocity(self.drive, since, point_m - ref_m, before)
-        return found
+        for superposed in self.superposed.values():
+            velocity = velocity + superposed.velocity(self.drive, since, point_m - ref_m, before)
+        return velocity
 
     @property
     def bowl_rad_s(self) -> float:
@@ -140,7 +140,10 @@ class DrivenMotion:
     def superposed_on_engine(self) -> Mapping[str, EngineMotion]:
         """How the engine makes what is superposed, by name."""
         heading = self.motion.path.heading_formula(self.drive)
-        return {name: one.on_engine(self.drive, heading) for name, one in self.superposed.items()}
+        return {
+            name: superposed.on_engine(self.drive, heading)
+            for name, superposed in self.superposed.items()
+        }
 
     def path_entry(self) -> PathEntry:
         """The path in ``case.json``."""
@@ -158,4 +161,6 @@ class DrivenMotion:
     def superposed_entries(self) -> list[SuperposedEntry]:
         """What is superposed in ``case.json``."""
         moving = self.superposed.values()
-        return [SuperposedEntry.model_validate(one.entry(self.drive)) for one in moving]
+        return [
+            SuperposedEntry.model_validate(superposed.entry(self.drive)) for superposed in moving
+        ]

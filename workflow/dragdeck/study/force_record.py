@@ -105,19 +105,19 @@ def _unit(column: str) -> float:
 
 
 def _column(table: Table, known: Mapping[str, float]) -> str:
-    found = [name for name in table.names if name in known]
-    if len(found) != 1:
+    columns = [name for name in table.names if name in known]
+    if len(columns) != 1:
         names, remedy = table.names, "name the columns in the first line, such as time_s,force_n"
         quoted = {*names} & {*TIME_COLUMNS, *FORCE_COLUMNS, *known}
         raise InputError(
-            f"{len(found) or 'no'} column(s) with a recognised name",
+            f"{len(columns) or 'no'} column(s) with a recognised name",
             file=table.file,
             line=table.header_line,
             value=", ".join(names)[:200] if quoted else None,
             limit=f"one of {', '.join(known)}",
             remedy=remedy,
         )
-    return found[0]
+    return columns[0]
 
 
 def _refuse_other_rate(time: Floats, rate_hz: float, file: Path) -> None:
@@ -324,9 +324,9 @@ def measured_signal(file: Path, signal: Signal, transient_s: float) -> MeasuredS
         raise RecordError("start", problem, value=value, remedy=remedy)
     _check_clipped(raw[used], interval, signal.low_pass_hz)
     kept = time <= end
-    grid, found = low_passed(time[kept] - start, force[kept], signal.low_pass_hz)
-    _check_length(found[(grid >= transient_s) & np.isfinite(found)], signal.low_pass_hz)
-    return MeasuredSignal(grid, found, start, error)
+    grid, filtered = low_passed(time[kept] - start, force[kept], signal.low_pass_hz)
+    _check_length(filtered[(grid >= transient_s) & np.isfinite(filtered)], signal.low_pass_hz)
+    return MeasuredSignal(grid, filtered, start, error)
 
 
 def _within(time: Floats, span: Span, field: str) -> slice:

@@ -268,7 +268,7 @@ class Media(Grains):
         if self.classes:
             if self.material or self.radius_mean_m or self.sieve:
                 raise ValueError("with classes, material and sizes stand in each of them")
-            total = sum(one.fraction for one in self.classes.values())
+            total = sum(class_.fraction for class_ in self.classes.values())
             if abs(total - 1) > 1e-6:
                 raise ValueError(f"the fractions of the classes sum to {total:.6g}, not to 1")
         return self
@@ -319,7 +319,7 @@ class Media(Grains):
         parts = list(self.parts.values())
         denser = [part.shape.denser if part.shape else 1.0 for part in parts]
         volumes = np.array_split(numbers * radii_m**3, len(parts))
-        whole = float(np.average(denser, weights=[one.sum() for one in volumes]))
+        whole = float(np.average(denser, weights=[volume.sum() for volume in volumes]))
         return solid_fraction(radii_m, numbers, whole)
 
     def spheres_of(self, part: Grains) -> int:
@@ -352,7 +352,7 @@ def class_counts(
     densities = dict(zip(volume, densities_kg_m3, strict=True))
     mass = {name: volume[name] * densities[name] for name in volume}
     per_particle = {"number": dict.fromkeys(volume, 1.0), "mass": mass, "volume": volume}
-    fractions = {name: one.fraction for name, one in media.classes.items()} or {"": 1.0}
+    fractions = {name: class_.fraction for name, class_ in media.classes.items()} or {"": 1.0}
     by_number = {
         name: share / per_particle[media.fractions_of][name] for name, share in fractions.items()
     }
@@ -377,15 +377,12 @@ def few_sizes(radii_m: Array) -> Array:
     return np.concatenate([np.full(len(part), np.cbrt((part**3).mean())) for part in parts])
 
 
-def class_numbers(particle_id: Ints, first_ids: Sequence[int]) -> Ints:
-    """Number of the class, from 0, of (N,) particles, whose ids rise from class to class."""
-    return np.searchsorted(first_ids or [1], particle_id, side="right") - 1
-
-
 def _whole_numbers(wanted: Mapping[str, float]) -> dict[str, int]:
     """Whole numbers with the rounded total of all: the largest remainders are rounded up."""
-    found = {name: math.floor(number) for name, number in wanted.items()}
-    missing = round(sum(wanted.values())) - sum(found.values())
-    for name in sorted(wanted, key=lambda one: found[one] - wanted[one])[:missing]:
-        found[name] += 1
-    return found
+    numbers = {name: math.floor(number) for name, number in wanted.items()}
+    missing = round(sum(wanted.values())) - sum(numbers.values())
+    for name in sorted(wanted, key=lambda candidate: numbers[candidate] - wanted[candidate])[
+        :missing
+    ]:
+        numbers[name] += 1
+    return numbers

@@ -84,8 +84,12 @@ class Superposed(Model):
 
     def superposed(self, speed_factor: float = 1.0) -> Mapping[str, SuperposedMotion]:
         """What is superposed on the path, by the name of its block, at this factor on speeds."""
-        found = {name: getattr(self, name) for name in Superposed.model_fields}
-        return {name: one.faster(speed_factor) for name, one in found.items() if one is not None}
+        motions = {name: getattr(self, name) for name in Superposed.model_fields}
+        return {
+            name: motion.faster(speed_factor)
+            for name, motion in motions.items()
+            if motion is not None
+        }
 
 
 AnyPath = CirclePath | FigureEightPath | LinePath | RestPath | WaypointsPath
@@ -148,9 +152,9 @@ class Motion(Superposed):
             raise ValueError(
                 "counted_from_revolution applies to circles only: this path has no revolutions"
             )
-        if (self.path.turning or self.path.leans) and self.spin is not None:
+        if (self.path.turning or self.path.inclined) and self.spin is not None:
             raise ValueError("spin and waypoints that turn cannot be combined: remove one of them")
-        if self.leans and self.path.most_turned_deg >= _MOST_TURNED_DEG:
+        if self.inclined and self.path.most_turned_deg >= _MOST_TURNED_DEG:
             raise ValueError(
                 f"an inclined workpiece turns by {self.path.most_turned_deg:g} degrees from one "
                 f"waypoint to the next, not by less than {_MOST_TURNED_DEG}: add waypoints"
@@ -168,16 +172,16 @@ class Motion(Superposed):
 
     def superposed(self, speed_factor: float = 1.0) -> Mapping[str, SuperposedMotion]:
         """What is superposed on the path, the rotation that it gives included."""
-        found = super().superposed(speed_factor)
-        if not self.path.turning or self.leans:
-            return found
+        motions = super().superposed(speed_factor)
+        if not self.path.turning or self.inclined:
+            return motions
         stages = [SpinStage(until_s=end, rpm=rpm) for end, rpm in self.path.turning]
-        return {**found, "spin": Spin(schedule=stages, ramp_s=0.0).faster(speed_factor)}
+        return {**motions, "spin": Spin(schedule=stages, ramp_s=0.0).faster(speed_factor)}
 
     @property
-    def leans(self) -> bool:
+    def inclined(self) -> bool:
         """Whether the workpiece's axis is ever inclined."""
-        return bool(self.tilt_deg) or self.path.leans
+        return bool(self.tilt_deg) or self.path.inclined
 
     @property
     def turns_about_inclined_axis(self) -> bool:
@@ -185,14 +189,14 @@ class Motion(Superposed):
         return bool(self.tilt_deg) and self.spin is not None
 
     @property
-    def axis_speed_m_s(self) -> float:
+    def nominal_speed_m_s(self) -> float:
         """Speed of the workpiece's axis relative to the bowl, m/s."""
         return self.path.own_speed_m_s or self.speed_m_s or math.nan
 
     @property
     def bowl_rad_s(self) -> float:
         """Angular speed of the bowl about +z, rad/s."""
-        return self.path.bowl_rad_s(self.axis_speed_m_s)
+        return self.path.bowl_rad_s(self.nominal_speed_m_s)
 
     @property
     def path_length_m(self) -> float:
@@ -203,12 +207,12 @@ class Motion(Superposed):
     def uncounted_m(self) -> float:
         """Length of the drag before the statistics begin, m: what is superposed has started."""
         whole = (self.path.revolution_m or 0.0) * ((self.counted_from_revolution or 1) - 1)
-        starts = (self.passed_m(one.ramp_s) for one in self.superposed().values())
+        starts = (self.passed_m(motion.ramp_s) for motion in self.superposed().values())
         return max(self.transient_m, whole, self.passed_m(self.ramp_s), *starts)
 
     def passed_m(self, time_s: float) -> float:
         """Length of the path after a time, at the end of its start or later, m."""
-        return (max(time_s, self.ramp_s) - self.ramp_s / 2) * self.axis_speed_m_s
+        return (max(time_s, self.ramp_s) - self.ramp_s / 2) * self.nominal_speed_m_s
 
     def turned(self, angle_deg: float) -> "Motion":
         """The same motion turned about the bowl's axis, immersed where the drag begins."""
@@ -476,7 +480,7 @@ class Scaling(Model):
     expected_exponent: Number | None = Field(default=None, description="expected exponent")
     source: str | None = Field(default=None, description="source of the expected exponent")
     fit_range: tuple[Positive, Positive] | None = Field(
-        default=None, description="lowest and highest value at which it is expected; none: all"
+        default=None, description="lowest and highest value of the fit; none: all"
     )
 
     @model_validator(mode="after")
@@ -584,21 +588,23 @@ class Study(Model):
             self.model_copy(
                 update={
                     "workpiece": self.workpiece.model_copy(
-                        update={"shape": one.shape or self.workpiece.shape}
+                        update={"shape": station.shape or self.workpiece.shape}
                     ),
-                    "motion": self.motion.turned(one.angle_deg),
+                    "motion": self.motion.turned(station.angle_deg),
                     "workpieces": None,
                 }
             )
-            for one in self._stations
+            for station in self._stations
         ]
 
     @property
     def _stations(self) -> Sequence[Station]:
         """The workpieces of the carousel; none where one stands as the study gives it."""
-        found = self.workpieces.stations if self.workpieces else ()
-        differ = len(found) > 1 or any(one.angle_deg or one.shape for one in found)
-        return found if differ else ()
+        stations = self.workpieces.stations if self.workpieces else ()
+        differ = len(stations) > 1 or any(
+            station.angle_deg or station.shape for station in stations
+        )
+        return stations if differ else ()
 
     def absent(self) -> set[str]:
         """The carousel, too, where it has one workpiece as the study gives it."""
@@ -615,7 +621,7 @@ class Study(Model):
         return {
             **without_fields(self.plain(), *OF_NO_RUN, "fidelities"),
             "materials": {
-                name: one.plain() for name, one in self.materials.items() if name in names
+                name: material.plain() for name, material in self.materials.items() if name in names
             },
             "pairs": {
                 "-".join(sorted(both)): self.pairs[name].plain()

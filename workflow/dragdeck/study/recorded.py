@@ -52,7 +52,9 @@ def with_recording(data: Json, study: Path) -> tuple[Json, Places, Mapping[str, 
             return value
         contents = {"sieve": _sieved, "shape": _shaped}
         known = {key: content for key, content in contents.items() if key in value}
-        return value | {k: filled(value[k], f"{field}.{k}", one) for k, one in known.items()}
+        return value | {
+            k: filled(value[k], f"{field}.{k}", recorded) for k, recorded in known.items()
+        }
 
     if isinstance(motion, dict) and "path" in motion:
         path = filled(motion["path"], "motion.path", _waypoints)
@@ -60,8 +62,10 @@ def with_recording(data: Json, study: Path) -> tuple[Json, Places, Mapping[str, 
     if isinstance(media, dict):
         classes = media.get("classes")
         if isinstance(classes, dict):
-            found = {name: grains(one, f"media.classes.{name}") for name, one in classes.items()}
-            media = {**media, "classes": found}
+            recorded_classes = {
+                name: grains(class_, f"media.classes.{name}") for name, class_ in classes.items()
+            }
+            media = {**media, "classes": recorded_classes}
         data = {**data, "media": grains(media, "media")}
     return data, places, unread
 
@@ -95,9 +99,9 @@ def _sieved(sieve: Any, field: str, study: Path, places: dict[str | None, _Place
 
 def mesh_errors(data: Json, study: Path) -> Iterator[InputError]:
     """What is wrong with the meshes of workpieces, of a study that has other errors, too."""
-    several, one = data.get("workpieces"), data.get("workpiece")
+    several, single = data.get("workpieces"), data.get("workpiece")
     each = several.get("each") if isinstance(several, dict) else None
-    for owner in (one, *(each if isinstance(each, list) else ())):
+    for owner in (single, *(each if isinstance(each, list) else ())):
         try:
             shape = MeshShape.model_validate(owner.get("shape") if isinstance(owner, dict) else 0)
             sizes = shape.facet_size_m, shape.edge_facet_size_m
@@ -154,5 +158,5 @@ def _read(
         places[f"{field}.{number}"] = file, line, None
         for at, name in [*enumerate(columns), ("speed_m_s", "speed_m_s")]:
             places[f"{field}.{number}.{at}"] = file, line, name
-    found: list[JsonValue] = points
-    return found
+    rows: list[JsonValue] = points
+    return rows

@@ -75,13 +75,13 @@ class Removal(Model):
 
     @model_validator(mode="after")
     def _whole(self) -> "Removal":
-        trials, own = self.calibrate or [], self.coefficient_m2_n
-        if (own is None) == (not trials):
+        trials, coefficient = self.calibrate or [], self.coefficient_m2_n
+        if (coefficient is None) == (not trials):
             raise ValueError("give either coefficient_m2_n, or calibrate with a weighed trial")
-        if self.sd_m2_n is not None and own is None:
+        if self.sd_m2_n is not None and coefficient is None:
             raise ValueError("sd_m2_n belongs to coefficient_m2_n: remove it")
-        uncertain = [(own or math.inf, self.sd_m2_n or 0.0, "sd_m2_n")]
-        uncertain += [(one.mass_loss_kg, one.sd_kg, "sd_kg") for one in trials]
+        uncertain = [(coefficient or math.inf, self.sd_m2_n or 0.0, "sd_m2_n")]
+        uncertain += [(trial.mass_loss_kg, trial.sd_kg, "sd_kg") for trial in trials]
         for value, sd, name in uncertain:
             if sd >= _TELLS * value:
                 why = f"{name} {sd:g} is half of its value, {value:g}, or more"
@@ -123,7 +123,7 @@ class TrialsFit(NamedTuple):
         """Probability of at least such a scatter if the uncertainties are the only cause."""
         from scipy.special import chdtrc
 
-        square = math.fsum(one**2 for one in self.residuals)
+        square = math.fsum(residual**2 for residual in self.residuals)
         return float(chdtrc(self.degrees, square)) if math.isfinite(self.degrees) else 1.0
 
     @property
@@ -148,7 +148,7 @@ def fit_trials(removal: Removal) -> TrialsFit | None:
 
     if removal.calibrate is None:
         return None
-    trials = [(one.mass_loss_kg, one.time_s, one.sd_kg) for one in removal.calibrate]
+    trials = [(trial.mass_loss_kg, trial.time_s, trial.sd_kg) for trial in removal.calibrate]
     mass, time, sd = np.array(trials).T
     information = float(((time / sd) ** 2).sum())
     rate = float((mass * time / sd**2).sum()) / information
@@ -235,33 +235,33 @@ class Law:
     parameters: tuple[str, ...] = ()
 
 
-def _finnie(one: Wearing, _: Removal) -> _Floats:
+def _finnie(wearing: Wearing, _: Removal) -> _Floats:
     """Finnie (1960), with a ratio of normal to tangential force of 2."""
-    angle = one.angle_rad
+    angle = wearing.angle_rad
     flat = np.sin(2 * angle) - 3 * np.sin(angle) ** 2
-    return one.double_energy_j * np.where(np.tan(angle) <= 1 / 3, flat, np.cos(angle) ** 2 / 3)
+    return wearing.double_energy_j * np.where(np.tan(angle) <= 1 / 3, flat, np.cos(angle) ** 2 / 3)
 
 
 _OKA_SPEED_M_S, _OKA_DIAMETER_M = 104.0, 326e-6
 
 
-def _oka(one: Wearing, of: Removal) -> _Floats:
+def _oka(wearing: Wearing, of: Removal) -> _Floats:
     """Oka et al. (2005), with their constants for sand; hardness in GPa.
 
     ``m v^2 (v/v')^(k2 - 2) (D/D')^k3 sin(a)^n1 (1 + Hv (1 - sin(a)))^n2``.
     """
-    hard, sine = (of.hardness_pa or 0.0) / 1e9, np.sin(one.angle_rad)
-    speed = np.hypot(one.normal_m_s, one.tangential_m_s)
+    hard, sine = (of.hardness_pa or 0.0) / 1e9, np.sin(wearing.angle_rad)
+    speed = np.hypot(wearing.normal_m_s, wearing.tangential_m_s)
     shape = sine ** (0.71 * hard**0.14) * (1 + hard * (1 - sine)) ** (2.4 * hard**-0.94)
     fast = (speed / _OKA_SPEED_M_S) ** (2.3 * hard**0.038 - 2)
     return np.asarray(
-        one.double_energy_j * fast * (2 * one.radius_m / _OKA_DIAMETER_M) ** 0.19 * shape
+        wearing.double_energy_j * fast * (2 * wearing.radius_m / _OKA_DIAMETER_M) ** 0.19 * shape
     )
 
 
-def _archard(one: Wearing, _: Removal) -> _Floats:
+def _archard(wearing: Wearing, _: Removal) -> _Floats:
     """Archard (1953), and Preston (1927) for polishing."""
-    return one.force_slide_n_m
+    return wearing.force_slide_n_m
 
 
 LAWS: Mapping[str, Law] = {

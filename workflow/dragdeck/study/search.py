@@ -7,12 +7,13 @@ were chosen, and each of them is a case of the study.
 import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
 from dragdeck.documents import Document, Part
-from dragdeck.study.base import Model, Name, Number, Whole
+from dragdeck.files import table_rows
+from dragdeck.study.base import QUANTITIES_FILE, Model, Name, Number, Whole
 
 RECORD = Path("search") / "points.json"
 """The record of a search in the results of its study."""
@@ -20,25 +21,14 @@ RECORD = Path("search") / "points.json"
 _OF_TARGET = ("minutes", "minutes_slowest")
 _OF_REMOVAL = ("removal_depth", "removal_variation", *_OF_TARGET)
 _OF_TOUCH = ("peak_pressure",)
-_SIGNED = ("drag_mean", "vertical_mean", "workpiece_work")
+_ROWS = [row for row in table_rows(QUANTITIES_FILE) if row["reported"]]
+_SIGNED = {row["name"] for row in _ROWS if row["negative"]}
 """Quantities that may be negative."""
 
-SearchedQuantity = Literal[
-    "removal_depth",
-    "removal_variation",
-    "minutes",
-    "minutes_slowest",
-    "peak_pressure",
-    "drag_mean",
-    "vertical_mean",
-    "workpiece_contacts",
-    "contact_force_mean",
-    "contact_force_p90",
-    "normal_load",
-    "force_slide",
-    "friction_work",
-    "workpiece_work",
-]
+if TYPE_CHECKING:
+    SearchedQuantity = str
+else:
+    SearchedQuantity = Literal[(*_OF_REMOVAL, *_OF_TOUCH, *(row["name"] for row in _ROWS))]
 
 
 class SearchedMeasure(Model):
@@ -71,12 +61,12 @@ class SearchedMeasure(Model):
 
     def lacks(self, removal: bool, target: bool, touches: bool) -> str:
         """The field without which no run has this quantity, empty if there is none."""
-        found = {
+        lacking = {
             "removal": self.quantity in _OF_REMOVAL and not removal,
             "removal.target_depth_m": self.quantity in _OF_TARGET and not target,
             "outputs.first_touch_fraction": self.quantity in _OF_TOUCH and not touches,
         }
-        return next((name for name, missing in found.items() if missing), "")
+        return next((name for name, missing in lacking.items() if missing), "")
 
 
 class Objective(SearchedMeasure):
@@ -161,7 +151,7 @@ class Search(Model):
     @property
     def measures(self) -> Mapping[str, SearchedMeasure]:
         """Objective and limits by their fields."""
-        limits = {f"limits.{number}": one for number, one in enumerate(self.limits)}
+        limits = {f"limits.{number}": limit for number, limit in enumerate(self.limits)}
         return {"objective": self.objective, **limits}
 
     def excluded(self) -> Iterator[tuple[str, str]]:

@@ -12,13 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from dragdeck.physics.estimates import SOLID_FRACTION_ESTIMATE
 from dragdeck.study.base import Model, Number, Positive, Whole
 
 Corners = NDArray[np.float64]
-
-SOLID_FRACTION_ESTIMATE = 0.59
-"""Solid fraction of a poured bed of spheres of about one size, about twelve of them wide, an
-estimate used only for expectations before the bed exists (measured beds replace it)."""
 
 SOLID_FRACTION_STD = 0.03
 """Standard deviation of measured solid fractions over those of `solid_fraction`, less 1

@@ -11,6 +11,7 @@ import yaml
 from pydantic import JsonValue
 
 from dragdeck.errors import InputError, choices
+from dragdeck.shipped import SHIPPED
 from dragdeck.study.base import DECIMAL, NAME, STUDY_FILE, Json
 from dragdeck.study.media import INSTEAD_OF
 
@@ -110,7 +111,9 @@ def _composed(content: bytes) -> yaml.Node:
 
 
 def _studies_nearby(file: Path) -> str:
-    names = sorted(found.parent.name for found in file.parent.parent.glob(f"*/{STUDY_FILE}"))
+    names = sorted(
+        study_file.parent.name for study_file in file.parent.parent.glob(f"*/{STUDY_FILE}")
+    )
     return f"choose one of: {', '.join(names)}" if names else "check the path"
 
 
@@ -123,8 +126,8 @@ def read_study(file: Path) -> dict[str, JsonValue]:
         As of `read_yaml` and `lineage`.
     """
     data: dict[str, JsonValue] = {}
-    for _, own in reversed(lineage(file)):
-        data = _merged(data, own)
+    for _, content in reversed(lineage(file)):
+        data = _merged(data, content)
     data.pop("extends", None)
     return data
 
@@ -137,25 +140,33 @@ def lineage(file: Path) -> list[tuple[Path, Json]]:
     InputError
         A file cannot be read, a study extends one that there is not, or itself.
     """
-    found: list[tuple[Path, Json]] = [(file, read_yaml(file))]
-    while (name := found[-1][1].get("extends")) is not None:
-        studies, place = file.parent.parent, found[-1][0]
-        base = studies / str(name) / STUDY_FILE
-        used = {other.parent.name for other, _ in found}
-        known = {other.parent.name for other in studies.glob(f"*/{STUDY_FILE}")} - used
+    family: list[tuple[Path, Json]] = [(file, read_yaml(file))]
+    while (name := family[-1][1].get("extends")) is not None:
+        studies, place = file.parent.parent, family[-1][0]
+        base = studies_called(studies, name) if isinstance(name, str) else []
         problem = None
-        if not isinstance(name, str) or not NAME.fullmatch(name) or not base.is_file():
+        if not base:
             problem = "extends an unknown study"
-        elif any(base == other for other, _ in found):
+        elif any(base[0] == other for other, _ in family):
             problem = "extends itself"
         if problem:
+            used = {other.parent.name for other, _ in family}
+            known = dict.fromkeys(other.parent.name for other in studies_called(studies))
+            names = [word for word in known if NAME.fullmatch(word) and word not in used]
             raise InputError(
                 problem, file=place, field="extends", value=shown(name),
-                limit=choices(str(name), filter(NAME.fullmatch, sorted(known))),
-                remedy="name another study, or remove the line",
+                limit=choices(str(name), names), remedy="name another study, or remove the line",
             )  # fmt: skip
-        found.append((base, read_yaml(base)))
-    return found
+        family.append((base[0], read_yaml(base[0])))
+    return family
+
+
+def studies_called(studies: Path, name: str | None = None) -> list[Path]:
+    """The files of the studies of this name, or of all: a project's before those of dragdeck."""
+    if name is not None and not NAME.fullmatch(name):
+        return []
+    folders = (studies, SHIPPED / "studies")
+    return [file for of in folders for file in sorted(of.glob(f"{name or '*'}/{STUDY_FILE}"))]
 
 
 def study_folders(file: Path) -> tuple[Path, ...]:
@@ -169,7 +180,7 @@ def _folders(file: Path, _changed: int) -> tuple[Path, ...]:
 
 
 def mesh_beside(study: Path, name: str) -> Path:
-    """The file of a mesh: beside the study, in its meshes/, or in the project's meshes/.
+    """The file of a mesh: beside the study, in its meshes/, in the project's or dragdeck's meshes/.
 
     A study that extends another finds its meshes, too.
 
@@ -178,8 +189,8 @@ def mesh_beside(study: Path, name: str) -> Path:
     InputError
         No such file in any of these places.
     """
-    places = [place for one in study_folders(study) for place in (one, one / "meshes")]
-    places.append(study.parent.parent.parent / "meshes")
+    places = [place for folder in study_folders(study) for place in (folder, folder / "meshes")]
+    places += dict.fromkeys([study.parent.parent.parent / "meshes", SHIPPED / "meshes"])
     for place in places:
         if (place / name).is_file():
             return place / name
@@ -197,26 +208,26 @@ _WHOLE = ("fidelity", "sweep")
 """Blocks that a study takes or replaces as a whole."""
 
 
-def _merged(base: Json, own: Json, top: bool = True) -> dict[str, JsonValue]:
+def _merged(base: Json, changes: Json, top: bool = True) -> dict[str, JsonValue]:
     """A study's content with another's changes.
 
     A part of another `kind` is replaced, and ``null`` leaves out a part of the base. A ``null``
     with nothing to leave out stays: only fields that may be empty accept it. Alternatives of the
     media give way to each other.
     """
-    replaced = {name for key in own for name in INSTEAD_OF.get(key, ())}
-    found = {key: value for key, value in base.items() if key not in replaced}
-    for key, value in own.items():
-        there = found.get(key)
-        if value is None and key in found:
-            del found[key]
+    replaced = {name for key in changes for name in INSTEAD_OF.get(key, ())}
+    merged = {key: value for key, value in base.items() if key not in replaced}
+    for key, value in changes.items():
+        there = merged.get(key)
+        if value is None and key in merged:
+            del merged[key]
         elif isinstance(value, dict) and not (top and key in _WHOLE):
             if not isinstance(there, dict) or value.get("kind") not in (None, there.get("kind")):
                 there = {}
-            found[key] = _merged(there, value, top=False)
+            merged[key] = _merged(there, value, top=False)
         else:
-            found[key] = value
-    return found
+            merged[key] = value
+    return merged
 
 
 def located(error: InputError) -> InputError:

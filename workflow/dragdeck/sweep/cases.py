@@ -31,7 +31,7 @@ from dragdeck.study.base import NAME, NAME_LIMIT, STUDY_FILE, Json, Model
 from dragdeck.study.check import explained, validate
 from dragdeck.study.model import Tolerance
 from dragdeck.study.search import Search, SearchRecord
-from dragdeck.study.yaml import read_study, read_yaml
+from dragdeck.study.yaml import read_study, read_yaml, studies_called
 
 Settings = Mapping[str, Any]
 """Dotted name of a field to its value."""
@@ -89,8 +89,8 @@ class Variation(Model):
             (field, {field: value}) for field, values in self.one_by_one.items() for value in values
         ]
         for values in combinations(self.vary):
-            for axis, own in alone or [("", {})]:
-                yield DesignPoint(axis, {**self.others, **values, **own})
+            for axis, fields in alone or [("", {})]:
+                yield DesignPoint(axis, {**self.others, **values, **fields})
 
 
 Block = TypeVar("Block", bound=Variation)
@@ -121,15 +121,15 @@ class Design(Model, Generic[Block]):
             problem = "the file has no such design"
             raise InputError(problem, file=file, value=name, limit=choices(name, data))
         try:
-            found = cls.model_validate(data if name is None else data[name])
+            plan = cls.model_validate(data if name is None else data[name])
         except ValidationError as error:
             raise explained(error, file) from None
-        check_number(sum(block.count for block in found.points), file)
-        if found.reference.count != 1:
+        check_number(sum(block.count for block in plan.points), file)
+        if plan.reference.count != 1:
             raise InputError(
                 "the reference must be a single point", file=file, field="reference.vary"
             )
-        return found
+        return plan
 
 
 def check_number(points: int, file: Path) -> None:
@@ -180,23 +180,25 @@ def load_cases(
     if fidelity is not None:
         data["fidelity"] = fidelity
     study = validate(data, file, whole=True)
-    plain, found, errors = {**data, "sweep": {}, "search": None}, [], []
+    plain, cases, errors = {**data, "sweep": {}, "search": None}, [], []
     points = list[Settings]([{}])
     if study.search is not None:
         searched_bounds(file, study.search)
         if searched and searched.is_file():
             known = SearchRecord.read(searched).points
-            points = [one.values for one in known if not one.refused] or points
+            points = [
+                searched_point.values for searched_point in known if not searched_point.refused
+            ] or points
     for point, settings in itertools.product(points, combinations(study.sweep)):
         settings = {**point, **settings}
         try:
-            found.append(settle_case(file, plain, settings, resolve=resolve))
+            cases.append(settle_case(file, plain, settings, resolve=resolve))
         except InputError as error:
             errors.append(error)
     if errors:
         raise together(errors)
-    _check_doubles(found)
-    return beside_each_other(found)
+    _check_doubles(cases)
+    return beside_each_other(cases)
 
 
 def searched_bounds(file: Path, search: Search) -> Mapping[str, Sequence[Case]]:
@@ -207,10 +209,10 @@ def searched_bounds(file: Path, search: Search) -> Mapping[str, Sequence[Case]]:
     InputError
         A value breaks the study.
     """
-    found = {}
+    bounds = {}
     data = {**read_study(file), "sweep": {}, "search": None, "fidelity": search.confirm}
     for field in search.vary:
-        cases = found[field] = list[Case]()
+        cases = bounds[field] = list[Case]()
         for value in (search.value(field, part) for part in (0.0, _MIDDLE, 1.0)):
             try:
                 cases.append(settle_case(file, data, {field: value}))
@@ -220,14 +222,14 @@ def searched_bounds(file: Path, search: Search) -> Mapping[str, Sequence[Case]]:
                                  file=file, field=f"search.vary.{field}", value=value,
                                  limit=error.limit, remedy=error.remedy or "other bounds",
                                  ) from None  # fmt: skip
-    return found
+    return bounds
 
 
-def _check_doubles(found: list[Case]) -> None:
+def _check_doubles(cases: list[Case]) -> None:
     """Refuse two cases of the same content: a value is given twice, perhaps written otherwise."""
     first: dict[str, Case] = {}
-    for case in found:
-        same = first.setdefault(f"{case.asked} {case.study.model_dump_json()}", case)
+    for case in cases:
+        same = first.setdefault(f"{case.requested} {case.study.model_dump_json()}", case)
         if same is not case:
             raise InputError(
                 f"a value is given twice: the cases {same.name} and {case.name} are the same",
@@ -301,16 +303,16 @@ def study_file(studies: Path, name: str) -> Path:
     InputError
         No such study; lists those there are.
     """
-    file = studies / name / STUDY_FILE
-    if not NAME.fullmatch(name) or not file.is_file():
-        known = sorted(found.parent.name for found in studies.glob(f"*/{STUDY_FILE}"))
+    files = studies_called(studies, name)
+    if not files:
+        known = dict.fromkeys(file.parent.name for file in studies_called(studies))
         raise InputError(
             f"unknown study {name!a}",
             file=studies,
             limit=choices(name, filter(NAME.fullmatch, known)),
             remedy=f"choose one of these, or create a folder; its name has {NAME_LIMIT}",
         )
-    return file
+    return files[0]
 
 
 _NEW_STUDY = """\

@@ -121,13 +121,13 @@ def plan_points(
     blocks = [plan.reference, *plan.points]
     packings = sum(block.count * (block.seeds or plan.seeds) for block in blocks)
     check_number(len(plan.scenes) * packings, plan_file)
-    found: dict[str, Case] = {}
+    unlike_cases: dict[str, Case] = {}
     for scene, block in itertools.product(plan.scenes.values(), blocks):
         for settings in _settings(plan, block, base.study, scene):
             shown = {**scene, **_unnamed(settings)}
             case = _case(base, {**plan.base, **scene, **settings}, shown, plan_file, resolve)
             _check_counted(case, plan_file)
-            found.setdefault(scenes["process"].run_id(case), case)
+            unlike_cases.setdefault(scenes["process"].run_id(case), case)
     drops: dict[str, Case] = {}
     for settings in [
         {},
@@ -135,7 +135,7 @@ def plan_points(
     ]:
         case = _case(base, {**plan.base, **settings}, settings, plan_file, resolve)
         drops.setdefault(scenes["drop_test"].run_id(case), case)
-    return Points(beside_each_other(found.values()), list(drops.values()), plan.cost_rounds)
+    return Points(beside_each_other(unlike_cases.values()), list(drops.values()), plan.cost_rounds)
 
 
 def _check_counted(case: Case, plan_file: Path) -> None:

@@ -147,7 +147,7 @@ class WorkpiecePath(Model):
         return ()
 
     @property
-    def leans(self) -> bool:
+    def inclined(self) -> bool:
         """Whether it inclines the workpiece."""
         return False
 
@@ -243,7 +243,7 @@ class WorkpiecePath(Model):
         ----------
         drive : Drive
         since : (N,) ndarray of int
-            StepCounts from the start of the drag.
+            Number of steps from the start of the drag.
         point_m, ref_m : (N, 3) ndarray
             The points, and the reference point, at these steps.
 
@@ -257,7 +257,7 @@ class WorkpiecePath(Model):
         moved = rate[:, None] * as_rows(self.tangent(share))
         if not self.turns(drive.orientation):
             return moved
-        after, before = (self._heading(share + one * _NEAR) for one in (1, -1))
+        after, before = (self._heading(share + sign * _NEAR) for sign in (1, -1))
         turning = wrap_angle(after - before) / (2 * _NEAR) * rate
         return moved + about_vertical(turning, point_m - ref_m)
 
@@ -273,9 +273,9 @@ class WorkpiecePath(Model):
         for when, late in (("now", 0), ("before", 1)):
             variables[f"path_{when}"] = str(drive.share_formula(late))
             share = Formula(f"v_path_{when}")
-            found = dict(zip("xyz", self.place(share), strict=True))
+            formulas = dict(zip("xyz", self.place(share), strict=True))
             along = dict(zip(("ahead_x", "ahead_y"), self.tangent(share), strict=False))
-            for name, value in {**found, **(along if turns else {})}.items():
+            for name, value in {**formulas, **(along if turns else {})}.items():
                 variables[f"path_{name}_{when}"] = formula(value)
         for axis in "xyz":
             variables[f"path_v{axis}"] = f"(v_path_{axis}_now-v_path_{axis}_before)/dt"

@@ -93,7 +93,7 @@ class WaypointsPath(WorkpiecePath):
     @classmethod
     def _in_time(cls, points: list[Waypoint]) -> list[Waypoint]:
         problem = PydanticCustomError("order", "the time does not increase")
-        late = [n for n, (one, other) in enumerate(pairwise(points), 1) if other[0] <= one[0]]
+        late = [n for n, (before, other) in enumerate(pairwise(points), 1) if other[0] <= before[0]]
         if late:
             wrong = [InitErrorDetails(type=problem, loc=(n, 0), input=points[n][0]) for n in late]
             raise ValidationError.from_exception_data("points", wrong)
@@ -114,12 +114,12 @@ class WaypointsPath(WorkpiecePath):
 
     def plain(self) -> dict[str, JsonValue]:
         """Waypoints have their inclination only if there is any: no run is named anew."""
-        count = 7 if self.leans else 5
+        count = 7 if self.inclined else 5
         shown: list[JsonValue] = [list[JsonValue](point[:count]) for point in self.points]
         return super().plain() | {"points": shown}
 
     @property
-    def leans(self) -> bool:
+    def inclined(self) -> bool:
         """Whether a waypoint has a pitch or a roll."""
         return any(any(point[5:]) for point in self.points)
 
@@ -136,11 +136,11 @@ class WaypointsPath(WorkpiecePath):
     def turning(self) -> Sequence[tuple[float, float]]:
         """From the start to each waypoint, s, and the speed of rotation until then, 1/min."""
         start = self.points[0].time_s
-        found = [
+        stretches = [
             (b.time_s - start, (b.turn_deg - a.turn_deg) / 6 / (b.time_s - a.time_s))
             for a, b in pairwise(self.points)
         ]
-        return found if any(rpm for _, rpm in found) else ()
+        return stretches if any(rpm for _, rpm in stretches) else ()
 
     @property
     def turning_rad_s(self) -> float:
@@ -226,14 +226,14 @@ class WaypointsPath(WorkpiecePath):
         ends = [(point.time_s - self.points[0].time_s) / pace for point in self.points[1:]]
         stretches = zip(ends, self._stretches(), strict=True)
         rates = [(end, pace * np.array(shift) / time) for end, (time, *shift) in stretches]
-        found = []
+        driven = []
         for count, begin, end in in_steps(ends, drive.steps, drive.timestep_s):
             moved = integral(rates, end) - integral(rates, begin)
             x, y, z = (moved / (count * drive.timestep_s)).tolist()
-            found.append(
+            driven.append(
                 DrivenStage(count, (x, y, z), self._turned(begin * pace, end * pace, drive))
             )
-        return found
+        return driven
 
     def _turned(self, begin_s: float, end_s: float, drive: Drive) -> Vector:
         """Rotation vector between two recorded times."""
@@ -244,7 +244,7 @@ class WaypointsPath(WorkpiecePath):
 
     def _inclined(self, drive: Drive) -> bool:
         """Whether its rotations are more than turns about the vertical of an upright workpiece."""
-        return self.leans or bool(self.turning and drive.tilt_deg)
+        return self.inclined or bool(self.turning and drive.tilt_deg)
 
     def _orientation(self, time_s: float) -> Floats:
         """Orientation relative to the first waypoint after a recorded time, (3, 3).
@@ -252,11 +252,11 @@ class WaypointsPath(WorkpiecePath):
         From one waypoint to the next, the workpiece turns about one axis at one speed.
         """
         time = time_s + self.points[0].time_s
-        one, other = next(
+        before, other = next(
             (both for both in pairwise(self.points) if time <= both[1].time_s), self.points[-2:]
         )
-        first, second = (_by_angles(point, self.points[0]) for point in (one, other))
-        part = (time - one.time_s) / (other.time_s - one.time_s)
+        first, second = (_by_angles(point, self.points[0]) for point in (before, other))
+        part = (time - before.time_s) / (other.time_s - before.time_s)
         return np.asarray(by_vector(part * rotation_vector(second @ first.T)) @ first)
 
     def turns(self, orientation: Orientation) -> bool:
@@ -291,11 +291,11 @@ class WaypointsPath(WorkpiecePath):
 
     def directions(self, drive: Drive, since: StepCounts, ref_xy_m: Floats) -> Floats:
         """That of the stage; in a vertical one or a pause, the last direction before."""
-        found, last, stages = [], self.direction_rad, self.stages(drive)
+        headings, last, stages = [], self.direction_rad, self.stages(drive)
         for x, y, _ in (stage.velocity_m_s for stage in stages):
             last = float(np.arctan2(y, x)) if x or y else last
-            found.append(last)
-        return wrap_angle(np.array(found)[_at(stages, since)])
+            headings.append(last)
+        return wrap_angle(np.array(headings)[_at(stages, since)])
 
     def velocity(self, drive: Drive, since: StepCounts, point_m: Floats, ref_m: Floats) -> Floats:
         """That of the stage."""
@@ -304,7 +304,9 @@ class WaypointsPath(WorkpiecePath):
         moved = np.array([stage.velocity_m_s for stage in stages])[number]
         if not self._inclined(drive):
             return moved
-        rates = [np.array(one.rotation_rad) / (one.steps * drive.timestep_s) for one in stages]
+        rates = [
+            np.array(stage.rotation_rad) / (stage.steps * drive.timestep_s) for stage in stages
+        ]
         rate = rotated(np.array(rates), self.direction_rad)[number]
         return np.asarray(moved + np.cross(rate, point_m - ref_m))
 
@@ -358,9 +360,7 @@ def _chains(
 
 def _by_angles(point: Waypoint, first: Waypoint) -> Floats:
     """Orientation at a waypoint relative to the first one: roll, then pitch, then turn, (3, 3)."""
-    turn, pitch, roll = (
-        math.radians(angle)
-        for angle in (point.turn_deg - first.turn_deg, point.pitch_deg, point.roll_deg)
-    )
-    x, y, z = np.eye(3)
-    return np.asarray(by_vector(turn * z) @ by_vector(pitch * y) @ by_vector(roll * x))
+    from scipy.spatial.transform import Rotation
+
+    angles = [point.turn_deg - first.turn_deg, point.pitch_deg, point.roll_deg]
+    return np.asarray(Rotation.from_euler("ZYX", angles, degrees=True).as_matrix())

@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field, JsonValue
 
 from dragdeck.study.base import Model, NonNegative
-from dragdeck.study.drive import Drive, EngineMotion, Floats, Rotation, SmoothStart, StepCounts
+from dragdeck.study.drive import Drive, EngineMotion, Floats, Orientations, SmoothStart, StepCounts
 
 
 class SuperposedMotion(Model):
@@ -59,11 +59,13 @@ class SuperposedMotion(Model):
         """By which angle it has turned the workpiece about its axis after (N,) steps, rad."""
         return np.zeros(len(since))
 
-    def rotated(self, drive: Drive, since: StepCounts, before: Rotation) -> Rotation:
+    def rotated(self, drive: Drive, since: StepCounts, before: Orientations) -> Orientations:
         """The orientation after (N,) steps, with that which the workpiece has without it."""
         return before
 
-    def velocity(self, drive: Drive, since: StepCounts, arm_m: Floats, before: Rotation) -> Floats:
+    def velocity(
+        self, drive: Drive, since: StepCounts, arm_m: Floats, before: Orientations
+    ) -> Floats:
         """What it adds to the velocity of points that are fixed to the workpiece.
 
         Parameters
@@ -72,7 +74,7 @@ class SuperposedMotion(Model):
         since : (N,) ndarray of int
         arm_m : (N, 3) ndarray
             From the reference point to the points, m.
-        before : Rotation
+        before : Orientations
             As for `rotated`.
 
         Returns

@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field, JsonValue
 
 from dragdeck.study.base import Positive
-from dragdeck.study.drive import Drive, EngineMotion, Floats, Rotation, StepCounts
+from dragdeck.study.drive import Drive, EngineMotion, Floats, Orientations, StepCounts
 from dragdeck.study.superposed.motion import SuperposedMotion
 
 
@@ -42,7 +42,9 @@ class Oscillation(SuperposedMotion):
         height = self.amplitude_m * np.sin(self._angle(drive, since))
         return np.column_stack([np.zeros((len(since), 2)), height])
 
-    def velocity(self, drive: Drive, since: StepCounts, arm_m: Floats, before: Rotation) -> Floats:
+    def velocity(
+        self, drive: Drive, since: StepCounts, arm_m: Floats, before: Orientations
+    ) -> Floats:
         """Of the whole workpiece, up and down."""
         velocity, pace = np.zeros_like(arm_m), self.begin(drive).pace(since)
         most = self.amplitude_m * self._rate_rad_s

@@ -13,7 +13,7 @@ from dragdeck.study.drive import (
     Drive,
     EngineMotion,
     Floats,
-    Rotation,
+    Orientations,
     StepCounts,
     about_vertical,
     by_vector,
@@ -70,8 +70,8 @@ class Spin(SuperposedMotion):
     def faster(self, factor: float) -> Self:
         """The spin at that factor, its stages as much shorter."""
         stages = [
-            one.model_copy(update={"until_s": one.until_s / factor, "rpm": factor * one.rpm})
-            for one in self._stages()
+            stage.model_copy(update={"until_s": stage.until_s / factor, "rpm": factor * stage.rpm})
+            for stage in self._stages()
         ]
         spin = {"rpm": stages[0].rpm} if self.schedule is None else {"schedule": stages}
         return self.model_copy(update={**spin, "ramp_s": self.ramp_s / factor})
@@ -105,14 +105,16 @@ class Spin(SuperposedMotion):
         within = begin.advance(np.clip(done, begun, ends)) - begin.advance(begun)
         return np.asarray(within @ np.array([rate for _, rate in stages]) * drive.timestep_s)
 
-    def rotated(self, drive: Drive, since: StepCounts, before: Rotation) -> Rotation:
+    def rotated(self, drive: Drive, since: StepCounts, before: Orientations) -> Orientations:
         """About the vertical, or the axis of a tilted workpiece."""
         angle = self.turn(drive, since)
         if not drive.tilt_deg:
-            return Rotation(before.turn_rad + angle, before.own)
-        return Rotation(before.turn_rad, by_vector(angle[:, None] * drive.own_axis))
+            return Orientations(before.turn_rad + angle, before.own)
+        return Orientations(before.turn_rad, by_vector(angle[:, None] * drive.own_axis))
 
-    def velocity(self, drive: Drive, since: StepCounts, arm_m: Floats, before: Rotation) -> Floats:
+    def velocity(
+        self, drive: Drive, since: StepCounts, arm_m: Floats, before: Orientations
+    ) -> Floats:
         """The rate of the stage that a step belongs to, cross the arm."""
         stages = self.stages(drive)
         rates = np.array([rate for _, rate in stages])

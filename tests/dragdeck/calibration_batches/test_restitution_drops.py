@@ -11,7 +11,7 @@ from dragchain.calibration.fit import calibrate_file
 from dragchain.calibration.report import write_calibration_report
 from dragchain.calibration.results import confirmed, write_calibration
 from dragchain.calibration.simulated_drops import read_drops
-from dragdeck.campaigns.restitution_drops import (
+from dragdeck.calibration_batches.restitution_drops import (
     Drop,
     confirmation,
     drop_case,

@@ -10,11 +10,10 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import NamedTuple
 
+from dragchain.quantities.registry import Quantity
 from dragchain.statistics.estimate import Estimate
-from dragdeck.files import table_rows
 from dragdeck.records.case import CaseOfRun, FidelityOfRun
 from dragdeck.records.run import changed_in_words
-from dragdeck.study.base import QUANTITIES_FILE
 
 _TIMES = "\N{MULTIPLICATION SIGN}"
 
@@ -26,40 +25,6 @@ class Basis(StrEnum):
     WINDOWS = "from windows at the physical Young's modulus"
     SCALED = "scaled to process time"
     NONE = "not available"
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """A quantity of a process run, and how it depends on the settings.
-
-    Attributes
-    ----------
-    name, label, unit : str
-        The unit is empty for a plain number.
-    time : int
-        Power of time in it. A workpiece that is f times as fast takes 1/f of the time.
-    robust : bool
-        Whether a reduced modulus and a faster workpiece change it so little that the run's value
-        stands for the process where there is no correction: force and torque on the whole
-        workpiece.
-    """
-
-    name: str
-    label: str
-    unit: str = ""
-    time: int = 0
-    robust: bool = False
-
-
-QUANTITIES = tuple(
-    Quantity(
-        row["name"], row["report"] or row["label"], row["report_unit"] or row["unit"],
-        int(row["time"] or 0), row["robust"] == "yes",
-    )
-    for row in sorted(table_rows(QUANTITIES_FILE), key=lambda row: int(row["place"] or 0))
-    if row["place"]
-)  # fmt: skip
-"""The registry: what a report tells of a process run, in its order."""
 
 
 class Correction(NamedTuple):

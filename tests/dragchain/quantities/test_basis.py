@@ -6,7 +6,8 @@ from typing import Any
 import pytest
 from report_files import case_json
 
-from dragchain.run.basis import Basis, Correction, Quantity, judge, notes
+from dragchain.quantities.basis import Basis, Correction, judge, notes
+from dragchain.quantities.registry import Quantity
 from dragchain.statistics.estimate import Estimate
 from dragdeck.records.case import CaseOfRun
 

@@ -1,6 +1,9 @@
 # The stability map: a job a regime, each with many small runs. A run that fails
 # is a finding; a batch that is interrupted goes on where it was.
 
+from evidence.stability.points import bed_settings
+
+STABILITY_MAP = config["stability_map"]
 
 # Folders of the fillings that columns and drags start from; none without a map.
 STABILITY_BEDS = [

@@ -26,7 +26,7 @@ def angle_runs(angles: Angles) -> dict[str, AngleRun]:
     The coefficients fill the study's ranges evenly in the square roots of the distances from the
     lower ends: angles change most where the coefficients are small.
     """
-    found = {}
+    scenes = {}
     for number in range(1, _POINTS + 1):
         friction, rolling = (
             round(low + (high - low) * ((0.5 + number * step) % 1) ** 2, 6)
@@ -37,8 +37,8 @@ def angle_runs(angles: Angles) -> dict[str, AngleRun]:
         for seed in (number, number + _OTHER_SEED)[: 1 + (number % _REPEATED == 0)]:
             for rig in angles.rigs:
                 run = AngleRun(rig=rig, friction=friction, rolling_friction=rolling, seed=seed)
-                found[f"{rig}-{seed:04d}"] = run
-    return found
+                scenes[f"{rig}-{seed:04d}"] = run
+    return scenes
 
 
 def run_angles(case: Case, batch: Batch, report: Report, cores: int = 1) -> None:
@@ -66,9 +66,11 @@ def run_angles(case: Case, batch: Batch, report: Report, cores: int = 1) -> None
         raise InputError("no measured angle", file=case.file, field="calibration.angles")
     angles = calibration.angles
     runs = angle_runs(angles)
-    for one in {one.rig: one for one in runs.values()}.values():
-        angle_scene(case, one)  # what cannot be simulated is refused before all runs
-    batch.each({name: partial(angle_scene, case, one) for name, one in runs.items()}, report, cores)
+    for run in {scene.rig: scene for scene in runs.values()}.values():
+        angle_scene(case, run)  # what cannot be simulated is refused before all runs
+    batch.each(
+        {name: partial(angle_scene, case, scene) for name, scene in runs.items()}, report, cores
+    )
     AnglesFile(
         study=case.study_name,
         title=case.study.title,

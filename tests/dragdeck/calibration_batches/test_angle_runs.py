@@ -10,7 +10,7 @@ from made_study import Made
 
 from dragchain.calibration.angles import read_angle
 from dragchain.run.run_parts import iter_frames
-from dragdeck.campaigns.angle_runs import angle_runs, run_angles
+from dragdeck.calibration_batches.angle_runs import angle_runs, run_angles
 from dragdeck.cases.case import Case
 from dragdeck.decks.outputs import load_outputs
 from dragdeck.decks.render import write_run

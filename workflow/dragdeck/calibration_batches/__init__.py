@@ -1,0 +1,1 @@
+"""Batches of short runs for a calibration: drop tests, heaps and drums."""

@@ -1,0 +1,161 @@
+# Functions of ./run, in a clone and in a project that `dragdeck init` made. $root is its folder,
+# where it works, and $caller the folder of the call.
+
+# A path that the caller gave is the caller's, not this folder's.
+seen_from_here() {
+    case $1 in
+        /*) printf '%s\n' "$1" ;;
+        */*) printf '%s\n' "$caller/$1" ;;
+        *) printf '%s\n' "$1" ;;
+    esac
+}
+
+if [ -n "${DRAGDECK_ENGINE:-}" ]; then
+    DRAGDECK_ENGINE=$(seen_from_here "$DRAGDECK_ENGINE")
+    export DRAGDECK_ENGINE
+fi
+
+usage_of_studies() {
+    cat <<'END'
+usage: ./run TARGET... [--config study=STUDY] [OPTION...]
+
+Run a study: from its input scripts to its report. ./run starts Snakemake with these arguments,
+for example:  ./run all --config study=uhlmann2015
+
+targets of a study:
+  all               tables, figures and report of all cases
+  drop_test, filling, process
+                    runs and tables of one scene only
+  report            the report on the runs, results/STUDY/report/report.html
+  scaling           fit of a power law to the mean drag; needs scaling in the study
+  calibrate         fit of coefficients to a drop test or angles; needs calibration in the study
+  figures           figures of the process runs for a publication, as SVG, PDF and PNG
+  export            ParaView files of all process runs
+  crate             RO-Crate of inputs, runs and report
+options of Snakemake:
+  --config study=STUDY fidelity=NAME plan=NAME
+                    study to run, settings and plan to use (defaults: config/config.yaml)
+  --dry-run         list the jobs without running them
+  --cores N         number of cores (default: all)
+  --workflow-profile profiles/slurm
+                    use the queue of a cluster, see docs/howto/cluster.md
+
+other commands:
+  ./run status STUDY            show what is complete, running, failed or waiting, and time left
+  ./run open STUDY              print the path of the report; open it if there is a display
+  ./run dragdeck ARGUMENT...    input scripts and runs, see ./run dragdeck --help
+  ./run dragchain ARGUMENT...   tables, figures and reports, see ./run dragchain --help
+  ./run compare --config studies=A,B
+                                run studies to their reports, and write their cases side by side in
+                                results/compare/A+B/comparison.html; cases of a sweep: studies=A
+  ./run search --config study=STUDY
+                                search for a setting, as search in the study says: round by round,
+                                to results/STUDY/search/search.html; resumes where it was
+
+All results are written to the folder of this script, wherever it is called from.
+
+environment variables:
+  DRAGDECK_ENGINE   path of the LIGGGHTS binary (default: liggghts)
+  DRAGDECK_LAUNCHER command that starts several MPI ranks, for example "srun --mpi=pmix"
+                    (default: mpirun)
+  DRAGDECK_CORES    number of cores for MPI ranks: a number or auto (default: auto, all cores
+                    of this machine)
+END
+}
+
+say() { printf '%s\n' "run: $*" >&2; }
+
+fail() {
+    say "$1"
+    shift
+    for line in "$@"; do printf '     %s\n' "$line" >&2; done
+    exit 1
+}
+
+# Results and .venv are made here.
+ensure_writable() {
+    [ -w "$root" ] || fail "this folder cannot be written to" "value:  $root" \
+        "remedy: run it as the owner of the folder, or work in your own copy"
+    free=$(df -Pk . 2>/dev/null | sed -n 's/^.* \([0-9][0-9]*\)  *[0-9]*%.*$/\1/p') || free=
+    [ "${free:-10000}" -ge 10000 ] || fail "the disk is full" "value:  $free kB free" \
+        "limit:  10000 kB" "remedy: free disk space, then give the same command again"
+}
+
+check_profile() {
+    case " $* " in
+        *" --profile profiles/slurm"*) fail "this profile would be combined with profiles/default" \
+            "value:  --profile profiles/slurm" "limit:  the cores of profiles/default would limit the MPI ranks of a run" \
+            "remedy: --workflow-profile profiles/slurm" ;;
+    esac
+}
+
+is_dry_run() {
+    case " $* " in *" --dry-run "* | *" -n "*) return 0 ;; esac
+    return 1
+}
+
+# Every study of a list, each to its report, and then their cases side by side.
+compare_studies() {
+    studies=
+    for word in "$@"; do
+        case $word in studies=*) studies=${word#studies=} ;; esac
+    done
+    [ -n "$studies" ] || fail "no studies to compare" \
+        "remedy: ./run compare --config studies=A,B, or studies=A for the cases of a sweep"
+    case $studies in
+        *[!A-Za-z0-9._,-]*) fail "not names of studies" "value:  $studies" \
+            "remedy: give names of folders of studies/, separated by commas" ;;
+    esac
+    folders=
+    for study in $(printf '%s' "$studies" | tr , ' '); do
+        say "study $study"
+        # No argument of a study holds a space.
+        # shellcheck disable=SC2046
+        "$root/run" all $(printf '%s\n' "$@" | sed "1d;s/^studies=.*/study=$study/") || return 1
+        folders="$folders results/$study"
+    done
+    if is_dry_run "$@"; then return 0; fi
+    out=results/compare/$(printf '%s' "$studies" | tr , +)
+    # No name of a study holds a space.
+    # shellcheck disable=SC2086
+    dragchain compare --out "$out" $folders && say "$out/comparison.html"
+}
+
+# Round by round: the next settings, and their runs. A run that failed is a finding.
+search_setting() {
+    study=
+    for word in "$@"; do
+        case $word in
+            study=*) study=${word#study=} ;;
+            fidelity=*) fail "a search has the fidelity of its study" "value:  $word" \
+                "remedy: set fidelity in the study" ;;
+        esac
+    done
+    [ -n "$study" ] || study=$(sed -n -E "s/^study: *[\"']?([A-Za-z0-9._-]+).*/\1/p" config/config.yaml)
+    shift
+    status=0
+    while :; do
+        state=$(dragchain step search "$study") || return 1
+        [ "$state" != complete ] || break
+        [ "$state" != unfinished ] || [ "$status" -eq 0 ] || return "$status"
+        status=0
+        "$root/run" searched "$@" || status=$?
+        if is_dry_run "$@"; then return "$status"; fi
+    done
+    say "results/$study/search/search.html"
+}
+
+# Run a command of a study.
+call() {
+    case $1 in
+        compare) compare_studies "$@" ;;
+        search) search_setting "$@" ;;
+        dragdeck | dragchain) exec "$@" ;;
+        status | open) exec dragdeck "$@" ;;
+        *)
+            ensure_writable
+            # A flag ends the list of loggers: a target may follow.
+            exec snakemake --logger dragdeck --show-failed-logs "$@"
+            ;;
+    esac
+}
