@@ -396,12 +396,12 @@ class Workflow:
     def planned_runs(self, jobs: Iterable[Any]) -> list[StudyRun]:
         """The engine runs of Snakemake's jobs: what is expected of each, and how far it is."""
         places = {f"run_{place}": place for place in PLACES}
-        by_folder: dict[str, dict[Path, Case]] = {}
+        cases: dict[str, dict[Path, Case]] = {}
         for job in jobs:
             if place := places.get(job.rule.name):
                 folder = self.project.root / Path(job.output[0]).parent
-                by_folder.setdefault(place, {})[folder] = self.case_of(place, job.wildcards.run)
-        several = (expected_runs(PLACES[place], folders) for place, folders in by_folder.items())
+                cases.setdefault(place, {})[folder] = self.case_of(place, job.wildcards.run)
+        several = (expected_runs(PLACES[place], folders) for place, folders in cases.items())
         return [run.now() for runs in several for run in runs]
 
     # --- parameters of rules ---------------------------------------------------------------

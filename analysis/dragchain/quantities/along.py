@@ -50,12 +50,12 @@ class PathQuantities(Part):
 
     def values(self, start: int = 0, stop: int | None = None) -> dict[str, float]:
         """The quantities over some blocks, all if not given, that have a value in each."""
-        found = {}
+        values = {}
         for quantity in COMPARED:
             blocks = self.of_blocks(quantity.name)[start:stop]
             if blocks.size and np.isfinite(blocks).all():
-                found[quantity.name] = quantity.of_blocks(blocks)
-        return found
+                values[quantity.name] = quantity.of_blocks(blocks)
+        return values
 
 
 MAP_DEPTHS, MAP_AZIMUTHS = 4, 12
@@ -110,10 +110,10 @@ def _load_map(counted: Sampled, depth_m: float) -> Floats:
     level = np.floor(rows["depth_m"].to_numpy() / depth_m * MAP_DEPTHS).astype(np.int64)
     level = level.clip(0, MAP_DEPTHS - 1)
     load = rows["normal_impulse_n_s"].to_numpy() / (counted.frames * counted.interval_s)
-    found = np.zeros((MAP_DEPTHS, MAP_AZIMUTHS))
+    load_map = np.zeros((MAP_DEPTHS, MAP_AZIMUTHS))
     for half in parts(rows["azimuth_rad"].to_numpy(np.float64), MAP_AZIMUTHS):
-        np.add.at(found, (level, half), load / 2.0)
-    return found
+        np.add.at(load_map, (level, half), load / 2.0)
+    return load_map
 
 
 LONG_WAVE, SHORT_WAVE = 2.0, 0.25
@@ -273,17 +273,17 @@ def _of_workpiece_contacts(run_dir: Path, path: CountedPath) -> dict[str, Floats
     frames = np.bincount(path.block(_frames(run_dir, path)), minlength=path.blocks)
     contacts = np.zeros(path.blocks)
     names = ("mean", "p50", "p90", "p99")
-    found = {f"contact_force_{name}": np.full(path.blocks, math.nan) for name in names}
+    forces = {f"contact_force_{name}": np.full(path.blocks, math.nan) for name in names}
     overlap = np.full(path.blocks, math.nan)
     for number, (normal, depth) in (
         (number, values.T) for number, values in path.parts(_pushing_contacts(run_dir))
     ):
         contacts[number] = len(normal)
         overlap[number] = _mean(depth / path.diameter_m)
-        found["contact_force_mean"][number] = _mean(normal)
+        forces["contact_force_mean"][number] = _mean(normal)
         for fraction in (50, 90, 99):
-            found[f"contact_force_p{fraction}"][number] = np.percentile(normal, fraction)
-    return {"workpiece_contacts": contacts / frames, **found, "workpiece_overlap": overlap}
+            forces[f"contact_force_p{fraction}"][number] = np.percentile(normal, fraction)
+    return {"workpiece_contacts": contacts / frames, **forces, "workpiece_overlap": overlap}
 
 
 def _mean(values: Floats) -> float:
@@ -339,9 +339,9 @@ def _of_chains(chains: pd.DataFrame, frames: Ints, path: CountedPath) -> dict[st
     steps = peters["step"].to_numpy(np.int64)
     along = np.cos(peters["inclination_rad"]) * np.cos(peters["azimuth_rad"])
     paths = chains[chains["dominant"]]
-    found = np.bincount(path.block(steps), minlength=path.blocks)
+    count = np.bincount(path.block(steps), minlength=path.blocks)
     return {
-        "chain_count": found / np.bincount(path.block(frames), minlength=path.blocks),
+        "chain_count": count / np.bincount(path.block(frames), minlength=path.blocks),
         "chain_length": path.mean(steps, peters["n_particles"].to_numpy(np.float64)),
         "chain_alignment": path.mean(steps, along.to_numpy(np.float64) ** 2),
         "path_bottleneck": path.mean(

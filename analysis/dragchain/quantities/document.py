@@ -114,23 +114,23 @@ class Extrapolated(Document):
     @property
     def said(self) -> str:
         """What was asked and reached, in a sentence; empty if nothing was asked."""
-        found = self.tolerance
-        if found is None:
+        reached = self.tolerance
+        if reached is None:
             return ""
-        known = {one.name: one.label for one in self.quantities}
-        labels = [f"the {known.get(name, name)}" for name in found.asked]
+        known = {quantity.name: quantity.label for quantity in self.quantities}
+        labels = [f"the {known.get(name, name)}" for name in reached.asked]
         what = " and ".join(filter(None, (", ".join(labels[:-1]), labels[-1])))
-        asked = f"{what} to within {100 * found.tolerance:.3g} %"
+        asked = f"{what} to within {100 * reached.tolerance:.3g} %"
         who, verb = "The run at the physical Young's modulus", ("gives", "does not give")
-        if found.runs:
-            who = f"{len(found.runs)} windows at the physical Young's modulus"
+        if reached.runs:
+            who = f"{len(reached.runs)} windows at the physical Young's modulus"
             verb = ("give", "do not give")
-        if found.reached:
+        if reached.reached:
             return f"{who} {verb[0]} {asked}."
-        windows, packings = found.needed
-        more = f"{windows} windows" if packings == 1 and found.runs else f"{packings} seeds"
+        windows, packings = reached.needed
+        more = f"{windows} windows" if packings == 1 and reached.runs else f"{packings} seeds"
         return f"{who} {verb[1]} {asked}: about {more} would."
 
     def of(self, name: str) -> ExtrapolatedQuantity | None:
         """A quantity by its name, None if it was not measured."""
-        return next((one for one in self.quantities if one.name == name), None)
+        return next((quantity for quantity in self.quantities if quantity.name == name), None)

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dragchain.arrays import Floats
-from dragdeck.files import table_rows
-from dragdeck.study.base import QUANTITIES_FILE
+from dragdeck.study.quantities import QUANTITIES
 
 
 @dataclass(frozen=True)
@@ -59,7 +58,7 @@ def _quantities(column: str) -> tuple[Quantity, ...]:
             row["kind"] == "squared", row["kind"] == "signed",
             int(row["time"] or 0), row["robust"] == "yes",
         )
-        for row in table_rows(QUANTITIES_FILE)
+        for row in QUANTITIES
         if row[column]
     )  # fmt: skip
 

@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, JsonValue
@@ -12,11 +11,6 @@ Json = Mapping[str, JsonValue]
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 """Names of studies, plans, materials and fidelities: they become parts of paths and commands."""
-
-QUANTITIES_FILE = Path(__file__).with_name("quantities.csv")
-"""The registry of the quantities of runs. `kind`: how a trade-off and windows treat it; none: they
-do not have it. `tolerance`: whether a tolerance may apply to it. `place` in the report, and what it
-is called there if not by its `label`; `time` and `robust`: see `dragchain.run.basis.Quantity`."""
 
 STUDY_FILE = "study.yaml"
 

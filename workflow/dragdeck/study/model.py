@@ -10,9 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from dragdeck.files import table_rows
 from dragdeck.study.base import (
-    QUANTITIES_FILE,
     Line,
     MaterialName,
     Model,
@@ -32,6 +30,7 @@ from dragdeck.study.paths.line import LinePath
 from dragdeck.study.paths.path import turned
 from dragdeck.study.paths.rest import RestPath
 from dragdeck.study.paths.waypoints import WaypointsPath
+from dragdeck.study.quantities import QUANTITIES
 from dragdeck.study.reference import Reference
 from dragdeck.study.removal import Removal
 from dragdeck.study.search import Search
@@ -303,8 +302,7 @@ class Outputs(Model):
 if TYPE_CHECKING:
     Quantity = str
 else:
-    _ROWS = table_rows(QUANTITIES_FILE)
-    Quantity = Literal[tuple(row["name"] for row in _ROWS if row["tolerance"])]
+    Quantity = Literal[tuple(row["name"] for row in QUANTITIES if row["tolerance"])]
 """Quantities to which a tolerance can apply; docs/evidence/tradeoff.md defines each."""
 
 RESTITUTION = "restitution"

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from dragdeck.documents import Document, Part
-from dragdeck.files import table_rows
-from dragdeck.study.base import QUANTITIES_FILE, Model, Name, Number, Whole
+from dragdeck.study.base import Model, Name, Number, Whole
+from dragdeck.study.quantities import QUANTITIES
 
 RECORD = Path("search") / "points.json"
 """The record of a search in the results of its study."""
@@ -21,14 +21,14 @@ RECORD = Path("search") / "points.json"
 _OF_TARGET = ("minutes", "minutes_slowest")
 _OF_REMOVAL = ("removal_depth", "removal_variation", *_OF_TARGET)
 _OF_TOUCH = ("peak_pressure",)
-_ROWS = [row for row in table_rows(QUANTITIES_FILE) if row["reported"]]
-_SIGNED = {row["name"] for row in _ROWS if row["negative"]}
+_SIGNED = {row["name"] for row in QUANTITIES if row["negative"]}
 """Quantities that may be negative."""
 
 if TYPE_CHECKING:
     SearchedQuantity = str
 else:
-    SearchedQuantity = Literal[(*_OF_REMOVAL, *_OF_TOUCH, *(row["name"] for row in _ROWS))]
+    _REPORTED = tuple(row["name"] for row in QUANTITIES if row["reported"])
+    SearchedQuantity = Literal[(*_OF_REMOVAL, *_OF_TOUCH, *_REPORTED)]
 
 
 class SearchedMeasure(Model):
