@@ -18,12 +18,8 @@ DROPS = Argument("--drops", type=Path, required=True, metavar="FILE", dest="drop
                   help="drops.json of the simulated drop tests (sweep); required")  # fmt: skip
 RECORD = Argument("record", type=Path, metavar="RECORD",
                    help="measured drop test: CSV file of force against time")  # fmt: skip
-WINDOWS_RECORD = Argument(
-    "--record", type=Path, required=True, metavar="FILE",
-    help="windows.json, what windows of other scenes say; required",
-)  # fmt: skip
 MEASURES = Argument("measures", type=Path, nargs="+", metavar="MEASURES",
-                     help="measures.json of each run: ./run dragchain step measure")  # fmt: skip
+                     help="quantities.json of each run: ./run dragchain quantities")  # fmt: skip
 
 
 COMMANDS = (
@@ -42,6 +38,12 @@ COMMANDS = (
             "contact events. It reads the tables of a process run and writes facets.parquet, "
             "contact_events.parquet, loading.json and workpiece.vtp to RUN_DIR/tables.",
             "loading.write:write_loading", (RUN_DIR,)),
+    Command("quantities", "measure the quantities of a run",
+            "Measure the quantities of a process run, each with its interval. It reads the tables "
+            "and force chains of the run, and contact events if there are any, and writes "
+            "quantities.json to RUN_DIR/tables. A run of a plan, and a window, gets its tables "
+            "and chains first.",
+            "quantities.measure:write_quantities", (RUN_DIR,)),
     Command("figures", "draw the figures of a run",
             "Draw the figures of a run. It reads the tables and writes PNG files to "
             "RUN_DIR/figures and their values to RUN_DIR/tables/findings.json.",
@@ -125,17 +127,9 @@ STEPS = (
             "report.summary:main_numbers",
             (Argument("report_dir", type=Path, metavar="REPORT_DIR",
                        help="folder of the report: results/STUDY/report"),)),
-    Command("measure", "measure a run of a plan",
-            "Make tables and force chains of one run of a plan and measure its quantities. It "
-            "reads the raw output and outcome.json of the run and writes measures.json to RUN_DIR.",
-            "tradeoff.measure_run:write_measures", (
-                RUN_DIR,
-                Argument("--packing", type=Path, required=True, metavar="FILE",
-                          dest="packing_table",
-                          help="packing.json of the packing at the start of the run; required"))),
     Command("tradeoff", "write the report on the speed-accuracy trade-off",
             "Estimate the error and cost of each setting from the runs of a plan. It reads "
-            "measures.json of the runs and writes report.html, tradeoff.json, runs.csv and "
+            "quantities.json of the runs and writes report.html, tradeoff.json, runs.csv and "
             "errors.csv to the folder.",
             "tradeoff.report:write_tradeoff", (
         OUT_DIR, MEASURES, MADE_BY,
@@ -149,31 +143,27 @@ STEPS = (
         Argument("--largest-step", type=float, default=math.inf, metavar="X",
                   help="largest time step to recommend, as a fraction of the Rayleigh time "
                   "(default: no limit)"))),
-    Command("extrapolate", "quantities of a run, and at the physical Young's modulus",
-            "Measure the quantities of a run, and take those at the physical Young's modulus from "
-            "its windows, if it has any. It reads the tables of the run and writes "
-            "extrapolated.json to RUN_DIR.",
+    Command("extrapolate", "what a run is at the physical Young's modulus",
+            "Take the quantities of a run at the physical Young's modulus from its windows, if it "
+            "has any. It writes extrapolated.json to RUN_DIR/tables.",
             "windows.extrapolate:extrapolate_run", (
-                RUN_DIR, WINDOWS_RECORD,
+                RUN_DIR,
                 Argument("--round", type=Path, metavar="FILE", dest="round_file",
                           help="last round of windows of the run: ./run dragchain step windows"))),
     Command("windows", "what windows say of a run at the physical Young's modulus",
             "Estimate the quantities of a run with reduced moduli at the physical Young's modulus "
             "from its windows, and how many more windows the tolerance requires. It reads the "
-            "tables of the run and the raw output of the windows.",
+            "quantities.json of the run and of its windows.",
             "windows.rounds:judge_windows", (
                 RUN_DIR,
                 Argument("--windows", type=Path, nargs="+", required=True, metavar="RUN_DIR",
                           help="folder of each window so far; required"),
-                Argument("--before", type=Path, metavar="FILE",
-                          help="the round before, whose windows are not measured again"),
                 Argument("--tolerance", type=float, required=True, metavar="X",
                           help="relative half-width of the 95 %% confidence interval; required"),
                 Argument("--quantities", nargs="+", required=True, metavar="NAME",
                           help="quantities to which the tolerance applies; required"),
                 Argument("--most", type=int, required=True, metavar="N",
                           help="largest number of windows; required"),
-                WINDOWS_RECORD,
                 Argument("--out", type=Path, required=True, metavar="FILE",
                           help="file to write; required"))),
     Command("search", "choose the next settings of a search",

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from dragchain.arrays import Floats, Ints
 from dragchain.errors import SeriesError
 from dragchain.run.kinematics import axis_speed
-from dragchain.statistics.correlated import MeanEstimate, estimate_mean, estimates, frame_sums
+from dragchain.statistics.correlated import estimates, frame_sums
 from dragchain.statistics.estimate import Estimate
 from dragchain.tables.by_step import intact
 from dragdeck.records.case import CaseOfRun
@@ -53,17 +53,6 @@ def read_counted(run_dir: Path | str, columns: Sequence[str] | None = None) -> p
     wanted = None if columns is None else list(columns)
     with intact(file):
         return pd.read_parquet(file, columns=wanted, filters=[("in_statistics", "==", True)])
-
-
-def summarise_forces(samples: pd.DataFrame) -> dict[str, MeanEstimate]:
-    """Mean and spread of `FORCES` over samples of `read_counted`, in N.
-
-    Raises
-    ------
-    SeriesError
-        If there are too few samples.
-    """
-    return {name: estimate_mean(samples[name].to_numpy()) for name in FORCES}
 
 
 @dataclass(frozen=True)
@@ -224,18 +213,12 @@ def ahead_behind(
     -------
     dict
         ``ahead_n`` and ``behind_n``: sum of the normal forces within 90 degrees of the direction
-        of motion and beyond, mean over the frames; ``ratio`` of the two; ``fraction_ahead`` of all.
-        A contact abeam counts half on either side.
+        of motion and beyond, mean over the frames. A contact abeam counts half on either side.
     """
     ahead = within_angle(azimuth_rad, np.pi / 2)
     weights = np.stack([normal_force_n * ahead, normal_force_n * (1.0 - ahead)], axis=1)
-
-    def statistic(sums: Floats) -> Floats:
-        front, back = sums[..., 0], sums[..., 1]
-        return np.stack([front, back, front / back, front / (front + back)], axis=-1)
-
-    ratios = estimates(frame_sums(frame, frames, weights), statistic)
-    return dict(zip(("ahead_n", "behind_n", "ratio", "fraction_ahead"), ratios, strict=True))
+    sums = estimates(frame_sums(frame, frames, weights), lambda means: means)
+    return dict(zip(("ahead_n", "behind_n"), sums, strict=True))
 
 
 def azimuth_profile(

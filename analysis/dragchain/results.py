@@ -13,9 +13,11 @@ import pyarrow.parquet as pq
 
 from dragchain.errors import TableError, UnknownNameError
 from dragchain.quantities.basis import Basis, notes
+from dragchain.quantities.document import EXTRAPOLATED, Extrapolated
+from dragchain.report.cases import read_if_there
 from dragchain.report.findings import FILE, ProcessFindings
 from dragchain.report.run_data import RunData, process_findings
-from dragchain.report.values import Values, read_optional, values_of
+from dragchain.report.values import Values, values_of
 from dragchain.run.case import upstream_folders
 from dragchain.tables.by_step import intact, read_table
 from dragchain.tables.columns import descriptions, unit_of
@@ -186,9 +188,13 @@ class FinishedRun(RunData):
     def values(self) -> Values:
         """Quantities of a process run, each with what it says of the process, as in the report.
 
-        Without ``loading.json`` or ``extrapolated.json`` it has fewer; errors as in `findings`.
+        They are read from ``quantities.json``, or computed if it does not exist; errors as in
+        `findings`.
         """
-        return values_of(self.case, self.findings, *read_optional(self.folder))
+        if self.case.scene != "process":
+            raise TableError(f"{self.folder}: the scene is {self.case.scene}, not process")
+        extrapolated = read_if_there(Extrapolated, self.folder / EXTRAPOLATED)
+        return values_of(self.case, self.quantities, extrapolated)
 
     @cached_property
     def findings(self) -> ProcessFindings:

@@ -25,7 +25,7 @@ rule measure_costs:
 
 rule write_tradeoff:
     input:
-        measures=lambda wildcards: WORK.every_point("measures.json"),
+        measures=lambda wildcards: WORK.every_point("tables/quantities.json"),
         drops=lambda wildcards: WORK.every_drop_point("tables/impacts.parquet"),
         costs=lambda wildcards: (
             [WORK.of_tradeoff("costs.json")] if WORK.points_of(PLAN).cost_rounds else []

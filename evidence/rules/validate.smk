@@ -3,7 +3,7 @@
 
 rule write_validation:
     input:
-        measures=lambda wildcards: WORK.every_point("measures.json", VALIDATION),
+        measures=lambda wildcards: WORK.every_point("tables/quantities.json", VALIDATION),
         loads=lambda wildcards: WORK.every_packing("tables/loading.json"),
         templates=WORK.page_templates(
             "validation/validation.html.j2", "validation/load.html.j2", package="evidence"
@@ -19,7 +19,7 @@ rule write_validation:
         ),
     params:
         command=f"./run validate --config study={STUDY} plan={VALIDATION}",
-        runs=lambda wildcards, input: [str(Path(file).parent) for file in input.measures],
+        runs=lambda wildcards, input: [str(Path(file).parent.parent) for file in input.measures],
         source=source_hash("evidence.validation.report"),
     shell:
         "python -m evidence validate --out $(dirname {output.page}) --command {params.command:q}"

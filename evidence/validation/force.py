@@ -8,18 +8,13 @@ import pandas as pd
 from pydantic import JsonValue
 from scipy import stats
 
-from dragchain.drag import (
-    FORCES,
-    find_drag_peaks,
-    peak_separation_s,
-    read_counted,
-    summarise_forces,
-)
+from dragchain.drag import FORCES, find_drag_peaks, peak_separation_s, read_counted
 from dragchain.loading.contact_events import Thresholds
 from dragchain.loading.document import FILE, ContactType, Loading
+from dragchain.quantities.document import RunQuantities
 from dragchain.run.reference import reference_drags
 from dragchain.statistics.bed_effects import fit_effects
-from dragchain.statistics.correlated import MeanEstimate
+from dragchain.statistics.correlated import MeanEstimate, estimate_mean
 from dragchain.statistics.estimate import Estimate, Real
 from dragdeck.documents import Part
 from dragdeck.records.case import CaseOfRun
@@ -104,7 +99,8 @@ def force_of_packings(packings: Sequence[MeasuredRun]) -> Force:
 
 
 def _packing_force(run: MeasuredRun) -> PackingForce:
-    forces, measures = summarise_forces(read_counted(run.folder, FORCES)), run.measures
+    samples, measures = read_counted(run.folder, FORCES), run.measures
+    forces = {name: estimate_mean(samples[name]) for name in FORCES}
     numbers = {"seed": run.seed, "bed_height_m": measures.single["bed_height"]}
     return PackingForce.model_validate(
         {**dict(measures), **dict(measures.cost), **numbers, **forces}
@@ -282,13 +278,14 @@ def _exponent(change: Estimate, new: JsonValue, old: JsonValue) -> Estimate | No
 
 # --- load, sliding and friction on the workpiece -----------------------------------------------
 
-_PER_METRE = {
-    "normal_impulse_n_s": "N s/m",
-    "sliding_m": "m/m",
-    "force_slide_n_m": "N m/m",
-    "friction_work_j": "J/m",
+_QUANTITIES = {
+    "workpiece_contacts": "",
+    "normal_impulse": "N s/m",
+    "sliding_distance": "m/m",
+    "force_slide": "N m/m",
+    "friction_work": "J/m",
 }
-"""Amounts per metre of path, each with its unit."""
+"""Quantities that are averaged, each with its unit."""
 
 _SHARES = ("events", "normal_impulse_n_s", "force_slide_n_m", "friction_work_j")
 
@@ -333,7 +330,8 @@ def load_of_packings(packings: Sequence[MeasuredRun]) -> LoadingOverPackings:
         If a packing has no ``loading.json``.
     """
     every = [Loading.read(run.folder / FILE) for run in packings]
-    first, numbers = every[0], [_numbers(packing) for packing in every]
+    first = every[0]
+    numbers = [_numbers(of, run.measures) for of, run in zip(every, packings, strict=True)]
     return LoadingOverPackings(
         rows=tuple(
             LoadingRow(label=key[0], unit=key[1], **vars(packing_mean([n[key] for n in numbers])))
@@ -346,7 +344,7 @@ def load_of_packings(packings: Sequence[MeasuredRun]) -> LoadingOverPackings:
     )
 
 
-def _numbers(loading: Loading) -> dict[tuple[str, str], float]:
+def _numbers(loading: Loading, measures: RunQuantities) -> dict[tuple[str, str], float]:
     """The numbers that packings are compared by: name and unit to value."""
     front = loading.front_fraction
     fractions = {
@@ -356,8 +354,7 @@ def _numbers(loading: Loading) -> dict[tuple[str, str], float]:
         "load_while_sliding_fraction": loading.load_while_sliding_fraction,
     }
     return {
-        ("mean_contacts", ""): loading.mean_contacts.value,
-        **{(name, unit): loading.per_metre[name].value for name, unit in _PER_METRE.items()},
+        **{key: measures.values_of_run[key[0]].value for key in _QUANTITIES.items()},
         **{(name, "%"): 100.0 * fraction.value for name, fraction in fractions.items()},
     }
 

@@ -10,9 +10,9 @@ import numpy as np
 from pydantic import JsonValue
 
 from dragchain.errors import SeriesError, TableError
+from dragchain.quantities.document import MEASURED_FILE, RunQuantities
 from dragchain.statistics.estimate import Estimate, mean_of
 from dragchain.tradeoff.compare import Setting, differing_inputs
-from dragchain.tradeoff.measures import FILE, Measures
 from dragdeck.records.case import CaseOfRun, load_case
 
 _FEWEST = 2
@@ -27,14 +27,14 @@ class MeasuredRun:
     ----------
     folder : Path
     case : CaseOfRun
-    measures : Measures
+    measures : RunQuantities
     changed : mapping
         Dotted names and values of the inputs that differ from the reference's.
     """
 
     folder: Path
     case: CaseOfRun
-    measures: Measures
+    measures: RunQuantities
     changed: Mapping[str, JsonValue]
 
     @property
@@ -80,16 +80,16 @@ def read_validation_runs(folders: Sequence[Path]) -> RunsByBed:
     Parameters
     ----------
     folders : sequence of Path
-        Run folders, with their tables and ``measures.json``.
+        Run folders, with their tables.
 
     Raises
     ------
     DocumentError
-        A run has no measures.
+        A run has no ``quantities.json``.
     TableError
         Fewer than two packings are complete.
     """
-    measures = {folder: Measures.read(folder / FILE) for folder in folders}
+    measures = {folder: RunQuantities.read(folder / MEASURED_FILE) for folder in folders}
     standard = measures[folders[0]]
     if not standard.complete:
         raise TableError(f"{folders[0]}: the reference run is not complete, so nothing is known")

@@ -20,9 +20,9 @@ from scipy.special import polygamma
 
 from dragchain.arrays import Floats
 from dragchain.errors import SeriesError
-from dragchain.quantities.registry import COMPARED, Quantity
-from dragchain.tradeoff.measures import Measures
-from dragchain.windows.estimate import Known, WindowsRecord
+from dragchain.quantities.document import RunQuantities
+from dragchain.quantities.known import Known, WindowsRecord
+from dragchain.quantities.registry import MEASURED, Quantity
 from dragdeck.physics.contact_mechanics import damping_ratio
 from dragdeck.records.stability import StableStepLaw, StableStepRecord
 from dragdeck.records.tradeoff import SixDigits
@@ -36,8 +36,8 @@ _MOST_DEGREES = 10.0
 """Windows' worth of evidence on a variance: never more, whatever the scenes agree on."""
 
 
-class SceneRun(Measures):
-    """A ``measures.json``, with the number of the acceptance check of the time step."""
+class SceneRun(RunQuantities):
+    """The quantities of a run, with the number of the acceptance check of the time step."""
 
     stability_number: float | None = None
 
@@ -59,7 +59,7 @@ def write_scene_records(out_dir: Path, archives: Sequence[Path]) -> str:
     ----------
     out_dir : Path
     archives : sequence of Path
-        Tar archives of ``measures.json`` files.
+        Tar archives of ``quantities.json`` files.
 
     Raises
     ------
@@ -130,7 +130,7 @@ def windows_record(scenes: Scenes, archives: Sequence[str]) -> WindowsRecord:
     SeriesError
         There is none.
     """
-    rows = {quantity.name: _known(quantity, scenes) for quantity in COMPARED}
+    rows = {quantity.name: _known(quantity, scenes) for quantity in MEASURED}
     quantities = {name: known for name, known in rows.items() if known}
     if not quantities:
         raise SeriesError(f"no quantity has both moduli in {_FEWEST_SCENES} scenes or more")
@@ -163,14 +163,27 @@ def _known(quantity: Quantity, scenes: Scenes) -> Known | None:
         variance_ratio=round(math.exp(float(np.mean(logs))), 3),
         degrees=round(_degrees(float(np.var(logs, ddof=1)) - by_chance), 1),
         packing_std=round(_between_packings(measured), 4),
+        correlation=round(_correlation(measured), 2),
     )
 
 
 def _runs_with(quantity: Quantity, runs: Sequence[SceneRun]) -> list[QuantityOfRun]:
     """The runs at the speed of their scene in which every block has the quantity."""
     plain = [run for run in runs if run.fidelity.speed_factor == 1]
-    rows = [QuantityOfRun(run, quantity.rooted(run.of_blocks(quantity.name))) for run in plain]
+    blocks = [run.of_blocks(quantity.name).values for run in plain]
+    rows = [
+        QuantityOfRun(run, np.sqrt(of) if quantity.squared else of)
+        for run, of in zip(plain, blocks, strict=True)
+    ]
     return [row for row in rows if len(row.blocks) > 1 and np.isfinite(row.blocks).all()]
+
+
+def _correlation(scenes: Sequence[Sequence[QuantityOfRun]]) -> float:
+    """Mean correlation of neighbouring blocks, corrected for its bias (Kendall 1954)."""
+    series = [run.blocks - run.blocks.mean() for runs in scenes for run in runs if run.variance]
+    counts = np.array([len(away) for away in series])
+    seen = np.array([away[1:] @ away[:-1] / (away @ away) for away in series])
+    return float(np.average((seen + 1 / counts) / (1 - 3 / counts), weights=counts))
 
 
 def _is_soft(run: SceneRun) -> bool:

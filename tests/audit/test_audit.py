@@ -64,18 +64,24 @@ def same(found: object, wanted: object, what: str) -> None:
     np.testing.assert_allclose(found, wanted, err_msg=what, **ROUNDING)
 
 
+def quantity(folder: Path, name: str) -> float:
+    """The value of a quantity of a run."""
+    document = json.loads((folder / "tables/quantities.json").read_text())
+    value: float = document["values_of_run"][name]["value"]
+    return value
+
+
 def test_forces(folder: Path, plain: PlainRun) -> None:
     rows, forces = pd.DataFrame(plain.forces()), table(folder, "workpiece_force")
     for name in rows:
         same(forces[name], rows[name], name)
     counted = [plain.counted(step) for step in rows["step"]]
     assert forces["in_statistics"].tolist() == counted
-    found = json.loads((folder / "tables/findings.json").read_text())["forces"]
-    for name in ("drag_n", "lateral_n", "vertical_n"):
-        values = rows[name][counted].tolist()
+    for name in ("drag", "lateral", "vertical"):
+        values = rows[f"{name}_n"][counted].tolist()
         mean = math.fsum(values) / len(values)
         spread = math.sqrt(math.fsum((v - mean) ** 2 for v in values) / (len(values) - 1))
-        same([found[name]["mean"], found[name]["std"]], [mean, spread], name)
+        same([quantity(folder, f"{name}_{of}") for of in ("mean", "std")], [mean, spread], name)
 
 
 def test_contacts_on_the_workpiece(folder: Path, plain: PlainRun) -> None:
@@ -146,7 +152,7 @@ def check_loads(folder: Path, plain: PlainRun) -> None:
 def test_loads_and_events(folder: Path, plain: PlainRun) -> None:
     check_loads(folder, plain)
     same(
-        json.loads((folder / "tables/loading.json").read_text())["mean_contacts"]["value"],
+        quantity(folder, "workpiece_contacts"),
         np.mean([len(of) for step, of in plain.on_workpiece() if plain.counted(step)]),
         "contacts",
     )
@@ -156,8 +162,7 @@ def test_loads_of_bodies_with_several_contacts(clumps: Path) -> None:
     """Amounts are those of the contacts of their spheres, the number of contacts that of bodies."""
     plain = PlainRun(clumps)
     check_loads(clumps, plain)
-    contacts = json.loads((clumps / "tables/loading.json").read_text())["mean_contacts"]["value"]
-    same(contacts, mean_contacts(plain), "contacts")
+    same(quantity(clumps, "workpiece_contacts"), mean_contacts(plain), "contacts")
     merged, spheres = table(clumps, "workpiece_contacts"), table(clumps, "sphere_contacts")
     loud = spheres[(spheres[["force_x_n", "force_y_n", "force_z_n"]] != 0.0).any(axis=1)]
     assert len(loud) > len(loud.drop_duplicates(["step", "particle_id"]))

@@ -168,7 +168,7 @@ def test_a_study_has_the_summary_of_its_report(project: Path) -> None:
     study = load("small")
     assert study.summary["drag_mean_n"].tolist() == [-2.5]
     assert dict(study.units) == {"case": "", "drag_mean_n": "N", "input_motion_speed_m_s": "m/s"}
-    assert study.describe("drag_mean_n") == "mean of the drag force (N)"
+    assert study.describe("drag_mean_n") == "mean drag (N)"
     with pytest.raises(UnknownNameError, match="did you mean 'drag_mean_n'"):
         study.describe("drag_mean")
 
@@ -196,7 +196,7 @@ def test_findings_are_those_of_the_report(project: Path, monkeypatch: pytest.Mon
     assert not (run.folder / FILE).exists()
     computed = run.findings
     counted = run.force.loc[run.force["in_statistics"], "drag_n"]
-    assert computed.forces["drag_n"].mean == pytest.approx(counted.mean())
+    assert run.values.drag.run.value == pytest.approx(counted.mean())
     written = write_findings(run)
     monkeypatch.setattr("dragchain.results.process_findings", _never)
     again = load("small").run("deep").findings

@@ -56,7 +56,7 @@ def test_a_run_of_a_plan_is_named_by_it_unless_the_study_has_it() -> None:
     ours = work("uhlmann2015")
     (run,) = (folder.rpartition("/")[2] for folder in ours.every_folder("process"))
     assert ours.cases_option("process")(SimpleNamespace(study="uhlmann2015", run=run)) == ""
-    point = ours.every_point("measures.json")[0].split("/")[-2]
+    point = ours.every_point("tables/quantities.json")[0].split("/")[-3]
     named = ours.cases_option("points")(SimpleNamespace(study="uhlmann2015", run=point))
     assert named == "--plan default"
 
@@ -87,5 +87,4 @@ def test_a_round_judges_as_many_windows_as_the_one_before_wanted(tmp_path: Path)
     second = SimpleNamespace(study="windows", run=run, round="2")
     assert len(ours.windows_of_round(second)) == 2
     assert ours.last_round(second).endswith("-3.json")  # type: ignore[union-attr]
-    before = SimpleNamespace(before=ours.round_before(second)[0])
-    assert "--tolerance 0.1 --quantities drag_mean --before" in ours.windows_options(second, before)
+    assert "--tolerance 0.1 --quantities drag_mean --most" in ours.windows_options(second)

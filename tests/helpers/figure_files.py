@@ -7,8 +7,10 @@ import numpy as np
 import pandas as pd
 import pyvista as pv
 from made_run import line, made_case, output, phases, save, write_documents
+from report_files import write_measured
 
 from dragchain.network.write import write_chains
+from dragchain.statistics.estimate import Estimate
 
 R = 0.003
 STEP_S = 1e-3
@@ -103,4 +105,6 @@ def write_process_run(run_dir: Path) -> Path:
     workpiece = pv.Cylinder(center=(0, 0, 0.025), direction=(0, 0, 1), radius=0.002, height=0.05)
     workpiece.triangulate().save(run_dir / "workpiece.stl")
     write_chains(run_dir)
+    drag = Estimate(-2.5, -2.7, -2.3)
+    write_measured(run_dir, drag_mean=drag, drag_std=drag.over(-5), ahead_behind=drag.over(-1))
     return run_dir

@@ -11,10 +11,11 @@ from pages import Page
 
 from dragchain.quantities.document import (
     EXTRAPOLATED,
+    MEASURED_FILE,
     Extrapolated,
-    ExtrapolatedQuantity,
     Need,
     Reached,
+    RunQuantities,
 )
 from dragchain.quantities.registry import REPORTED
 from dragchain.report.findings import (
@@ -31,8 +32,6 @@ from dragchain.report.findings import (
     Peaks,
     ProcessFindings,
 )
-from dragchain.run.reference import ReferenceDrag
-from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import Estimate, EstimateColumns
 from dragdeck.records.run import figures_of
 
@@ -71,29 +70,14 @@ def known(value: float) -> Estimate:
     return Estimate(value, value, value)
 
 
-def force(mean: float) -> MeanEstimate:
-    return MeanEstimate(
-        mean=mean, std=0.5, samples=1000, autocorrelation_samples=5.0, effective_samples=100.0,
-        se=0.05, ci95_low=mean - 0.1, ci95_high=mean + 0.1, confidence=0.95, reliable=True,
-    )  # fmt: skip
-
-
-def process_findings(drag: float = -2.5) -> ProcessFindings:
-    network = ("coordination_number", "mechanical_coordination_number", "rattler_fraction",
-               "normal_force_mean_n", "n_particle_workpiece_contacts")  # fmt: skip
+def process_findings() -> ProcessFindings:
     numbers = dict.fromkeys(Chains.model_fields, 0.25) | {"dominant_frames": 31}
     no_columns = EstimateColumns.of([])
     return ProcessFindings(
         run="workpiece-1", process_time_zero_s=0.1, confidence=0.95, workpiece_frames=31,
-        forces=dict.fromkeys(("drag_n", "lateral_n", "vertical_n"), force(drag)),
-        comparison=(ReferenceDrag(
-            label="experiment", mean_n=-2.59, std_n=0.66, source="a paper"),),
         peaks=Peaks(count=4, process_time_s=(), drag_n=(), largest_n=-3.9, separation_s=0.1),
-        network=dict.fromkeys(network, 4.5) | {"frames": 31},
-        chains=Chains.model_validate(numbers),
-        ahead_behind=AheadBehind(
-            ahead_n=known(1.0), behind_n=known(1.0), ratio=known(math.nan),
-            fraction_ahead=known(1.0)),
+        network_frames=31, rattler_fraction=0.1, chains=Chains.model_validate(numbers),
+        ahead_behind=AheadBehind(ahead_n=known(1.0), behind_n=known(1.0)),
         azimuth=AzimuthProfile(edges_rad=(), force_n=no_columns),
         depth=DepthProfile(
             edges_m=(), contact_n=no_columns, line_load_n_per_m=no_columns,
@@ -111,14 +95,40 @@ DROP = DropFindings(
 )
 
 
-def make_run(results: Path, case: dict[str, Any], findings: Findings, names: list[str]) -> Path:
+FORCES = ("drag_mean", "lateral_mean", "vertical_mean")
+
+
+def make_run(
+    results: Path, case: dict[str, Any], findings: Findings, names: list[str], drag: float = -2.5
+) -> Path:
+    """Write a run; all forces of a process are `drag`, with a half-width of 0.1 N."""
     folder = results / "small" / case["scene"] / case["run"]
     write_documents(folder, case, record=run_json())
     (folder / "figures").mkdir()
     findings.write(folder / FILE)
+    if case["scene"] == "process":
+        values = dict.fromkeys(FORCES, Estimate.around(drag, 0.1))
+        write_measured(folder, **values, drag_std=Estimate.around(0.5, 0.1))
     for name in names:
         (folder / "figures" / f"{name}.png").write_bytes(PNG)
     return folder
+
+
+def write_measured(folder: Path, **values: Estimate) -> None:
+    """Write ``quantities.json`` of a process run, or add values to it."""
+    file, case = folder / MEASURED_FILE, json.loads((folder / "case.json").read_text())
+    if file.is_file():
+        measured = RunQuantities.read(file)
+        values = {**measured.values_of_run, **values}
+    cost = {
+        "steps": 1, "wall_time_s": 1.0, "cpu_time_s": 1.0, "ranks": 1, "timestep_s": 1e-5,
+        "axis_speed_m_s": 0.01, "steps_per_m": 1e7,
+    }  # fmt: skip
+    names = ("study", "run", "inputs", "fidelity", "versions")
+    whole = {name: case[name] for name in names} | {
+        "bed": None, "complete": True, "cost": cost, "started": "", "values_of_run": values,
+    }  # fmt: skip
+    RunQuantities.model_validate(whole).write(file)
 
 
 REACHED = Reached(
@@ -128,17 +138,18 @@ REACHED = Reached(
 
 
 def write_quantities(run: Path, corrected: float | None = None, **reached: Any) -> None:
-    """Write ``extrapolated.json``: all quantities 2, by windows that many times it."""
-    value = None if corrected is None else Estimate.around(2.0 * corrected, abs(0.2 * corrected))
-    own = Estimate(2.0, math.nan, math.nan)
-    found = tuple(
-        ExtrapolatedQuantity(
-            name=one.name, label=one.label, unit=one.unit, measured=own, value=value
-        )
-        for one in REPORTED
-    )
-    made = REACHED.model_copy(update=reached) if corrected else None
-    Extrapolated(quantities=found, tolerance=made).write(run / EXTRAPOLATED)
+    """All quantities but those that are known are 2; by windows they are so many times that."""
+    file = run / MEASURED_FILE
+    two = dict.fromkeys((quantity.name for quantity in REPORTED), Estimate(2.0, math.nan, math.nan))
+    values = two | RunQuantities.read(file).values_of_run
+    write_measured(run, **values)
+    if corrected:
+        windows = {
+            name: Estimate.around(corrected * value.value, abs(0.1 * corrected * value.value))
+            for name, value in values.items()
+        }
+        tolerance = REACHED.model_copy(update=reached)
+        Extrapolated(values=windows, tolerance=tolerance).write(run / EXTRAPOLATED)
 
 
 def page_of(out: Path) -> Page:

@@ -10,7 +10,7 @@ import pandas as pd
 from made_run import particles_kept, run_json, save, write_documents
 from report_files import case_json
 
-from dragchain.quantities.registry import COMPARED
+from dragchain.quantities.registry import MEASURED
 from dragchain.tradeoff.compare import read_plan_runs
 from dragchain.tradeoff.outcome import Tradeoff, compare_settings
 from dragdeck.documents import SCHEMA
@@ -48,7 +48,7 @@ def measures(
     failure: Sequence[Mapping[str, object]] = (),
     inputs: Mapping[str, object] | None = None,
 ) -> dict[str, Any]:
-    """Content of ``measures.json``; `noise` is the relative scatter of a block."""
+    """Content of ``quantities.json``; `noise` is the relative scatter of a block."""
     modulus, step, speed = point
     content: dict[str, Any] = {
         "schema": SCHEMA, "study": "small", "run": f"{modulus:g}-{step:g}-{speed:g}-{seed}",
@@ -71,7 +71,7 @@ def measures(
     known = effects or {}
     of_blocks = {
         quantity.name: _blocks(quantity, known, rng.normal(bed, noise, blocks))
-        for quantity in COMPARED[:-2]
+        for quantity in MEASURED[:-2]
     }
     return {
         **content,
@@ -96,7 +96,7 @@ def write(folder: Path, contents: Sequence[Mapping[str, Any]]) -> list[Path]:
     """Write a folder a run; the files, in the order of the contents."""
     files = []
     for number, content in enumerate(contents):
-        file = folder / f"{number}-{content['run']}" / "measures.json"
+        file = folder / f"{number}-{content['run']}" / "tables" / "quantities.json"
         file.parent.mkdir(parents=True)
         file.write_text(json.dumps(content))
         files.append(file)
@@ -136,7 +136,7 @@ def contents(**changes: Any) -> list[dict[str, Any]]:
 def made(folder: Path, found: list[dict[str, Any]]) -> Tradeoff:
     """The trade-off of runs with these measures, the first at the reference."""
     files = write(folder, found)
-    return compare_settings(*read_plan_runs(files, files[0].parent))
+    return compare_settings(*read_plan_runs(files, files[0].parents[1]))
 
 
 def point_of(content: dict[str, Any]) -> tuple[float, ...]:

@@ -508,9 +508,9 @@ class Workflow:
         runs = [SCENES["process"].run_id(window) for window in windows]
         return [run_path(wildcards.study, WINDOWS, run) for run in runs]
 
-    def records_of_round(self, wildcards: RoundOfRun) -> list[str]:
-        """How the windows of a round ended."""
-        return [f"{folder}/{RECORD[WINDOWS]}" for folder in self.windows_of_round(wildcards)]
+    def measured_of_round(self, wildcards: RoundOfRun) -> list[str]:
+        """The quantities of the windows of a round."""
+        return [f"{folder}/tables/quantities.json" for folder in self.windows_of_round(wildcards)]
 
     def last_round(self, wildcards: Wildcards) -> str | list[str]:
         """The last round of windows of a run, if it has any."""
@@ -522,13 +522,12 @@ class Workflow:
             file = self.judged(wildcards.study, wildcards.run, number)
         return file
 
-    def windows_options(self, wildcards: Wildcards, input: Any) -> str:
+    def windows_options(self, wildcards: Wildcards) -> str:
         """What the windows of a run are asked for, as options of the command line."""
         asked = self.case_of("process", wildcards.run).study.chosen_fidelity().windows
         assert asked is not None
         quantities = " ".join(map(quote, asked.quantities))
-        before = f"--before {input.before}" if input.before else ""
         return (
-            f"--tolerance {asked.tolerance} --quantities {quantities} {before}"
+            f"--tolerance {asked.tolerance} --quantities {quantities}"
             f" --most {len(self.windows_of_run(wildcards))}"
         )

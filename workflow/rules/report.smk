@@ -22,7 +22,7 @@ rule write_report:
     input:
         [WORK.every(name, "run.json", "tables/findings.json") for name in SCENES],
         [WORK.every_table(name) for name in SCENES],
-        WORK.every("process", "tables/loading.json"),
+        WORK.every("process", "tables/loading.json", "tables/quantities.json"),
         WORK.every("process", "network.html"),
         WORK.every("process", "tables/extrapolated.json"),
         advice=WORK.needed_advice,

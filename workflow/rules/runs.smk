@@ -98,6 +98,7 @@ for PLACE, SCENE in SCENES.items():
             f"draw_{PLACE}"
         input:
             tables_of(PLACE, [*SCENE.tables, *SCENE.network]),
+            of_run(PLACE, "tables/quantities.json") if PLACE == "process" else [],
             run=of_run(PLACE, "run.json"),
         output:
             [
@@ -148,12 +149,34 @@ rule draw_for_journal:
         "dragchain journal $(dirname {input.run}) {params.colours} > {log} 2>&1"
 
 
+# The quantities of a run. A run of a plan and a window get their tables and chains with them.
+for PLACE in ("process", POINTS, WINDOWS):
+
+    rule:
+        name:
+            f"measure_{PLACE}"
+        input:
+            (
+                []
+                if PLACE in OUTCOMES
+                else tables_of(PLACE, [*SCENES["process"].network, *SCENES["process"].loading])
+            ),
+            run=of_run(PLACE, RECORD[PLACE]),
+            bed=WORK.of_its_bed(PLACE, "tables/packing.json"),
+            record=WORK.windows_record,
+        output:
+            of_run(PLACE, "tables/quantities.json"),
+        params:
+            source=source_hash("dragchain.quantities.measure"),
+        shell:
+            "dragchain quantities $(dirname {input.run}) > {log} 2>&1"
+
+
 # What the windows of a run say so far. Each round decides whether there is another one.
 checkpoint judge_windows:
     input:
-        tables_of("process", [*SCENES["process"].tables, *SCENES["process"].network]),
-        WORK.records_of_round,
-        run=of_run("process", "run.json"),
+        WORK.measured_of_round,
+        run=of_run("process", "tables/quantities.json"),
         before=WORK.round_before,
         record=WORK.windows_record,
     output:
@@ -165,16 +188,14 @@ checkpoint judge_windows:
         windows=WORK.windows_of_round,
         source=source_hash("dragchain.windows.rounds"),
     shell:
-        "dragchain step windows $(dirname {input.run}) --windows {params.windows} {params.asked}"
-        " --record {input.record} --out {output} > {log} 2>&1"
+        "dragchain step windows $(dirname $(dirname {output})) --windows {params.windows}"
+        " {params.asked} --out {output} > {log} 2>&1"
 
 
-# The quantities of a run, and what they are at the physical Young's modulus by its windows.
+# What a run is at the physical Young's modulus, by its windows.
 rule extrapolate_process:
     input:
-        tables_of("process", [*SCENES["process"].tables, *SCENES["process"].network]),
-        run=of_run("process", "run.json"),
-        record=WORK.windows_record,
+        of_run("process", "tables/quantities.json"),
         windows=WORK.last_round,
     output:
         of_run("process", "tables/extrapolated.json"),
@@ -182,21 +203,7 @@ rule extrapolate_process:
         windows=lambda wildcards, input: f"--round {input.windows}" if input.windows else "",
         source=source_hash("dragchain.windows.extrapolate"),
     shell:
-        "dragchain step extrapolate $(dirname {input.run}) --record {input.record}"
-        " {params.windows} > {log} 2>&1"
-
-
-# What is compared of a point: its tables, chains and numbers.
-rule measure_points:
-    input:
-        of_run(POINTS, "outcome.json"),
-        bed=WORK.of_its_bed(POINTS, "tables/packing.json"),
-    output:
-        of_run(POINTS, "measures.json"),
-    params:
-        source=source_hash("dragchain.tradeoff.measure_run"),
-    shell:
-        "dragchain step measure $(dirname {output}) --packing {input.bed} > {log} 2>&1"
+        "dragchain step extrapolate $(dirname $(dirname {output})) {params.windows} > {log} 2>&1"
 
 
 for PLACE, SCENE in {**SCENES, POINTS: SCENES["process"]}.items():
@@ -208,7 +215,7 @@ for PLACE, SCENE in {**SCENES, POINTS: SCENES["process"]}.items():
                 f"map_loading_of_{PLACE}"
             input:
                 (
-                    of_run(PLACE, "measures.json")
+                    of_run(PLACE, "tables/quantities.json")
                     if PLACE == POINTS
                     else tables_of(PLACE, SCENE.tables)
                 ),

@@ -3,7 +3,7 @@
 
 rule write_scaling:
     input:
-        WORK.every("process", "tables/workpiece_force.parquet"),
+        WORK.every("process", "tables/quantities.json"),
     output:
         multiext(WORK.of_study("scaling", "scaling."), "csv", "json"),
         figure=shown(WORK.of_study("scaling", "scaling.png"), "scaling", "Scaling", "scaling"),

@@ -27,7 +27,7 @@ from dragchain.drag import circumference
 from dragchain.errors import TableError
 from dragchain.figures.panels import head, new_panels
 from dragchain.figures.style import MARKERS, SERIES, WIDE_IN, force_map
-from dragchain.quantities.along import MAP_AZIMUTHS, MAP_DEPTHS, loading_along
+from dragchain.quantities.along import MAP_AZIMUTHS, MAP_DEPTHS
 from dragchain.quantities.basis import Standing
 from dragchain.quantities.registry import REPORTED, Quantity
 from dragchain.report.campaign import write_report
@@ -279,7 +279,7 @@ def _load_map(study: StudyRuns) -> Floats:
     load_map = study.extrapolated.load_map if study.extrapolated else None
     if load_map is not None:
         return np.array(load_map.value).reshape(MAP_DEPTHS, MAP_AZIMUTHS)
-    return loading_along(study.process.folder, study.process.case, 1)[1]
+    return np.array(study.measured.load_map).reshape(MAP_DEPTHS, MAP_AZIMUTHS)
 
 
 def draw_maps(cases: Sequence[ComparedCase]) -> Figure:

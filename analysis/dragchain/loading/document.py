@@ -11,30 +11,25 @@ FILE = Path("tables") / "loading.json"
 
 
 class Totals(Part):
-    """Sums over all contacts and counted samples, and what follows from them.
+    """Sums over all contacts and counted samples, and ratios of them.
 
     Attributes
     ----------
-    totals, per_metre : mapping
-        By amount, `AMOUNTS` and ``normal_work_j``, ``workpiece_work_j`` and ``events``; the latter
-        per metre of the workpiece's path.
+    totals : mapping
+        By amount, `AMOUNTS` and ``normal_work_j``, ``workpiece_work_j`` and ``events``.
     front_fraction : mapping
         Fraction of each amount on the front half of the workpiece.
     friction_fraction_of_work, normal_fraction_of_work : Estimate
         Of the work that the workpiece does on the particles.
     load_while_sliding_fraction : Estimate
         Of the normal impulse.
-    mean_contacts : Estimate
-        Contacts with force at one time.
     """
 
     totals: Mapping[str, int | float]
-    per_metre: Mapping[str, Estimate]
     front_fraction: Mapping[str, Estimate]
     friction_fraction_of_work: Estimate
     normal_fraction_of_work: Estimate
     load_while_sliding_fraction: Estimate
-    mean_contacts: Estimate
 
 
 class Quantiles(Part):

@@ -235,14 +235,13 @@ def _profile(axes: Axes, profile: Profile) -> None:
 
 def _title(loading: Loading, case: CaseOfRun) -> str:
     """Say what the picture is of; fractions are unknown where nothing slides."""
-    work = loading.per_metre["friction_work_j"]
+    work_j_m = loading.totals["friction_work_j"] / loading.path_m
     front = loading.front_fraction["force_slide_n_m"]
     fraction = loading.friction_fraction_of_work.value
     return (
         f"{case.case or case.run}: sliding load on the workpiece, "
         f"{loading.path_m * 1e3:.0f} mm of path in {loading.time_s:.1f} s\n"
-        f"friction work {work.value:.3g} J/m (95 % CI {work.ci95_low:.3g} to {work.ci95_high:.3g}),"
-        f" {100 * fraction:.1f} % of the work of the workpiece\n"
+        f"friction work {work_j_m:.3g} J/m, {100 * fraction:.1f} % of the work of the workpiece\n"
         f"front half: {100 * front.value:.0f} % of force times sliding distance"
         f" (95 % CI {100 * front.ci95_low:.0f} to {100 * front.ci95_high:.0f})"
     )

@@ -80,45 +80,35 @@ def _totals(sampled: Sampled, events: pd.DataFrame) -> Totals:
     ahead = within_angle(rows["azimuth_rad"].to_numpy(np.float64), np.pi / 2)
     sums = np.column_stack(
         [
-            *(sampled.per_frame(rows[name]) for name in _KNOWN),
             *(sampled.per_frame(rows[name] * ahead) for name in _KNOWN),
             *(sampled.per_frame(rows[name] * (1.0 - ahead)) for name in _KNOWN),
-            sampled.per_frame(rows["contacts"]),
             sampled.per_frame(rows["normal_impulse_n_s"] * rows["mobilised"]),
             sampled.per_frame(rows["normal_impulse_n_s"] * (1.0 - rows["mobilised"])),
-            np.bincount(events["frame"], minlength=sampled.frames),
         ]
     )
     friction, normal, whole = (
         _KNOWN.index(name) for name in ("friction_work_j", "normal_work_j", "workpiece_work_j")
     )
-    metre = sampled.path_m / sampled.frames
 
     def statistic(means: Floats) -> Floats:
-        total, front, back = (means[..., k * count : (k + 1) * count] for k in range(3))
-        contacts, sliding, sticking, begins = np.moveaxis(means[..., 3 * count :], -1, 0)
-        work = total[..., whole]
+        front, back = means[..., :count], means[..., count : 2 * count]
+        sliding, sticking = np.moveaxis(means[..., 2 * count :], -1, 0)
+        total = front + back
         others = [
-            total[..., friction] / work,
-            total[..., normal] / work,
+            total[..., friction] / total[..., whole],
+            total[..., normal] / total[..., whole],
             sliding / (sliding + sticking),
-            contacts,
-            begins / metre,
         ]
-        return np.concatenate(
-            [total / metre, front / (front + back), np.stack(others, -1)], axis=-1
-        )
+        return np.concatenate([front / total, np.stack(others, -1)], axis=-1)
 
-    totals = estimates(sums, statistic)
-    friction_part, normal_part, sliding_part, contacts, begins = totals[2 * count :]
+    ratios = estimates(sums, statistic)
+    friction_part, normal_part, sliding_part = ratios[count:]
     return Totals(
         totals={name: float(rows[name].sum()) for name in _KNOWN} | {"events": len(events)},
-        per_metre=dict(zip(_KNOWN, totals, strict=False)) | {"events": begins},
-        front_fraction=dict(zip(_KNOWN, totals[count:], strict=False)),
+        front_fraction=dict(zip(_KNOWN, ratios, strict=False)),
         friction_fraction_of_work=friction_part,
         normal_fraction_of_work=normal_part,
         load_while_sliding_fraction=sliding_part,
-        mean_contacts=contacts,
     )
 
 

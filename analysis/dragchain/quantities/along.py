@@ -1,7 +1,7 @@
 """What one process run says of every quantity along its path.
 
 The counted path is cut into blocks of about one mean particle diameter; each
-quantity has one value a block. A run's value is the mean over its blocks.
+quantity has one value a block, and `dragchain.quantities.blocks` makes the run's value of them.
 """
 
 import math
@@ -13,13 +13,15 @@ import numpy as np
 import pandas as pd
 
 from dragchain.arrays import Floats, Ints
-from dragchain.drag import parts, read_counted
+from dragchain.drag import FORCES, drag_peaks, parts, read_counted, within_angle
 from dragchain.loading.samples import Sampled, sample
-from dragchain.quantities.registry import COMPARED
-from dragchain.run.kinematics import drag_phase, needed
-from dragchain.statistics.estimate import finite
+from dragchain.quantities.blocks import Blocks, estimate_of
+from dragchain.quantities.known import UNKNOWN, Known
+from dragchain.quantities.registry import MEASURED
+from dragchain.run.kinematics import drag_phase, motion_of, needed, spins, workpiece_rotation
+from dragchain.statistics.estimate import Estimate, finite
 from dragchain.tables.by_step import read_groups, read_table
-from dragdeck.decks.outputs import load_outputs
+from dragchain.tables.columns import vector
 from dragdeck.documents import Part
 from dragdeck.records.case import CaseOfRun
 
@@ -35,6 +37,9 @@ class PathQuantities(Part):
         Length of a block, m.
     blocks : mapping
         Quantity to a sequence of B values, None where a block has none.
+    weights : mapping
+        Quantity to what each block counts, for example its samples, contacts or chains. All
+        blocks of a quantity that is not named count the same.
     load_map : sequence of float
         Mean normal load by depth and azimuth, N, a depth after the other.
     """
@@ -42,70 +47,80 @@ class PathQuantities(Part):
     arc_m: float = 0.0
     block_m: float = 0.0
     blocks: Mapping[str, tuple[float | None, ...]] = {}
+    weights: Mapping[str, tuple[float, ...]] = {}
     load_map: tuple[float, ...] = ()
 
-    def of_blocks(self, name: str) -> Floats:
-        """The values of a quantity, (B,), NaN where a block has none; (0,) if none has one."""
-        return np.array(self.blocks.get(name, ()), dtype=np.float64)
+    def of_blocks(self, name: str) -> Blocks:
+        """The blocks of a quantity; none if the run does not have it."""
+        values = np.array(self.blocks.get(name, ()), dtype=np.float64)
+        return Blocks(values, np.array(self.weights.get(name, np.ones(len(values)))))
 
     def values(self, start: int = 0, stop: int | None = None) -> dict[str, float]:
-        """The quantities over some blocks, all if not given, that have a value in each."""
-        values = {}
-        for quantity in COMPARED:
-            blocks = self.of_blocks(quantity.name)[start:stop]
-            if blocks.size and np.isfinite(blocks).all():
-                values[quantity.name] = quantity.of_blocks(blocks)
-        return values
+        """The quantities over some blocks, all if not given; without those that have no value."""
+        values = {
+            quantity.name: quantity.of_mean(
+                self.of_blocks(quantity.name).part(slice(start, stop)).mean
+            )
+            for quantity in MEASURED
+        }
+        return {name: value for name, value in values.items() if math.isfinite(value)}
+
+    def estimates(self, known: Mapping[str, Known]) -> dict[str, Estimate]:
+        """The quantities of the run with their intervals, without those that have no value.
+
+        Parameters
+        ----------
+        known : mapping
+            Quantity to what runs of other scenes say of it, for those of which they do.
+        """
+        there = self.values()
+        return {
+            quantity.name: estimate_of(
+                quantity, self.of_blocks(quantity.name), known.get(quantity.name, UNKNOWN)
+            )
+            for quantity in MEASURED
+            if quantity.name in there
+        }
 
 
 MAP_DEPTHS, MAP_AZIMUTHS = 4, 12
 """Bins of a load map: equal parts of the immersion depth, and of the circumference."""
 
 
-def loading_along(run_dir: Path, case: CaseOfRun, blocks: int) -> tuple[dict[str, Floats], Floats]:
-    """Quantities of loading in each block of the path, and the load map.
+def _of_loading(sampled: Sampled, path: "CountedPath") -> dict[str, Blocks]:
+    """What the contacts on the workpiece do to it, in equal parts of their samples."""
+    block = np.arange(sampled.frames) * path.blocks // sampled.frames
+    frames = np.bincount(block, minlength=path.blocks)
+    ahead = within_angle(sampled.rows["azimuth_rad"].to_numpy(np.float64), np.pi / 2)
 
-    Parameters
-    ----------
-    run_dir : Path
-        With the tables of a complete run.
-    case : CaseOfRun
-    blocks : int
-        Number of equal blocks B of the counted path.
+    def sums(of_rows: Floats | pd.Series) -> Floats:
+        return np.asarray(np.bincount(block, sampled.per_frame(of_rows), path.blocks), np.float64)
 
-    Returns
-    -------
-    blocks : dict of str to (B,) ndarray
-        Normal load, N: the sum of the normal forces of all contacts; sliding distance of all
-        contacts for a metre of path, m/m; normal force times sliding distance for a metre of path,
-        N m/m; friction work for a metre of path, J/m.
-    load_map : (MAP_DEPTHS, MAP_AZIMUTHS) ndarray
-        Mean normal load by depth and azimuth, N.
-
-    Raises
-    ------
-    TableError
-        If the slip of the contacts is not known, or no particle touches the workpiece.
-    """
-    counted = sample(run_dir, case)
-    block = np.arange(counted.frames) * blocks // counted.frames
-    frames = np.bincount(block, minlength=blocks)
-
-    def per_frame(name: str) -> Floats:
-        sums = counted.per_frame(counted.rows[name])
-        return np.asarray(np.bincount(block, sums, blocks) / frames)
-
-    path_m = counted.path_m / counted.frames
-    along = {
-        "normal_load": per_frame("normal_impulse_n_s") / counted.interval_s,
-        "sliding_distance": per_frame("sliding_m") / path_m,
-        "force_slide": per_frame("force_slide_n_m") / path_m,
-        "friction_work": per_frame("friction_work_j") / path_m,
+    load = sums(sampled.rows["normal_impulse_n_s"])
+    metres = sampled.path_m / sampled.frames * frames
+    return {
+        "workpiece_contacts": Blocks.ratio(sums(sampled.rows["contacts"]), frames),
+        "normal_load": Blocks.ratio(load / sampled.interval_s, frames),
+        **{
+            name: Blocks.ratio(sums(sampled.rows[column]), metres)
+            for name, column in _PER_METRE.items()
+        },
+        "ahead_behind": Blocks.ratio(sums(sampled.rows["normal_impulse_n_s"] * ahead), load),
     }
-    return along, _load_map(counted, needed(case.workpiece, "workpiece").immersion_depth_m)
+
+
+_PER_METRE = {
+    "sliding_distance": "sliding_m",
+    "force_slide": "force_slide_n_m",
+    "friction_work": "friction_work_j",
+    "workpiece_work": "workpiece_work_j",
+    "normal_impulse": "normal_impulse_n_s",
+}
+"""Amounts of the contacts that are told for a metre of path."""
 
 
 def _load_map(counted: Sampled, depth_m: float) -> Floats:
+    """Mean normal load by depth and azimuth, (MAP_DEPTHS, MAP_AZIMUTHS) in N."""
     rows = counted.rows
     level = np.floor(rows["depth_m"].to_numpy() / depth_m * MAP_DEPTHS).astype(np.int64)
     level = level.clip(0, MAP_DEPTHS - 1)
@@ -155,13 +170,16 @@ class CountedPath:
         number = np.ceil(fraction * self.blocks).astype(np.int64) - 1
         return np.asarray(number.clip(0, self.blocks - 1))
 
-    def mean(self, steps: Ints, values: Floats) -> Floats:
-        """Mean of N values in every block, (B,); NaN in a block without any."""
+    def mean(self, steps: Ints, values: Floats) -> Blocks:
+        """Means of N values in every block, with their numbers."""
         block = self.block(steps)
         total = np.bincount(block, weights=values, minlength=self.blocks)
+        return Blocks.ratio(total, np.bincount(block, minlength=self.blocks))
+
+    def per_metre(self, block: Ints) -> Blocks:
+        """How many there are in a metre of every block, from the block of each, (N,)."""
         count = np.bincount(block, minlength=self.blocks)
-        with np.errstate(invalid="ignore"):
-            return np.asarray(total / count)
+        return Blocks(count / (self.length_m / self.blocks), np.ones(self.blocks))
 
     def parts(self, rows: Iterable[Rows]) -> Iterator[tuple[int, Floats]]:
         """Values of rising steps block by block: number of the block, and what is in it.
@@ -187,24 +205,51 @@ class CountedPath:
 
 
 def quantities_along(run_dir: Path, case: CaseOfRun) -> PathQuantities:
-    """The quantities of a complete run with tables and chains."""
-    force = read_counted(run_dir, ("step", "drag_n", "lateral_n", "vertical_n"))
+    """The quantities of a complete run with tables and chains.
+
+    Contact events are counted if `dragchain.loading` has found them.
+
+    Raises
+    ------
+    TableError
+        If a table is missing, the slip of the contacts is not known, or no particle touches the
+        workpiece.
+    """
+    turning = (HEADING, *TORQUES) if spins(case) else ()
+    force = read_counted(run_dir, ("step", "time_s", *FORCES, *turning))
     path = CountedPath.of(case, force["step"].to_numpy(np.int64))
-    loading, load_map = loading_along(run_dir, case, path.blocks)
-    on_workpiece, network = _of_workpiece_contacts(run_dir, path), _of_network(run_dir, path)
-    blocks = {**_of_force(force, path), **on_workpiece, **loading, **network}
+    sampled = sample(run_dir, case)
+    quantities = {
+        **_of_force(force, path, case),
+        **_of_workpiece_contacts(run_dir, path),
+        **_of_loading(sampled, path),
+        **_of_events(run_dir / "tables" / "contact_events.parquet", sampled, path),
+        **_of_network(run_dir, path),
+    }
+    load_map = _load_map(sampled, needed(case.workpiece, "workpiece").immersion_depth_m)
     return PathQuantities(
         arc_m=path.length_m,
         block_m=path.length_m / path.blocks,
-        blocks={name: tuple(map(finite, values)) for name, values in blocks.items()},
+        blocks={
+            name: tuple(map(finite, blocks.values.tolist())) for name, blocks in quantities.items()
+        },
+        weights={
+            name: tuple(blocks.weights.tolist())
+            for name, blocks in quantities.items()
+            if np.ptp(blocks.weights) > 0.0 or not blocks.weights.any()
+        },
         load_map=tuple(load_map.ravel().tolist()),
     )
 
 
-def _of_force(force: pd.DataFrame, path: CountedPath) -> dict[str, Floats]:
+HEADING, TORQUES = "direction_rad", vector("torque", "n_m")
+
+
+def _of_force(force: pd.DataFrame, path: CountedPath, case: CaseOfRun) -> dict[str, Blocks]:
     steps = force["step"].to_numpy(np.int64)
     drag = force["drag_n"].to_numpy(np.float64)
-    deviation = drag - drag.mean()
+    unbiased = math.sqrt(len(drag) / (len(drag) - 1))
+    deviation = (drag - drag.mean()) * unbiased
     spacing = path.length_m / len(drag)
     bands = {
         "long": (LONG_WAVE, math.inf),
@@ -217,15 +262,33 @@ def _of_force(force: pd.DataFrame, path: CountedPath) -> dict[str, Floats]:
         )
         for name, (low, high) in bands.items()
     }
-    if path.length_m < 2.0 * LONG_WAVE * path.diameter_m:
-        squares["drag_std_long"][:] = math.nan  # a window is no longer than its waves
-    return {
-        "drag_mean": path.mean(steps, drag),
-        "drag_std": path.mean(steps, deviation**2),
-        **squares,
-        "lateral_mean": path.mean(steps, force["lateral_n"].to_numpy(np.float64)),
-        "vertical_mean": path.mean(steps, force["vertical_n"].to_numpy(np.float64)),
+    means = {f"{name.removesuffix('_n')}_mean": force[name].to_numpy(np.float64) for name in FORCES}
+    if spins(case):
+        means["torque_mean"] = _own_torque(force, case)
+    away = {
+        f"{name.removesuffix('_n')}_std": (force[name] - force[name].mean()) * unbiased
+        for name in FORCES
     }
+    blocks = {
+        **{name: path.mean(steps, series) for name, series in means.items()},
+        **{name: path.mean(steps, series.to_numpy() ** 2) for name, series in away.items()},
+        **squares,
+        "peaks": path.per_metre(path.block(steps[drag_peaks(force, case).index])),
+    }
+    if path.length_m < 2.0 * LONG_WAVE * path.diameter_m:  # a window is no longer than its waves
+        del blocks["drag_std_long"], blocks["peaks"]  # what is a peak depends on them
+    return blocks
+
+
+def _own_torque(samples: pd.DataFrame, case: CaseOfRun) -> Floats:
+    """Torque of the particles on the workpiece about its own axis, (N,) in N m.
+
+    Unless the workpiece turns in the frame of its path, its work is negligible beside the drag's.
+    """
+    step, heading = samples["step"].to_numpy(np.int64), samples[HEADING].to_numpy(np.float64)
+    torque = samples[[*TORQUES]].to_numpy(np.float64)
+    axis = motion_of(case).drive.own_axis
+    return np.asarray(workpiece_rotation(step, heading, case).into(torque) @ axis)
 
 
 def band_pass(series: Floats, spacing_m: float, shortest_m: float, longest_m: float) -> Floats:
@@ -269,21 +332,21 @@ def _pushing_contacts(run_dir: Path) -> Iterator[Rows]:
             )
 
 
-def _of_workpiece_contacts(run_dir: Path, path: CountedPath) -> dict[str, Floats]:
-    frames = np.bincount(path.block(_frames(run_dir, path)), minlength=path.blocks)
-    contacts = np.zeros(path.blocks)
-    names = ("mean", "p50", "p90", "p99")
-    forces = {f"contact_force_{name}": np.full(path.blocks, math.nan) for name in names}
-    overlap = np.full(path.blocks, math.nan)
+def _of_workpiece_contacts(run_dir: Path, path: CountedPath) -> dict[str, Blocks]:
+    names = (*(f"contact_force_{name}" for name in ("mean", "p50", "p90", "p99")), _OVERLAP)
+    values, contacts = {name: np.zeros(path.blocks) for name in names}, np.zeros(path.blocks)
     for number, (normal, depth) in (
         (number, values.T) for number, values in path.parts(_pushing_contacts(run_dir))
     ):
         contacts[number] = len(normal)
-        overlap[number] = _mean(depth / path.diameter_m)
-        forces["contact_force_mean"][number] = _mean(normal)
-        for fraction in (50, 90, 99):
-            forces[f"contact_force_p{fraction}"][number] = np.percentile(normal, fraction)
-    return {"workpiece_contacts": contacts / frames, **forces, "workpiece_overlap": overlap}
+        of_block = [_mean(normal), *np.percentile(normal, (50, 90, 99)), _mean(depth)]
+        for name, value in zip(names, of_block, strict=True):
+            values[name][number] = value
+    values[_OVERLAP] /= path.diameter_m
+    return {name: Blocks.ratio(of * contacts, contacts) for name, of in values.items()}
+
+
+_OVERLAP = "workpiece_overlap"
 
 
 def _mean(values: Floats) -> float:
@@ -291,18 +354,20 @@ def _mean(values: Floats) -> float:
     return float(np.bincount(np.zeros(len(values), dtype=np.int64), values)[0] / len(values))
 
 
-def _frames(run_dir: Path, path: CountedPath) -> Ints:
-    """Steps of the counted frames of the contacts on the workpiece, those without contact too."""
-    output = load_outputs(run_dir)["workpiece_contacts"]
-    steps = np.arange(output.first_step, path.last_step + 1, output.period_steps, dtype=np.int64)
-    return steps[steps > path.first_step]
+def _of_events(file: Path, sampled: Sampled, path: CountedPath) -> dict[str, Blocks]:
+    """Contact events by the sample in which they begin."""
+    if not file.is_file():
+        return {}
+    frame_of = sampled.rows.drop_duplicates("time_s").set_index("time_s")["frame"]
+    begins = frame_of.reindex(read_table(file, ["start_s"])["start_s"]).to_numpy(np.int64)
+    return {"events": path.per_metre(begins * path.blocks // sampled.frames)}
 
 
-def _of_network(run_dir: Path, path: CountedPath) -> dict[str, Floats]:
+def _of_network(run_dir: Path, path: CountedPath) -> dict[str, Blocks]:
     tables = run_dir / "tables"
     network = read_table(tables / "network.parquet")
     steps = network["step"].to_numpy(np.int64)
-    overlap = np.full(path.blocks, math.nan)
+    overlap = np.zeros(path.blocks)
     for number, values in path.parts(_overlaps(tables / "contacts.parquet", path)):
         overlap[number] = np.percentile(values, 99)
     columns = {
@@ -310,10 +375,11 @@ def _of_network(run_dir: Path, path: CountedPath) -> dict[str, Floats]:
         "mechanical_coordination_number": "mechanical_coordination_number",
         "network_force_mean": "normal_force_mean_n",
     }
+    frames = np.bincount(path.block(steps), minlength=path.blocks)
     return {
         **{name: path.mean(steps, network[col].to_numpy()) for name, col in columns.items()},
-        "overlap_p99": overlap,
-        **_of_chains(read_table(tables / "chains.parquet", _CHAIN_COLUMNS), steps, path),
+        "overlap_p99": Blocks.ratio(overlap * frames, frames),
+        **_of_chains(read_table(tables / "chains.parquet", _CHAIN_COLUMNS), frames, path),
     }
 
 
@@ -334,14 +400,14 @@ _CHAIN_COLUMNS = [
 ]
 
 
-def _of_chains(chains: pd.DataFrame, frames: Ints, path: CountedPath) -> dict[str, Floats]:
+def _of_chains(chains: pd.DataFrame, frames: Ints, path: CountedPath) -> dict[str, Blocks]:
     peters = chains[chains["definition"] == "peters"]
     steps = peters["step"].to_numpy(np.int64)
     along = np.cos(peters["inclination_rad"]) * np.cos(peters["azimuth_rad"])
     paths = chains[chains["dominant"]]
     count = np.bincount(path.block(steps), minlength=path.blocks)
     return {
-        "chain_count": count / np.bincount(path.block(frames), minlength=path.blocks),
+        "chain_count": Blocks.ratio(count, frames),
         "chain_length": path.mean(steps, peters["n_particles"].to_numpy(np.float64)),
         "chain_alignment": path.mean(steps, along.to_numpy(np.float64) ** 2),
         "path_bottleneck": path.mean(

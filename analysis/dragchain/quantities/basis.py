@@ -49,8 +49,6 @@ class Standing:
         What that rests on.
     reason : str
         Why it is not available, or what it is not corrected for; empty if nothing is to be said.
-    reliable : bool
-        Whether the series is long enough for the interval of the run.
     windows : int
         Number of windows that the value is from.
     """
@@ -60,8 +58,12 @@ class Standing:
     value: Estimate | None
     basis: Basis
     reason: str = ""
-    reliable: bool = True
     windows: int = 0
+
+    @property
+    def reliable(self) -> bool:
+        """Whether the interval of the run is reliable."""
+        return self.run.reliable
 
     @property
     def corrected(self) -> bool:
@@ -80,43 +82,37 @@ class Standing:
 
 
 def judge(
-    quantity: Quantity,
-    own: Estimate,
-    case: CaseOfRun,
-    correction: Correction | None,
-    reliable: bool = True,
+    quantity: Quantity, measured: Estimate, case: CaseOfRun, correction: Correction | None
 ) -> Standing:
     """Decide what the value of a run says of the process.
 
     Parameters
     ----------
     quantity : Quantity
-    own : Estimate
+    measured : Estimate
         Value of the run, in simulated time.
     case : CaseOfRun
         A process run.
     correction : Correction or None
         What windows make of it; None if they do not give it.
-    reliable : bool
-        Whether the interval of `own` is reliable.
     """
     factor = case.fidelity.speed_factor**quantity.time
-    run = own.over(1.0 / factor)
+    run = measured.over(1.0 / factor)
     scaled = Basis.SCALED if factor != 1.0 else Basis.SIMULATED
     doubts = changed_settings(case.fidelity)
     if not doubts:
-        return Standing(quantity, run, run, scaled, "", reliable)
+        return Standing(quantity, run, run, scaled)
     if correction is not None:
         ends = (correction.factor.ci95_low, correction.factor.ci95_high)
         low, high = sorted(run.value * end for end in ends)
         value = Estimate(run.value * correction.factor.value, low, high)
-        return Standing(quantity, run, value, Basis.WINDOWS, "", reliable, correction.windows)
+        return Standing(quantity, run, value, Basis.WINDOWS, "", correction.windows)
     reason = f"not corrected for {' and '.join(doubts)}"
     if case.marks:
         reason += f": {_why_not(case)}"
     if quantity.robust:
-        return Standing(quantity, run, run, scaled, reason, reliable)
-    return Standing(quantity, run, None, Basis.NONE, reason, reliable)
+        return Standing(quantity, run, run, scaled, reason)
+    return Standing(quantity, run, None, Basis.NONE, reason)
 
 
 def changed_settings(fidelity: FidelityOfRun) -> dict[str, str]:

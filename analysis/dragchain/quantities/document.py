@@ -1,32 +1,105 @@
-"""The document ``extrapolated.json``: quantities of a run, and at the physical modulus."""
+"""The documents of a run's quantities: ``quantities.json``, and ``extrapolated.json``.
 
-from collections.abc import Mapping
+The first has what the run itself gives; the second, what its windows make of it at the physical
+Young's modulus.
+"""
+
+import math
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
+from pydantic import JsonValue
+
+from dragchain.quantities.along import PathQuantities
+from dragchain.quantities.registry import MEASURED
 from dragchain.statistics.estimate import Estimate
 from dragdeck.documents import Document, Part
+from dragdeck.records.case import FidelityOfRun
+from dragdeck.records.run import AcceptanceCheck
 
+MEASURED_FILE = Path("tables") / "quantities.json"
 EXTRAPOLATED = Path("tables") / "extrapolated.json"
 
 
-class ExtrapolatedQuantity(Part):
-    """A quantity of a run, and its value at the physical modulus where windows give it.
+def checks_in_words(checks: Iterable[AcceptanceCheck]) -> str:
+    """Acceptance checks and what was seen."""
+    return "; ".join(f"{check.name}: {check.seen}" for check in checks)
+
+
+class RunCost(Part):
+    """The cost of a run.
 
     Attributes
     ----------
-    name, label, unit : str
-    measured : Estimate
-        Value of the run as it was simulated.
-    value : Estimate or None
-        At the physical Young's modulus, None if neither windows nor the run itself give it.
+    steps : int
+        Number of time steps.
+    wall_time_s, cpu_time_s : float
+        Wall-clock time, and CPU time of all ranks, s.
+    ranks : int
+        MPI ranks.
+    timestep_s : float
+        Time step, s.
+    axis_speed_m_s : float
+        Speed of the workpiece along its path, m/s.
+    steps_per_m : float
+        Time steps per metre of path.
     """
 
-    name: str
-    label: str
-    unit: str
-    measured: Estimate
-    value: Estimate | None = None
+    steps: int
+    wall_time_s: float
+    cpu_time_s: float
+    ranks: int
+    timestep_s: float
+    axis_speed_m_s: float
+    steps_per_m: float
+
+    @property
+    def cpu_per_m(self) -> float:
+        """Processor time for a metre of path, s/m; NaN for a run that failed at once."""
+        return self.cpu_time_s / self.steps * self.steps_per_m if self.steps else math.nan
+
+
+class RunQuantities(PathQuantities, Document):
+    """The content of ``quantities.json``.
+
+    Attributes
+    ----------
+    values_of_run : mapping
+        Quantity to its value with interval, in simulated time.
+    failure : sequence of AcceptanceCheck
+        Checks that did not pass; a failed run has no quantities.
+    single : mapping
+        The quantities of the packing.
+    """
+
+    remedy = "make it with: ./run dragchain quantities"
+
+    study: str
+    run: str
+    bed: str | None
+    inputs: Mapping[str, JsonValue]
+    fidelity: FidelityOfRun
+    numbers: Mapping[str, float] = {}
+    complete: bool
+    cost: RunCost
+    versions: Mapping[str, str]
+    started: str
+    failure: tuple[AcceptanceCheck, ...] = ()
+    single: Mapping[str, float] = {}
+    values_of_run: Mapping[str, Estimate] = {}
+
+    @property
+    def seed(self) -> int:
+        """Seed of its bed."""
+        seed = self.inputs["seed"]
+        assert isinstance(seed, int)
+        return seed
+
+    @property
+    def why_failed(self) -> str:
+        """The checks that did not pass, and what was seen."""
+        return checks_in_words(self.failure)
 
 
 class Need(NamedTuple):
@@ -99,6 +172,8 @@ class Extrapolated(Document):
 
     Attributes
     ----------
+    values : mapping
+        Quantity to its value at the physical Young's modulus, of those that windows give.
     tolerance : Reached or None
         Of a run that was asked for one.
     load_map : LoadMap or None
@@ -107,7 +182,7 @@ class Extrapolated(Document):
 
     remedy = "make it with: ./run dragchain step extrapolate"
 
-    quantities: tuple[ExtrapolatedQuantity, ...]
+    values: Mapping[str, Estimate] = {}
     tolerance: Reached | None = None
     load_map: LoadMap | None = None
 
@@ -117,8 +192,7 @@ class Extrapolated(Document):
         reached = self.tolerance
         if reached is None:
             return ""
-        known = {quantity.name: quantity.label for quantity in self.quantities}
-        labels = [f"the {known.get(name, name)}" for name in reached.asked]
+        labels = [f"the {_LABELS.get(name, name)}" for name in reached.asked]
         what = " and ".join(filter(None, (", ".join(labels[:-1]), labels[-1])))
         asked = f"{what} to within {100 * reached.tolerance:.3g} %"
         who, verb = "The run at the physical Young's modulus", ("gives", "does not give")
@@ -131,6 +205,5 @@ class Extrapolated(Document):
         more = f"{windows} windows" if packings == 1 and reached.runs else f"{packings} seeds"
         return f"{who} {verb[1]} {asked}: about {more} would."
 
-    def of(self, name: str) -> ExtrapolatedQuantity | None:
-        """A quantity by its name, None if it was not measured."""
-        return next((quantity for quantity in self.quantities if quantity.name == name), None)
+
+_LABELS = {quantity.name: quantity.label for quantity in MEASURED}

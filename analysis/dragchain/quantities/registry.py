@@ -3,9 +3,6 @@
 import math
 from dataclasses import dataclass
 
-import numpy as np
-
-from dragchain.arrays import Floats
 from dragdeck.study.quantities import QUANTITIES
 
 
@@ -19,10 +16,11 @@ class Quantity:
         The unit is empty for a plain number.
     short : str
         Head of a column, of the main quantities of a trade-off.
-    squared : bool
-        Its blocks hold squares: a run's value is the root of their mean.
-    signed : bool
-        It may be zero or change its sign: errors are counted in mean drags.
+    kind : str
+        ``squared``: its blocks hold squares, and a run's value is the root of their mean; ``odds``:
+        they hold a fraction f, and a run's value is f / (1 - f); ``signed``: it may be zero or
+        change its sign, and errors are counted in mean drags; ``packing``: it has one value a
+        packing, and no blocks; else ``plain``.
     time : int
         Power of time in it. A workpiece that is f times as fast takes 1/f of the time.
     robust : bool
@@ -35,19 +33,27 @@ class Quantity:
     label: str
     unit: str = ""
     short: str = ""
-    squared: bool = False
-    signed: bool = False
+    kind: str = "plain"
     time: int = 0
     robust: bool = False
 
-    def rooted(self, blocks: Floats) -> Floats:
-        """Values of blocks, (B,), as a run's value is one."""
-        return np.sqrt(blocks) if self.squared else blocks
+    @property
+    def squared(self) -> bool:
+        """Whether its blocks hold squares."""
+        return self.kind == "squared"
 
-    def of_blocks(self, blocks: Floats) -> float:
-        """A run's value from the values of its blocks, (B,)."""
-        mean = float(np.mean(blocks))
-        return math.sqrt(mean) if self.squared else mean
+    @property
+    def signed(self) -> bool:
+        """Whether it may be zero or change its sign."""
+        return self.kind == "signed"
+
+    def of_mean(self, mean: float) -> float:
+        """A run's value from the mean of its blocks, NaN where it would be infinite."""
+        if self.squared:
+            return math.sqrt(mean)
+        if self.kind == "odds":
+            return mean / (1.0 - mean) if mean < 1.0 else math.nan
+        return mean
 
 
 def _quantities(column: str) -> tuple[Quantity, ...]:
@@ -55,8 +61,7 @@ def _quantities(column: str) -> tuple[Quantity, ...]:
     return tuple(
         Quantity(
             row["name"], row["label"], row["unit"], row["short"].replace("|", "\N{SOFT HYPHEN}"),
-            row["kind"] == "squared", row["kind"] == "signed",
-            int(row["time"] or 0), row["robust"] == "yes",
+            row["kind"], int(row["time"] or 0), row["robust"] == "yes",
         )
         for row in QUANTITIES
         if row[column]
@@ -66,9 +71,9 @@ def _quantities(column: str) -> tuple[Quantity, ...]:
 REPORTED = _quantities("reported")
 """What a report tells of a process run, in its order."""
 
-COMPARED = _quantities("kind")
-"""What a trade-off compares. All but those of the packing, which are last, have a value for every
+MEASURED = _quantities("kind")
+"""What is measured of a run. All but those of the packing, which are last, have a value for every
 block of the path."""
 
-MAIN = tuple(quantity.name for quantity in COMPARED if quantity.short)
+MAIN = tuple(quantity.name for quantity in MEASURED if quantity.short)
 """The quantities that figures and the tables of settings show."""

@@ -14,16 +14,18 @@ from typing import Generic, TypeVar
 import numpy as np
 from pydantic import JsonValue
 
+from dragchain.loading.document import FILE as LOADING
 from dragchain.loading.document import Loading
 from dragchain.loading.wear import FILE as WEAR
 from dragchain.loading.wear import Wear
-from dragchain.quantities.document import Extrapolated, ExtrapolatedQuantity
+from dragchain.quantities.document import EXTRAPOLATED, MEASURED_FILE, Extrapolated, RunQuantities
 from dragchain.report.findings import FILE, DropFindings, FillingFindings, Findings, ProcessFindings
 from dragchain.report.page import TIMES, fixed, number, with_interval
-from dragchain.report.values import Values, read_optional, values_of, values_over_packings
+from dragchain.report.values import Values, values_of, values_over_packings
 from dragchain.run.case import changed_inputs, upstream_folders, with_changes
 from dragchain.run.kinematics import axis_speed, drag_phase, motion_of, needed, path_passed
 from dragchain.statistics.estimate import mean_of
+from dragdeck.documents import Document
 from dragdeck.errors import DocumentError, RejectedRunError
 from dragdeck.records.case import CaseOfRun, ClassOfRun, load_case
 from dragdeck.records.run import RunRecord, read_accepted
@@ -188,6 +190,7 @@ def _text(value: JsonValue) -> str:
 # --- runs ----------------------------------------------------------------------------------------
 
 
+D = TypeVar("D", bound=Document)
 F = TypeVar("F", bound=Findings, covariant=True)
 
 
@@ -205,14 +208,15 @@ class ReportedRun(Generic[F]):
 class StudyRuns:
     """A process run with the filling and the drop test it belongs to, None where it names none.
 
-    `loading`: load, sliding and friction work on the workpiece; `extrapolated`: its quantities at
-    the physical Young's modulus; `wear`: what laws of removal read. Each is None where it was not
-    computed.
+    `measured`: its quantities; `loading`: fractions and types of the contacts on the workpiece;
+    `extrapolated`: its quantities at the physical Young's modulus; `wear`: what laws of removal
+    read. Each of the last three is None where it was not computed.
     """
 
     process: ReportedRun[ProcessFindings]
     filling: ReportedRun[FillingFindings] | None
     drop_test: ReportedRun[DropFindings] | None
+    measured: RunQuantities
     loading: Loading | None = None
     extrapolated: Extrapolated | None = None
     wear: Wear | None = None
@@ -220,13 +224,7 @@ class StudyRuns:
     @cached_property
     def values(self) -> Values:
         """The quantities of the process run, each with what it says of the process."""
-        process = self.process
-        return values_of(process.case, process.findings, self.loading, self.extrapolated)
-
-    def physical(self, name: str) -> ExtrapolatedQuantity | None:
-        """A quantity with its value at the physical modulus, None if that is not known."""
-        one = self.extrapolated.of(name) if self.extrapolated else None
-        return one if one and one.value else None
+        return values_of(self.process.case, self.measured.values_of_run, self.extrapolated)
 
     @property
     def runs(self) -> list[ReportedRun[Findings]]:
@@ -256,8 +254,20 @@ def read_study_runs(run_dir: Path) -> StudyRuns:
     with suppress(RejectedRunError, DocumentError):
         if "drop_test" in upstream:
             drop_test = read_reported(upstream["drop_test"], DropFindings)
-    wear = Wear.read(run_dir / WEAR) if (run_dir / WEAR).is_file() else None
-    return StudyRuns(process, filling, drop_test, *read_optional(run_dir), wear)
+    return StudyRuns(
+        process,
+        filling,
+        drop_test,
+        RunQuantities.read(run_dir / MEASURED_FILE),
+        read_if_there(Loading, run_dir / LOADING),
+        read_if_there(Extrapolated, run_dir / EXTRAPOLATED),
+        read_if_there(Wear, run_dir / WEAR),
+    )
+
+
+def read_if_there(document: type[D], file: Path) -> D | None:
+    """Read a document, None if there is none; `DocumentError` if it cannot be used."""
+    return document.read(file) if file.is_file() else None
 
 
 def read_reported(run_dir: Path, findings: type[F]) -> ReportedRun[F]:

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dragchain.report.cases import ReportedCase
-from dragchain.report.values import mean_over_packings
 from dragchain.run.case import changed_inputs
 from dragchain.statistics.estimate import Estimate
 from dragdeck.records.advice import AdviceFile, OptionEntry
@@ -120,8 +119,8 @@ def answers(case: ReportedCase) -> list[Answer]:
 def _answer(name: str, case: ReportedCase, asked: AdvisedSettings) -> Answer:
     if name == _RESTITUTION:
         return Answer("coefficient of restitution", "", None, asked.error, asked.tolerance)
-    known = [one for study in case.studies if (one := study.physical(name))]
-    if len(known) < len(case.studies):
+    standing, scale = case.values.of(name), case.first.process.case.fidelity.youngs_modulus_scale
+    if standing is None or standing.value is None or not (standing.corrected or scale == 1.0):
         return Answer(name, "", None, None, asked.tolerance)
-    found = mean_over_packings([one.value for one in known if one.value])
-    return Answer(known[0].label, known[0].unit, found, found.relative_half_width, asked.tolerance)
+    quantity, value = standing.quantity, standing.value
+    return Answer(quantity.label, quantity.unit, value, value.relative_half_width, asked.tolerance)

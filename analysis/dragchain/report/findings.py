@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal, NamedTuple
 
-from dragchain.run.reference import ReferenceDrag
 from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import Estimate, EstimateColumns, Real
 from dragchain.tables.impacts import Restitution
@@ -42,8 +41,6 @@ class Chains(Part):
 
     Attributes
     ----------
-    peters_per_frame, peters_particles_mean : float
-        Quasi-linear chains per frame, and their mean number of particles.
     widest_paths_per_frame : float
         Paths from workpiece to bowl per frame.
     workpiece_contacts_without_path_per_frame : float
@@ -63,8 +60,6 @@ class Chains(Part):
         (1: all equal).
     """
 
-    peters_per_frame: float
-    peters_particles_mean: Real
     widest_paths_per_frame: float
     workpiece_contacts_without_path_per_frame: float
     widest_paths_to_side_fraction: Real
@@ -85,14 +80,10 @@ class AheadBehind(Part):
     ----------
     ahead_n, behind_n : Estimate
         Within 90 degrees of the direction of motion, and beyond, N.
-    ratio, fraction_ahead : Estimate
-        Ratio ahead / behind, and fraction ahead of both.
     """
 
     ahead_n: Estimate
     behind_n: Estimate
-    ratio: Estimate
-    fraction_ahead: Estimate
 
 
 class AzimuthProfile(Part):
@@ -182,15 +173,11 @@ class ProcessFindings(Findings):
     ----------
     process_time_zero_s : float
         Simulated time at which the drag starts.
-    forces : mapping of str to MeanEstimate
-        ``drag_n``, ``lateral_n``, ``vertical_n``; of a workpiece that spins, ``torque_n_m`` about
-        its axis.
-    network : mapping of str to float
-        Means of the columns of ``network.parquet``, and the number of ``frames``.
+    network_frames : int
+    rattler_fraction : float
+        Mean over these frames.
     wake : Wake or None
         None if the workpiece enters no wake, or if there are too few samples before or in it.
-    comparison : tuple of ReferenceDrag
-        One entry per published mean drag.
     peaks : Peaks
         Of the drag force.
     chains : Chains
@@ -210,10 +197,9 @@ class ProcessFindings(Findings):
 
     scene: Literal["process"] = "process"
     process_time_zero_s: float
-    forces: Mapping[str, MeanEstimate]
-    comparison: tuple[ReferenceDrag, ...]
+    network_frames: int
+    rattler_fraction: float
     peaks: Peaks
-    network: Mapping[str, int | Real]
     chains: Chains
     confidence: float
     workpiece_frames: int

@@ -1,6 +1,6 @@
 """A run with its tables, each read once and only if it is needed, and its findings from them."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 
 from dragchain.arrays import Floats, Ints
 from dragchain.drag import (
-    FORCES,
-    TORQUE,
     ahead_behind,
     azimuth_profile,
     depth_profile,
@@ -21,12 +19,13 @@ from dragchain.drag import (
     drag_peaks,
     peak_separation_s,
     read_counted,
-    summarise_forces,
 )
 from dragchain.errors import SeriesError
 from dragchain.figures.network_picture import NetworkScene, load_scene
 from dragchain.figures.rendering import check_rendering
 from dragchain.loading.samples import SPHERES
+from dragchain.quantities.document import MEASURED_FILE, RunQuantities
+from dragchain.quantities.measure import estimates_along
 from dragchain.report.findings import (
     FILE,
     AheadBehind,
@@ -43,21 +42,11 @@ from dragchain.report.findings import (
     ProcessFindings,
     Wake,
 )
-from dragchain.run.kinematics import (
-    drag_start_s,
-    motion_of,
-    needed,
-    path_passed,
-    process_time,
-    spins,
-    workpiece_rotation,
-)
-from dragchain.run.reference import reference_drags
+from dragchain.run.kinematics import drag_start_s, needed, path_passed, process_time
 from dragchain.statistics.correlated import estimate_mean, estimates, frame_sums
-from dragchain.statistics.estimate import CONFIDENCE, EstimateColumns
+from dragchain.statistics.estimate import CONFIDENCE, Estimate, EstimateColumns
 from dragchain.tables.bed import segregation
 from dragchain.tables.by_step import read_groups, read_table
-from dragchain.tables.columns import vector
 from dragchain.tables.impacts import effective_restitution
 from dragdeck.decks.outputs import load_outputs
 from dragdeck.records.case import CaseOfRun
@@ -125,6 +114,17 @@ class RunData:
         return DragTrace(process_time(time_s, self.case), drag, lateral, counted)
 
     @cached_property
+    def quantities(self) -> Mapping[str, Estimate]:
+        """The quantities of a process run by name, as they are in ``quantities.json``.
+
+        They are computed if the file does not exist.
+        """
+        file = self.folder / MEASURED_FILE
+        if file.is_file():
+            return RunQuantities.read(file).values_of_run
+        return estimates_along(self.folder, self.case)
+
+    @cached_property
     def bottlenecks_n(self) -> Floats:
         """The dominant workpiece path's bottleneck in each network frame, see below."""
         return dominant_bottlenecks(self.network, self.chains)
@@ -166,11 +166,7 @@ def write_findings(run: RunData) -> Findings:
 
 def process_findings(run: RunData) -> ProcessFindings:
     """Compute the findings of a process run; errors are those of `write_findings`."""
-    turning = (_HEADING, *_TORQUES) if spins(run.case) else ()
-    samples = read_counted(run.folder, ("step", "time_s", *FORCES, *turning))
-    forces = summarise_forces(samples)
-    if turning:
-        forces[TORQUE] = estimate_mean(_own_torque(samples, run.case))
+    samples = read_counted(run.folder, ("step", "time_s", "drag_n"))
     frame, frames, contacts = whole = _workpiece_contacts(run, samples)
     at, _, loads = _workpiece_contacts(run, samples, SPHERES) if run.case.bodies else whole
     names = [one.name for one in run.case.classes]
@@ -184,10 +180,9 @@ def process_findings(run: RunData) -> ProcessFindings:
     return ProcessFindings(
         run=run.case.run,
         process_time_zero_s=drag_start_s(run.case),
-        forces=forces,
-        comparison=tuple(reference_drags(run.case.reference)),
         peaks=_peaks(samples, run),
-        network={"frames": len(run.network)} | _means(run.network),
+        network_frames=len(run.network),
+        rattler_fraction=float(run.network["rattler_fraction"].mean()),
         chains=_chains(run.chains, len(run.network)),
         confidence=CONFIDENCE,
         workpiece_frames=frames,
@@ -212,20 +207,6 @@ def process_findings(run: RunData) -> ProcessFindings:
         if names
         else {},
     )
-
-
-_HEADING, _TORQUES = "direction_rad", vector("torque", "n_m")
-
-
-def _own_torque(samples: pd.DataFrame, case: CaseOfRun) -> Floats:
-    """Torque of the particles on the workpiece about its own axis, (N,) in N m.
-
-    Unless the workpiece turns in the frame of its path, its work is negligible beside the drag's.
-    """
-    step, heading = samples["step"].to_numpy(np.int64), samples[_HEADING].to_numpy(np.float64)
-    torque = samples[[*_TORQUES]].to_numpy(np.float64)
-    axis = motion_of(case).drive.own_axis
-    return np.asarray(workpiece_rotation(step, heading, case).into(torque) @ axis)
 
 
 def of_classes(
@@ -294,21 +275,13 @@ def _peaks(samples: pd.DataFrame, run: RunData) -> Peaks:
     )
 
 
-def _means(network: pd.DataFrame) -> dict[str, float]:
-    means = network.drop(columns=["step", "time_s"]).mean()
-    return {str(name): float(mean) for name, mean in means.items()}
-
-
 def _chains(chains: pd.DataFrame, frames: int) -> Chains:
-    peters = chains[chains["definition"] == "peters"]
     paths = chains[chains["definition"] == "widest_path"]
     dominant = paths[paths["dominant"]]
     whole = paths[paths["reaches_bowl"]]
     azimuth = np.exp(1j * dominant["azimuth_rad"].to_numpy(np.float64))
     mean_azimuth = azimuth.mean() if len(azimuth) else np.nan
     return Chains(
-        peters_per_frame=len(peters) / frames,
-        peters_particles_mean=peters["n_particles"].mean(),
         widest_paths_per_frame=len(whole) / frames,
         workpiece_contacts_without_path_per_frame=(len(paths) - len(whole)) / frames,
         widest_paths_to_side_fraction=(whole["end_kind"] == "side").mean(),

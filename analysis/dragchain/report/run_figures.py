@@ -29,9 +29,8 @@ from dragchain.figures.style import BLUE, COLOURS, HALF_IN, RED, drawing, save
 from dragchain.report.findings import DropFindings, DropImpacts, FillingFindings, ProcessFindings
 from dragchain.report.run_data import RunData, write_findings
 from dragchain.run.kinematics import process_time
-from dragchain.run.reference import ReferenceDrag
+from dragchain.run.reference import ReferenceDrag, reference_drags
 from dragchain.run.run_parts import iter_prints
-from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import Estimate
 from dragdeck.decks.outputs import load_outputs
 from dragdeck.records.case import CaseOfRun, load_case
@@ -45,7 +44,7 @@ _DEPTH = "depth below the surface (mm)"
 
 def forces_panel(axes: Axes, run: RunData, found: ProcessFindings) -> None:
     """Drag and lateral force over process time with the mean drag, as Uhlmann et al. (2015)."""
-    trace, ours = run.drag, found.forces["drag_n"]
+    trace, mean = run.drag, run.quantities["drag_mean"]
     time_s = trace.process_time_s
     span = [float(time_s[trace.counted][0]), float(time_s[-1])]
     drag, lateral, transient = (COLOURS[name] for name in ("drag", "lateral", "transient"))
@@ -54,12 +53,12 @@ def forces_panel(axes: Axes, run: RunData, found: ProcessFindings) -> None:
     )
     axes.plot(time_s, trace.drag_n, color=drag, lw=0.8, label="drag force (along motion)")
     axes.axvspan(float(time_s[0]), span[0], color=transient, alpha=0.6, lw=0, label="transient")
-    axes.fill_between(span, ours.ci95_low, ours.ci95_high, color="black", alpha=0.15, lw=0)
-    interval = f"{ours.ci95_low:.2f} to {ours.ci95_high:.2f}"
-    label = f"mean drag {ours.mean:.2f} N (95 % CI {interval} N)"
-    axes.plot(span, [ours.mean] * 2, color="black", label=label)
-    for one in found.comparison:
-        published_mean(axes, one)
+    axes.fill_between(span, mean.ci95_low, mean.ci95_high, color="black", alpha=0.15, lw=0)
+    interval = f"{mean.ci95_low:.2f} to {mean.ci95_high:.2f}"
+    label = f"mean drag {mean.value:.2f} N (95 % CI {interval} N)"
+    axes.plot(span, [mean.value] * 2, color="black", label=label)
+    for published in reference_drags(run.case.reference):
+        published_mean(axes, published)
     axes.set(xlabel="process time (s)", ylabel="force on the workpiece (N)", xlim=(0, time_s[-1]))
 
 
@@ -117,17 +116,14 @@ def forces(run: RunData, found: ProcessFindings) -> Figure:
     """Drag and lateral force over process time, as Fig. 4a of Uhlmann et al. (2015)."""
     figure, (axes,) = new_panels(3.6)
     forces_panel(axes, run, found)
-    axes.set_title(_reliability(found.forces["drag_n"]))
+    mean, std = (run.quantities[f"drag_{name}"] for name in ("mean", "std"))
+    doubt = "" if mean.reliable else ": too short for a reliable interval"
+    axes.set_title(f"drag {mean.value:.2f} ± {std.value:.2f} N (± standard deviation){doubt}")
     return legend_below(figure)
 
 
-def _reliability(ours: MeanEstimate) -> str:
-    text = f"drag {ours.mean:.2f} ± {ours.std:.2f} N (± standard deviation)"
-    return f"{text}, {ours.effective_samples:.0f} effective samples{_doubt(ours)}"
-
-
-def _doubt(ours: MeanEstimate | Estimate) -> str:
-    return "" if ours.reliable else " (too few)"
+def _doubt(estimate: Estimate) -> str:
+    return "" if estimate.reliable else " (too few)"
 
 
 def force_around_workpiece(run: RunData, found: ProcessFindings) -> Figure:
@@ -140,18 +136,18 @@ def force_around_workpiece(run: RunData, found: ProcessFindings) -> Figure:
         "normal force on the workpiece by azimuth from the direction of\n"
         "motion, mean over frames; bars: 95 % CI\n"
         f"ahead {sums.ahead_n.value:.2f} N, behind {sums.behind_n.value:.2f} N, "
-        + _ratio(sums.ratio),
+        + _ratio(run.quantities.get("ahead_behind")),
     )
     return figure
 
 
-def _ratio(ratio: Estimate) -> str:
-    if not np.isfinite(ratio.value):
+def _ratio(ratio: Estimate | None) -> str:
+    if ratio is None:
         return "no contact behind"
-    if not np.isfinite(ratio.ci95_low):
+    if not ratio.known:
         return f"ratio {ratio.value:.1f} (no interval)"
-    high = f"{ratio.ci95_high:.1f}" if np.isfinite(ratio.ci95_high) else "unbounded"
-    return f"ratio {ratio.value:.1f} (95 % CI {ratio.ci95_low:.1f} to {high}){_doubt(ratio)}"
+    ends = f"{ratio.ci95_low:.1f} to {ratio.ci95_high:.1f}"
+    return f"ratio {ratio.value:.1f} (95 % CI {ends}){_doubt(ratio)}"
 
 
 def force_depth(run: RunData, found: ProcessFindings) -> Figure:

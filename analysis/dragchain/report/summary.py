@@ -2,19 +2,18 @@
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import pandas as pd
 
-from dragchain.drag import FORCES
 from dragchain.errors import TableError
 from dragchain.quantities.basis import Standing
 from dragchain.report.cases import StudyRuns, cases_of
 from dragchain.report.findings import ProcessFindings
 from dragchain.report.values import Against
-from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import Estimate
+from dragchain.tables.columns import quantity_column
 
 Cell = str | int | float | bool | None
 Row = dict[str, Cell]
@@ -49,9 +48,8 @@ def _summary_row(study: StudyRuns, headline: str) -> Row:
         "steps_per_s": record.steps_per_s,
         "wall_time_s": record.wall_time_s,
         "engine_version": record.engine_version,
-        **_forces(found.forces),
         **_comparisons(values.against),
-        **_of_runs(values.standings),
+        **_of_run(values.standings),
         **_asked(study),
         "peak_max_n": found.peaks.largest_n,
         **_wake(found),
@@ -71,67 +69,40 @@ def _cell(value: object) -> Cell:
     return value if isinstance(value, str | int | float | None) else json.dumps(value)
 
 
-def _forces(forces: Mapping[str, MeanEstimate]) -> Row:
-    row: Row = {}
-    for name in FORCES:
-        direction, force = name.removesuffix("_n"), forces[name]
-        row |= {
-            f"{direction}_mean_n": force.mean,
-            f"{direction}_std_n": force.std,
-            f"{direction}_ci95_low_n": force.ci95_low,
-            f"{direction}_ci95_high_n": force.ci95_high,
-            f"{direction}_effective_samples": force.effective_samples,
-            f"{direction}_reliable": force.reliable,
-        }
-    return row
-
-
 def _comparisons(comparisons: Sequence[Against]) -> Row:
     row: Row = {}
-    for one in comparisons:
+    for against in comparisons:
         row |= _interval(
-            f"drag_against_{one.reference.label}", "_percent", one.difference.over(0.01)
+            f"drag_against_{against.reference.label}", "percent", against.difference.over(0.01)
         )
     return row
 
 
-def _interval(name: str, unit: str, found: Estimate) -> Row:
+def _interval(name: str, unit: str, estimate: Estimate) -> Row:
     """A value with the ends of its interval; `unit` ends the names of the columns."""
-    ends = {"": found.value, "_ci95_low": found.ci95_low, "_ci95_high": found.ci95_high}
-    return {f"{name}{end}{unit}": value for end, value in ends.items()}
+    ends = (estimate.value, estimate.ci95_low, estimate.ci95_high)
+    names = (name, f"{name}_ci95_low", f"{name}_ci95_high")
+    return {quantity_column(of, unit): end for of, end in zip(names, ends, strict=True)}
 
 
-_NAMED_OTHERWISE = {
-    *("drag_mean", "drag_std", "lateral_mean", "vertical_mean", "ahead_behind"),
-    *("coordination_number", "mechanical_coordination_number", "chain_count", "chain_length"),
-    "path_bottleneck",
-}
-"""Quantities whose values of the run have columns from the findings."""
-
-
-def _of_runs(standings: Sequence[Standing]) -> Row:
-    """The values of the run, in process time."""
+def _of_run(standings: Sequence[Standing]) -> Row:
+    """The values of the run, in process time, and whether an interval is reliable."""
     row: Row = {}
-    for one in standings:
-        if one.quantity.name not in _NAMED_OTHERWISE:
-            row |= _estimate(one.quantity.name, one.quantity.unit, one.run)
+    for standing in standings:
+        name = standing.quantity.name
+        row |= _interval(name, standing.quantity.unit, standing.run)
+        row |= {f"{name}_reliable": standing.run.reliable}
     return row
 
 
 def _corrected(standings: Sequence[Standing]) -> Row:
     """The values at the physical Young's modulus, where windows give them."""
     row: Row = {}
-    for one in standings:
-        if one.corrected:
-            row |= _estimate(f"extrapolated_{one.quantity.name}", one.quantity.unit, one.shown)
+    for standing in standings:
+        if standing.corrected:
+            name = f"extrapolated_{standing.quantity.name}"
+            row |= _interval(name, standing.quantity.unit, standing.shown)
     return row
-
-
-def _estimate(name: str, unit: str, found: Estimate) -> Row:
-    """A value, with its interval if it has one."""
-    end = "_" + unit.lower().replace("/", "_per_").replace(" ", "_") if unit else ""
-    end = end.replace("_1_per", "_per")
-    return _interval(name, end, found) if found.known else {f"{name}{end}": found.value}
 
 
 def _asked(study: StudyRuns) -> Row:
@@ -162,35 +133,23 @@ def _wake(found: ProcessFindings) -> Row:
 
 
 def _network(found: ProcessFindings) -> Row:
-    network, sides, slope = found.network, found.ahead_behind, found.depth.slope_n_per_m
     return {
-        "network_frames": network["frames"],
-        "coordination_number": network["coordination_number"],
-        "mechanical_coordination_number": network["mechanical_coordination_number"],
-        "rattler_fraction": network["rattler_fraction"],
-        "contact_normal_force_mean_n": network["normal_force_mean_n"],
-        "workpiece_contacts_per_frame": network["n_particle_workpiece_contacts"],
-        "ahead_mean_n": sides.ahead_n.value,
-        "behind_mean_n": sides.behind_n.value,
-        **_interval("ahead_behind_ratio", "", sides.ratio),
-        **_interval("depth_slope", "_n_per_m", slope),
+        "network_frames": found.network_frames,
+        "rattler_fraction": found.rattler_fraction,
+        "ahead_mean_n": found.ahead_behind.ahead_n.value,
+        "behind_mean_n": found.ahead_behind.behind_n.value,
+        **_interval("depth_slope", "N/m", found.depth.slope_n_per_m),
     }
 
 
 _OF_CHAINS = (
-    *("widest_paths_per_frame", "widest_paths_to_side_fraction", "dominant_bottleneck_mean_n"),
-    *("dominant_bottleneck_max_n", "dominant_particles_mean", "dominant_altitude_mean_m"),
-    "dominant_azimuth_mean_rad",
+    *("widest_paths_per_frame", "widest_paths_to_side_fraction", "dominant_bottleneck_max_n"),
+    *("dominant_particles_mean", "dominant_altitude_mean_m", "dominant_azimuth_mean_rad"),
 )
 
 
 def _chains(found: ProcessFindings) -> Row:
-    chains = found.chains
-    return {
-        "peters_chains_per_frame": chains.peters_per_frame,
-        "peters_chain_particles_mean": chains.peters_particles_mean,
-        **{name: getattr(chains, name) for name in _OF_CHAINS},
-    }
+    return {name: getattr(found.chains, name) for name in _OF_CHAINS}
 
 
 def _upstream(study: StudyRuns) -> Row:

@@ -1,52 +1,18 @@
 """The quantities of a process run, each with what it says of the process."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
 from typing import NamedTuple
 
-from dragchain.drag import FORCES, TORQUE
-from dragchain.loading.document import FILE as LOADING
-from dragchain.loading.document import Loading
 from dragchain.quantities.basis import Basis, Correction, Standing, judge, notes
-from dragchain.quantities.document import EXTRAPOLATED, Extrapolated
+from dragchain.quantities.document import Extrapolated
 from dragchain.quantities.registry import REPORTED
-from dragchain.report.findings import ProcessFindings
 from dragchain.run.reference import ReferenceDrag, reference_drags
 from dragchain.statistics.estimate import Estimate, mean_of
 from dragdeck.records.case import CaseOfRun
 from dragdeck.records.run import changed_in_words
-
-
-def read_optional(run_dir: Path) -> tuple[Loading | None, Extrapolated | None]:
-    """Read ``loading.json`` and ``extrapolated.json`` of a process run, None where there is none.
-
-    Raises
-    ------
-    DocumentError
-        If one of them cannot be used.
-    """
-    loading, extrapolated = run_dir / LOADING, run_dir / EXTRAPOLATED
-    return (
-        Loading.read(loading) if loading.is_file() else None,
-        Extrapolated.read(extrapolated) if extrapolated.is_file() else None,
-    )
-
-
-# --- values --------------------------------------------------------------------------------------
-
-
-_FORCES = {f"{name.removesuffix('_n')}_mean": name for name in FORCES} | {"torque_mean": TORQUE}
-_PER_METRE = {
-    "force_slide": "force_slide_n_m",
-    "sliding_distance": "sliding_m",
-    "friction_work": "friction_work_j",
-    "workpiece_work": "workpiece_work_j",
-    "normal_impulse": "normal_impulse_n_s",
-    "events": "events",
-}
 
 
 class Against(NamedTuple):
@@ -120,70 +86,33 @@ class Values:
 
 
 def values_of(
-    case: CaseOfRun,
-    found: ProcessFindings,
-    loading: Loading | None,
-    extrapolated: Extrapolated | None,
+    case: CaseOfRun, measured: Mapping[str, Estimate], extrapolated: Extrapolated | None
 ) -> Values:
     """The quantities of a process run.
 
     Parameters
     ----------
     case : CaseOfRun
-    found : ProcessFindings
-    loading : Loading or None
-        Content of ``loading.json``, if it was made.
+    measured : mapping of str to Estimate
+        The quantities of the run, in simulated time.
     extrapolated : Extrapolated or None
         Content of ``extrapolated.json``, if it was made.
     """
-    own = dict(_own(case, found, loading, extrapolated))
     standings = []
     for quantity in REPORTED:
-        if quantity.name in own:
-            force = found.forces.get(_FORCES.get(quantity.name, ""))
-            correction = _correction(quantity.name, extrapolated)
-            reliable = force is None or force.reliable
-            standings.append(judge(quantity, own[quantity.name], case, correction, reliable))
+        value = measured.get(quantity.name)
+        if value is not None:
+            correction = _correction(value, quantity.name, extrapolated)
+            standings.append(judge(quantity, value, case, correction))
     return Values(case, tuple(standings))
 
 
-def _own(
-    case: CaseOfRun,
-    found: ProcessFindings,
-    loading: Loading | None,
-    extrapolated: Extrapolated | None,
-) -> Iterator[tuple[str, Estimate]]:
-    """The values of the run in simulated time, later ones instead of earlier ones."""
-    yield "chain_count", Estimate(found.chains.peters_per_frame, math.nan, math.nan)
-    yield "chain_length", Estimate(found.chains.peters_particles_mean, math.nan, math.nan)
-    for name in ("coordination_number", "mechanical_coordination_number"):
-        if name in found.network:
-            yield name, Estimate(found.network[name], math.nan, math.nan)
-    std = Estimate(found.forces["drag_n"].std, math.nan, math.nan)  # of one divisor, samples - 1
-    for one in extrapolated.quantities if extrapolated else ():
-        yield one.name, one.measured
-        if one.name == "drag_std" and one.measured.value:
-            std = one.measured.over(one.measured.value / std.value)
-    yield "drag_std", std
-    for name, force in _FORCES.items():
-        if force in found.forces:
-            yield name, found.forces[force].estimate
-    yield "ahead_behind", found.ahead_behind.ratio
-    if loading is not None:
-        yield "workpiece_contacts", loading.mean_contacts
-        for name, key in _PER_METRE.items():
-            yield name, loading.per_metre[key]
-        yield "peaks", Estimate(found.peaks.count / loading.path_m, math.nan, math.nan)
-
-
-def _correction(name: str, extrapolated: Extrapolated | None) -> Correction | None:
+def _correction(value: Estimate, name: str, extrapolated: Extrapolated | None) -> Correction | None:
     """What the windows of a run make of a quantity."""
-    if extrapolated is None or extrapolated.tolerance is None:
+    if extrapolated is None or name not in extrapolated.values or not extrapolated.tolerance:
         return None
-    one, windows = extrapolated.of(name), len(extrapolated.tolerance.runs)
-    if not windows or one is None or one.value is None:
-        return None
-    return Correction(one.value.over(one.measured.value), windows)
+    windows = len(extrapolated.tolerance.runs)
+    return Correction(extrapolated.values[name].over(value.value), windows)
 
 
 def values_over_packings(several: Sequence[Values]) -> Values:
@@ -200,9 +129,8 @@ def values_over_packings(several: Sequence[Values]) -> Values:
         same = [one for each in several if (one := each.of(standing.quantity.name))]
         run = mean_of([one.run.value for one in same])
         value = _common([one.value for one in same if one.value], standing.basis)
-        reliable = all(one.reliable for one in same) or run.known
         windows = sum(one.windows for one in same)
-        found.append(replace(standing, run=run, value=value, reliable=reliable, windows=windows))
+        found.append(replace(standing, run=run, value=value, windows=windows))
     return Values(first.case, tuple(found), len(several))
 
 
@@ -234,8 +162,8 @@ def _of_packings(values: Values) -> Iterator[str]:
         )
     else:
         yield (
-            "One packing (seed): 95 % confidence intervals cover the scatter along its path, not "
-            f"that between packings{windows}."
+            "One packing (seed): 95 % confidence intervals cover the scatter along its path and, "
+            "of quantities of which it was measured in other scenes, that from packing to packing."
         )
 
 

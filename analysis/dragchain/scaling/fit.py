@@ -13,10 +13,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from dragchain.arrays import Floats
-from dragchain.drag import FORCES, read_counted, summarise_forces
 from dragchain.errors import SeriesError, TableError
 from dragchain.figures.panels import legend_below, log_ticks, new_panels
 from dragchain.figures.style import BLUE, INK, ORANGE, WIDTH_IN, drawing, png
+from dragchain.quantities.document import MEASURED_FILE, RunQuantities
 from dragchain.report.page import page_environment
 from dragchain.run.case import changed_inputs
 from dragchain.run.kinematics import motion_of, needed
@@ -29,7 +29,7 @@ from dragchain.scaling.document import (
     ScalingFile,
 )
 from dragchain.statistics.bed_effects import EffectsFit, fit_effects
-from dragchain.statistics.estimate import Estimate, flattened
+from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate, flattened
 from dragdeck.files import write_bytes, write_text
 from dragdeck.records.case import CaseOfRun, load_case
 from dragdeck.records.run import RunRecord
@@ -100,19 +100,19 @@ def _read_run(folder: Path, field: str) -> RunOfScaling:
     level = case.inputs.get(field)
     if isinstance(level, bool) or not isinstance(level, int | float) or level <= 0:
         raise TableError(f"{folder}: field {field} is {level!r}, a power law needs numbers above 0")
-    drag = summarise_forces(read_counted(folder, FORCES))["drag_n"]
-    if drag.mean >= 0.0:
-        raise TableError(f"{folder}: the mean drag is {drag.mean:+.3g} N, along the motion")
+    drag = RunQuantities.read(folder / MEASURED_FILE).values_of_run["drag_mean"]
+    if drag.value >= 0.0:
+        raise TableError(f"{folder}: the mean drag is {drag.value:+.3g} N, along the motion")
     workpiece = needed(case.workpiece, "workpiece")
     weight = case.media.weight_kg_m3 * case.gravity_m_s2 * 2.0 * workpiece.radius_m
     row = ScaledRun(
         run=case.run,
         seed=case.inputs.get("seed"),
         level=float(level),
-        drag_n=-drag.mean,
-        standard_error_n=drag.se,
+        drag_n=-drag.value,
+        standard_error_n=drag.half_width / NORMAL_QUANTILE,
         reliable=drag.reliable,
-        eta=-drag.mean / (weight * workpiece.immersion_depth_m**2),
+        eta=-drag.value / (weight * workpiece.immersion_depth_m**2),
         bed=case.upstream.get("filling", case.run),
     )
     return RunOfScaling(row, case)

@@ -3,7 +3,7 @@
 ``columns.csv`` beside this module describes them; the end of a column's name is its unit.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from fnmatch import fnmatchcase
 from functools import cache
 from pathlib import Path
@@ -11,6 +11,7 @@ from pathlib import Path
 import pyarrow as pa
 
 from dragdeck.files import table_rows
+from dragdeck.study.quantities import QUANTITIES
 
 
 def vector(name: str, unit: str) -> tuple[str, str, str]:
@@ -83,7 +84,30 @@ _UNITS: Mapping[str, str] = {
 def _rows() -> list[tuple[str, tuple[str, ...], str]]:
     """Column, tables and description; ``*`` in a column stands for any text."""
     rows = table_rows(Path(__file__).with_name("columns.csv"))
-    return [(row["column"], tuple(row["tables"].split()), row["description"]) for row in rows]
+    of_tables = [(row["column"], tuple(row["tables"].split()), row["description"]) for row in rows]
+    of_quantities = [
+        (column, ("summary",), text)
+        for row in QUANTITIES
+        if row["reported"] and row["kind"]
+        for column, text in _of_quantity(row)
+    ]
+    return of_tables + of_quantities
+
+
+def _of_quantity(row: Mapping[str, str]) -> Iterator[tuple[str, str]]:
+    """The columns of a quantity in the summary, and what they mean."""
+    name, unit, label = row["name"], row["unit"], row["label"]
+    yield quantity_column(name, unit), f"{label}, in process time" if row["time"] else label
+    for end, side in (("low", "lower"), ("high", "upper")):
+        text = f"{side} end of the 95 % confidence interval of the {label}"
+        yield quantity_column(f"{name}_ci95_{end}", unit), text
+    yield f"{name}_reliable", "whether that interval is reliable"
+
+
+def quantity_column(name: str, unit: str) -> str:
+    """The column of a quantity: its name, with its unit at the end."""
+    end = f"_{unit.lower().replace('/', '_per_').replace(' ', '_')}" if unit else ""
+    return name + end.replace("_1_per", "_per")
 
 
 def descriptions(column: str) -> dict[str, str]:

@@ -18,11 +18,11 @@ from scipy import stats
 
 from dragchain.arrays import Floats
 from dragchain.errors import SeriesError, TableError
+from dragchain.quantities.document import MEASURED_FILE, RunQuantities
 from dragchain.quantities.registry import Quantity
 from dragchain.run.case import changed_inputs
 from dragchain.statistics.bed_effects import EffectsFit, Factors, fit_effects
 from dragchain.statistics.estimate import CONFIDENCE, student_quantile
-from dragchain.tradeoff.measures import FILE, Measures
 from dragdeck.records.tradeoff import ErrorEntry
 
 _PARAMETERS = ("youngs_modulus_scale", "timestep_fraction", "speed_factor")
@@ -80,14 +80,14 @@ class PlanRun:
     Attributes
     ----------
     setting : Setting
-    measures : Measures
+    measures : RunQuantities
     stretches : sequence of mapping of str to float
         Quantity to the run's value over each stretch of its path that is as long as the common
         one, the first of them that path; empty if it failed.
     """
 
     setting: Setting
-    measures: Measures
+    measures: RunQuantities
     stretches: Sequence[Mapping[str, float]]
 
     @property
@@ -107,7 +107,7 @@ def read_plan_runs(
     Parameters
     ----------
     files : sequence of Path
-        Their ``measures.json``.
+        Their ``quantities.json``.
     reference_run : Path
         Folder of a run at the reference.
 
@@ -125,11 +125,11 @@ def read_plan_runs(
     TableError
         If no run is complete, or the reference is not among them.
     """
-    every = {file: Measures.read(file) for file in files}
-    standard = every.get(reference_run / FILE)
+    every = {file: RunQuantities.read(file) for file in files}
+    standard = every.get(reference_run / MEASURED_FILE)
     if standard is None:
         raise TableError(f"{reference_run}: the reference is not among the runs of the trade-off")
-    longest: dict[tuple[Setting, str | None], Measures] = {}
+    longest: dict[tuple[Setting, str | None], RunQuantities] = {}
     for measures in every.values():
         key = (_setting(measures, standard), measures.bed)
         if key not in longest or measures.arc_m > longest[key].arc_m:
@@ -142,14 +142,14 @@ def read_plan_runs(
     return runs, _setting(standard, standard), arc
 
 
-def _inputs(measures: Measures) -> dict[str, JsonValue]:
+def _inputs(measures: RunQuantities) -> dict[str, JsonValue]:
     fidelity = {f"fidelity.{name}": value for name, value in measures.fidelity}
     silent = {*SILENT, "fidelity.name", *(f"fidelity.{name}" for name in _PARAMETERS)}
     inputs = {**measures.inputs, **fidelity}
     return {name: value for name, value in inputs.items() if name not in silent}
 
 
-def differing_inputs(measures: Measures, standard: Measures) -> dict[str, JsonValue]:
+def differing_inputs(measures: RunQuantities, standard: RunQuantities) -> dict[str, JsonValue]:
     """Inputs and settings of a run, by dotted name, that differ from those of another.
 
     No parameter is among them.
@@ -157,7 +157,7 @@ def differing_inputs(measures: Measures, standard: Measures) -> dict[str, JsonVa
     return changed_inputs(_inputs(measures), _inputs(standard))
 
 
-def _setting(measures: Measures, standard: Measures) -> Setting:
+def _setting(measures: RunQuantities, standard: RunQuantities) -> Setting:
     changed = differing_inputs(measures, standard)
     other = [f"{name} {_shown(value)}" for name, value in changed.items()]
     return Setting.of(measures.fidelity, ", ".join(other))
@@ -167,13 +167,13 @@ def _shown(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _run(setting: Setting, measures: Measures, arc_m: float) -> PlanRun:
+def _run(setting: Setting, measures: RunQuantities, arc_m: float) -> PlanRun:
     count = max(1, int(measures.arc_m / arc_m + 1e-9))
     values = [values_within(measures, arc_m, stretch) for stretch in range(count)]
     return PlanRun(setting, measures, values)
 
 
-def values_within(measures: Measures, arc_m: float, stretch: int = 0) -> dict[str, float]:
+def values_within(measures: RunQuantities, arc_m: float, stretch: int = 0) -> dict[str, float]:
     """A run's values over a stretch of its path, the first if no other; blocks stay whole.
 
     What has one value a bed belongs to the first stretch.

@@ -10,7 +10,7 @@ from pydantic import JsonValue
 
 from dragchain.arrays import Floats
 from dragchain.errors import SeriesError, TableError
-from dragchain.quantities.registry import COMPARED
+from dragchain.quantities.registry import MEASURED
 from dragchain.run.case import changed_inputs
 from dragchain.tables.by_step import read_table
 from dragchain.tradeoff.compare import PlanRun, QuantityComparison, Setting, compare_quantity
@@ -129,7 +129,7 @@ def compare_settings(
     """
     found: dict[str, QuantityComparison] = {}
     skipped: dict[str, str] = {}
-    for quantity in COMPARED:
+    for quantity in MEASURED:
         try:
             found[quantity.name] = compare_quantity(quantity, runs, reference)
         except SeriesError as error:

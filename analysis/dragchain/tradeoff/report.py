@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from dragchain.quantities.along import LONG_WAVE, SHORT_WAVE
-from dragchain.quantities.registry import COMPARED, MAIN
+from dragchain.quantities.registry import MAIN, MEASURED
 from dragchain.report.campaign import write_report
 from dragchain.report.page import MINUS, number
 from dragchain.statistics.estimate import CONFIDENCE
@@ -99,7 +99,7 @@ def run_table(tradeoff: Tradeoff) -> pd.DataFrame:
             "failure": run.measures.why_failed,
             "counted_path_m": run.measures.arc_m or math.nan,
             **run.measures.cost.model_dump(),
-            **{one.name: run.stretches[0].get(one.name, math.nan) for one in COMPARED},
+            **{one.name: run.stretches[0].get(one.name, math.nan) for one in MEASURED},
         }
         for run in tradeoff.runs
     ]
@@ -154,7 +154,9 @@ def tradeoff_record(
         reference=FidelityParameters(**tradeoff.reference.parameters()),
         quantities={
             name: QuantityEntry.model_validate(
-                {**vars(own.quantity), **vars(own), "arc_m": tradeoff.arc_m}
+                vars(own.quantity)
+                | vars(own)
+                | {"arc_m": tradeoff.arc_m, "signed": own.quantity.signed}
             )
             for name, own in tradeoff.comparisons.items()
         },
@@ -224,7 +226,7 @@ def write_tradeoff(
         Gets ``runs.csv``, ``runs.parquet``, ``errors.csv``, ``errors.parquet``,
         ``tradeoff.json``, ``figures/pareto.png`` and ``report.html``.
     measures : sequence of Path
-        ``measures.json`` of every run, that of the reference among them.
+        ``quantities.json`` of every run, that of the reference among them.
     reference_run : Path
         Folder of a run at the reference.
     drops : sequence of Path

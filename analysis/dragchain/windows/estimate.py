@@ -1,7 +1,6 @@
 """Quantities and load map at physical stiffness from windows and the soft run.
 
-`Round` is the document of a round, ``round-<number>.json``; `WindowsRecord` what is known
-beforehand.
+`Round` is the document of a round, ``round-<number>.json``.
 
 Two estimates are joined by precision: the mean of the windows, and the value of the soft run times
 the ratio that other scenes had, if they agree. The variance of the windows is joined with that of
@@ -16,61 +15,15 @@ with the total load of the windows, corrected by the windows' map as far as thei
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated
 
 import numpy as np
-from pydantic import AllowInfNan, BeforeValidator
 from scipy.special import erf
 
 from dragchain.arrays import Floats
 from dragchain.quantities.document import Extrapolated, LoadMap, Need, Reached
-from dragchain.statistics.correlated import MIN_SAMPLES, estimate_mean
-from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate, mean_of, student_quantile
-from dragdeck.documents import Document, Part
-
-
-def _infinite(number: object) -> object:
-    return math.inf if number is None else number
-
-
-class Known(Part):
-    """What windows of other scenes say of a quantity before there are any.
-
-    Attributes
-    ----------
-    ratio_log, ratio_log_std : float
-        Logarithm of the value at the physical modulus over that of the soft run: its mean, and its
-        standard deviation from scene to scene; infinite if they say nothing.
-    variance_ratio, degrees : float
-        Relative variance of windows over that of the soft run's stretches of their length, and how
-        many windows' worth of evidence that is.
-    packing_std : float
-        Relative standard deviation of the mean from packing to packing.
-    """
-
-    ratio_log: float
-    ratio_log_std: Annotated[float, AllowInfNan(True), BeforeValidator(_infinite)]
-    variance_ratio: float
-    degrees: float
-    packing_std: float
-
-
-class WindowsRecord(Document):
-    """The content of ``windows.json``: measured in development scenes.
-
-    Attributes
-    ----------
-    measured : str
-        Date.
-    source : str
-    quantities : mapping
-    """
-
-    remedy = "install dragdeck again: it belongs to the package"
-
-    measured: str
-    source: str
-    quantities: Mapping[str, Known]
+from dragchain.quantities.known import Known
+from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate, student_quantile
+from dragdeck.documents import Part
 
 
 class WindowOfRun(Part):
@@ -120,11 +73,6 @@ class Round(Extrapolated):
 
 # --- estimate ------------------------------------------------------------------------------------
 
-
-UNKNOWN = Known(
-    ratio_log=0.0, ratio_log_std=math.inf, variance_ratio=0.0, degrees=0.0, packing_std=0.0
-)
-"""Of a quantity of which nothing is known beforehand."""
 
 _CAUTION, _DOUBT = 1.5, 1.5
 """Factor on the standard deviation between scenes, since a user's differs more from designed ones
@@ -210,14 +158,6 @@ def joined_squares(windows: Floats, stretches: Floats, known: Known) -> Joined:
         found.other_precision * scale,
         found.packing_variance / scale,
         found.degrees,
-    )
-
-
-def of_one_run(blocks: Floats, value: float, known: Known) -> Estimate:
-    """A run's value with its interval, from its blocks, (B,), and the scatter between packings."""
-    own = estimate_mean(blocks).estimate if len(blocks) >= MIN_SAMPLES else mean_of(blocks)
-    return Estimate.around(
-        value, abs(value) * math.hypot(own.relative_half_width, NORMAL_QUANTILE * known.packing_std)
     )
 
 

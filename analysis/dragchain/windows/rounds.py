@@ -7,25 +7,21 @@ from pathlib import Path
 import numpy as np
 
 from dragchain.arrays import Floats
-from dragchain.quantities.along import PathQuantities, quantities_along
-from dragchain.quantities.document import ExtrapolatedQuantity, LoadMap, Need, Reached
-from dragchain.quantities.registry import COMPARED, Quantity
+from dragchain.quantities.along import PathQuantities
+from dragchain.quantities.document import MEASURED_FILE, LoadMap, Need, Reached, RunQuantities
+from dragchain.quantities.known import UNKNOWN, WindowsRecord
+from dragchain.quantities.registry import MEASURED, Quantity
 from dragchain.statistics.estimate import Estimate
 from dragchain.tables.by_step import read_table
-from dragchain.tradeoff.measure_run import make_tables, read_outcome
-from dragchain.tradeoff.measures import checks_in_words
 from dragchain.windows.estimate import (
-    UNKNOWN,
     Joined,
     Round,
     WindowOfRun,
-    WindowsRecord,
     corrected_map,
     joined,
     joined_squares,
     windows_needed,
 )
-from dragdeck.records.case import load_case
 
 _FEWEST = 2
 """Windows of which one alone says nothing of its scatter."""
@@ -43,11 +39,9 @@ in the rest: a bed that was thrown up by the ramp differs by far more (docs/evid
 def judge_windows(
     run_dir: Path,
     windows: Sequence[Path],
-    before: Path | None,
     tolerance: float,
     quantities: Sequence[str],
     most: int,
-    record: Path,
     out: Path,
 ) -> None:
     """Write what the windows of a run say of its quantities at physical stiffness.
@@ -55,31 +49,26 @@ def judge_windows(
     Parameters
     ----------
     run_dir : Path
-        The run with reduced moduli, with tables and chains.
+        The run with reduced moduli.
     windows : sequence of Path
-        Folders of its windows so far, those of the round before first.
-    before : Path or None
-        That round, whose windows are not measured again; None for the first.
+        Folders of its windows so far.
     tolerance : float
         Relative half-width of the interval at which no further window is run.
     quantities : sequence of str
         To which the tolerance applies.
     most : int
         Number of windows that there can be.
-    record : Path
-        ``windows.json``.
     out : Path
         The file to write.
 
     Raises
     ------
-    TableError
-        A run has no outcome, or its outputs cannot be read.
+    DocumentError
+        A run has no ``quantities.json``.
     """
-    soft = quantities_along(run_dir, load_case(run_dir))
-    known = Round.read(before).windows if before else ()
-    found = (*known, *(_measured(folder) for folder in windows[len(known) :]))
-    judged(soft, found, tolerance, quantities, most, WindowsRecord.read(record)).write(out)
+    soft = RunQuantities.read(run_dir / MEASURED_FILE)
+    measured = [_measured(folder) for folder in windows]
+    judged(soft, measured, tolerance, quantities, most, WindowsRecord.shipped()).write(out)
 
 
 def judged(
@@ -91,23 +80,15 @@ def judged(
     record: WindowsRecord,
 ) -> Round:
     """The round that these windows are; see `judge_windows`."""
-    good = [one for one in windows if not one.refused]
-    rows, needs = [], [Need(_FEWEST, 1)]
-    values = soft.values()
-    for quantity, found in _joined(soft, values, good, record):
-        value = found.estimate(len(good)) if found else _NONE
-        rows.append(
-            ExtrapolatedQuantity(
-                name=quantity.name,
-                label=quantity.label,
-                unit=quantity.unit,
-                measured=Estimate(values[quantity.name], math.nan, math.nan),
-                value=value if value.known else None,
-            )
-        )
-        if quantity.name in asked and found:
-            needs.append(windows_needed(found, len(good), tolerance, most))
-    widths = {one.name: one.value.relative_half_width for one in rows if one.value}
+    good = [window for window in windows if not window.refused]
+    values, needs = {}, [Need(_FEWEST, 1)]
+    for quantity, join in _joined(soft, good, record):
+        value = join.estimate(len(good))
+        if value.known:
+            values[quantity.name] = value
+        if quantity.name in asked:
+            needs.append(windows_needed(join, len(good), tolerance, most))
+    widths = {name: value.relative_half_width for name, value in values.items()}
     reached = len(good) >= _FEWEST and all(
         widths.get(name, math.inf) <= tolerance for name in asked
     )
@@ -116,16 +97,16 @@ def judged(
     wanted = len(windows) + max(1, need.windows - len(good))
     wanted = min(wanted, math.ceil(_MOST_MORE * len(windows)), most)
     return Round(
-        quantities=tuple(rows),
+        values=values,
         tolerance=Reached(
             tolerance=tolerance,
             asked=tuple(asked),
             reached=reached,
             needed=need,
-            runs=tuple(one.run for one in good),
-            refused={one.run: one.refused for one in windows if one.refused},
+            runs=tuple(window.run for window in good),
+            refused={window.run: window.refused for window in windows if window.refused},
         ),
-        load_map=_load_map(soft, good, rows),
+        load_map=_load_map(soft, good, values),
         windows=tuple(windows),
         wanted=len(windows) if last else wanted,
         last=last,
@@ -133,26 +114,20 @@ def judged(
 
 
 def _load_map(
-    soft: PathQuantities, windows: Sequence[WindowOfRun], rows: Sequence[ExtrapolatedQuantity]
+    soft: PathQuantities, windows: Sequence[WindowOfRun], values: Mapping[str, Estimate]
 ) -> LoadMap | None:
-    total = next((one.value for one in rows if one.name == "normal_load"), None) or _NONE
+    total = values.get("normal_load", _NONE)
     runs = soft.arc_m / windows[0].arc_m if windows else math.nan
-    return corrected_map(soft.load_map, [one.load_map for one in windows], total, runs)
+    return corrected_map(soft.load_map, [window.load_map for window in windows], total, runs)
 
 
 def _joined(
-    soft: PathQuantities,
-    values: Mapping[str, float],
-    windows: Sequence[WindowOfRun],
-    record: WindowsRecord,
-) -> Iterator[tuple[Quantity, Joined | None]]:
-    """Each quantity of the soft run at physical stiffness, None if not all windows have it."""
-    for quantity in COMPARED:
-        if quantity.name not in values:
-            continue
-        if any(quantity.name not in one.values for one in windows) or len(windows) < _FEWEST:
-            yield quantity, None
-        else:
+    soft: PathQuantities, windows: Sequence[WindowOfRun], record: WindowsRecord
+) -> Iterator[tuple[Quantity, Joined]]:
+    """Each quantity at physical stiffness that the soft run and all windows have."""
+    known_of_all = [soft.values(), *(window.values for window in windows)]
+    for quantity in MEASURED if len(windows) >= _FEWEST else ():
+        if all(quantity.name in values for values in known_of_all):
             join = joined_squares if quantity.squared else joined
             known = record.quantities.get(quantity.name, UNKNOWN)
             stretches = _stretches(soft, quantity.name, windows[0].arc_m)
@@ -177,21 +152,18 @@ def _stretches(soft: PathQuantities, name: str, arc_m: float) -> Floats:
     """Means of a quantity's blocks over stretches of the soft run as long as a window's sample."""
     blocks = soft.of_blocks(name)
     each = max(1, round(arc_m / soft.block_m))
-    count = max(1, len(blocks) // each)
-    return np.array([one.mean() for one in np.array_split(blocks, count)])
+    means = blocks.means(max(1, len(blocks.values) // each))
+    return means[np.isfinite(means)]
 
 
 def _measured(folder: Path) -> WindowOfRun:
     """A window with its quantities; refused if it failed or its bed has not come to rest."""
-    outcome, case = read_outcome(folder), load_case(folder)
-    window = WindowOfRun(run=folder.name, cpu_time_s=outcome.processor_time_s)
-    if not outcome.complete:
-        why = checks_in_words(outcome.failed_checks) or "not complete"
-        return window.model_copy(update={"refused": why})
-    make_tables(folder)
-    along = quantities_along(folder, case)
-    found = {"arc_m": along.arc_m, "values": along.values(), "refused": unsettled(folder)}
-    return window.model_copy(update={**found, "load_map": along.load_map})
+    run = RunQuantities.read(folder / MEASURED_FILE)
+    window = WindowOfRun(run=folder.name, cpu_time_s=run.cost.cpu_time_s)
+    if not run.complete:
+        return window.model_copy(update={"refused": run.why_failed or "not complete"})
+    measured = {"arc_m": run.arc_m, "values": run.values(), "refused": unsettled(folder)}
+    return window.model_copy(update={**measured, "load_map": run.load_map})
 
 
 def unsettled(folder: Path) -> str:

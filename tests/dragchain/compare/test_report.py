@@ -47,12 +47,11 @@ def study(results: Path, seeds: tuple[int, ...] = tuple(PACKING)) -> list[Path]:
         inputs = {"depth": (0.02, 0.04)[deep], "speed": (0.1, 0.3)[fast], "seed": seed}
         name = f"deep-{deep}_fast-{fast}_seed-{seed}"
         case = case_json("process", name, case=name, inputs=inputs)
-        folder = make_run(results, case, process_findings(drag(deep, fast, seed)), PICTURES)
+        folder = make_run(results, case, process_findings(), PICTURES, drag(deep, fast, seed))
         write_quantities(folder)
         patches = np.full(48, 0.1 + 0.1 * deep) + 0.01 * np.sin(seed * np.arange(48))
         found = LoadMap(soft=patches, value=patches, std=np.zeros(48), soft_error=0.1, error=0.05)
-        whole = Extrapolated.read(folder / EXTRAPOLATED)
-        whole.model_copy(update={"load_map": found}).write(folder / EXTRAPOLATED)
+        Extrapolated(load_map=found).write(folder / EXTRAPOLATED)
         (folder / "network.html").write_text("<p>network</p>")
         folders.append(folder)
     return folders

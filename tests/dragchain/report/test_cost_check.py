@@ -1,16 +1,21 @@
 """What a run was expected to cost, beside what it did."""
 
 import json
-import math
 import re
 from pathlib import Path
 from typing import Any
 
 import pytest
-from report_files import ASKED, PICTURES, case_json, make_run, process_findings, write_quantities
+from report_files import (
+    ASKED,
+    PICTURES,
+    case_json,
+    make_run,
+    process_findings,
+    write_measured,
+    write_quantities,
+)
 
-from dragchain.quantities.document import EXTRAPOLATED, Extrapolated, ExtrapolatedQuantity
-from dragchain.quantities.registry import REPORTED
 from dragchain.report.cases import cases_of, read_study_runs
 from dragchain.report.cost_check import answers, prediction_for, read_advice
 from dragchain.report.study_report import write_study_report
@@ -46,13 +51,12 @@ def advice_file(folder: Path, *options: dict[str, Any], schema: int = 2) -> Path
 
 @pytest.fixture
 def run(tmp_path: Path) -> Path:
-    case = case_json("process", "workpiece-1", asked=ASKED)
+    case = at_physical_modulus(case_json("process", "workpiece-1", asked=ASKED))
     return make_run(tmp_path / "results", case, process_findings(), PICTURES)
 
 
 def test_the_report_compares_cost_and_tolerance(run: Path, tmp_path: Path) -> None:
-    file = advice_file(tmp_path, option(ranks=1), option())
-    write_physical(run, drag_mean=(-2.5, 0.1))
+    file = advice_file(tmp_path, option(ranks=1), option(youngs_modulus_scale=1.0))
     write_study_report(tmp_path, [run], file)
     text = re.sub(r"<[^>]+>", " ", (tmp_path / "report.html").read_text(encoding="utf-8"))
     words = " ".join(text.split())
@@ -60,29 +64,24 @@ def test_the_report_compares_cost_and_tolerance(run: Path, tmp_path: Path) -> No
     assert "4.0 % yes" in words
 
 
-def write_physical(folder: Path, **found: tuple[float, float]) -> None:
-    """Write ``extrapolated.json`` of a run at the physical modulus: values and half-widths."""
-    labels = {one.name: one.label for one in REPORTED}
-    quantities = (
-        ExtrapolatedQuantity(
-            name=name, label=labels[name], unit="N", measured=Estimate(value, math.nan, math.nan),
-            value=Estimate.around(value, half),
-        )
-        for name, (value, half) in found.items()
-    )  # fmt: skip
-    Extrapolated(quantities=tuple(quantities)).write(folder / EXTRAPOLATED)
+def at_physical_modulus(case: dict[str, Any]) -> dict[str, Any]:
+    return case | {"fidelity": case["fidelity"] | {"youngs_modulus_scale": 1.0}}
 
 
 @pytest.mark.parametrize(
     "other",
     [
-        option(youngs_modulus_scale=0.02), option(timestep_fraction=0.5),
-        option(speed_factor=2.0), option(ranks=1), option() | {"inputs": {"seed": 2}},
+        option(), option(youngs_modulus_scale=1.0, timestep_fraction=0.5),
+        option(youngs_modulus_scale=1.0, speed_factor=2.0),
+        option(youngs_modulus_scale=1.0, ranks=1),
+        option(youngs_modulus_scale=1.0) | {"inputs": {"seed": 2}},
     ],
 )  # fmt: skip
 def test_a_prediction_of_other_settings_is_not_compared(run: Path, other: dict[str, Any]) -> None:
     case = CaseOfRun.read(run / "case.json")
-    wrong, right = (OptionEntry.model_validate(one) for one in (other, option()))
+    wrong, right = (
+        OptionEntry.model_validate(entry) for entry in (other, option(youngs_modulus_scale=1.0))
+    )
     assert prediction_for(case, [wrong]) is None
     assert prediction_for(case, [wrong, right]) == right
 
@@ -90,8 +89,8 @@ def test_a_prediction_of_other_settings_is_not_compared(run: Path, other: dict[s
 def test_each_asked_quantity_has_an_answer(tmp_path: Path) -> None:
     quantities = ["drag_mean", "chain_count", "contact_force_mean"]
     case = case_json("process", "stiff", asked={**ASKED, "quantities": quantities})
-    folder = make_run(tmp_path, case, process_findings(), PICTURES)
-    write_physical(folder, drag_mean=(-2.5, 0.1), chain_count=(40.0, 4.0))
+    folder = make_run(tmp_path, at_physical_modulus(case), process_findings(), PICTURES)
+    write_measured(folder, chain_count=Estimate.around(40.0, 4.0))
     drag, chains, forces = answers(cases_of([read_study_runs(folder)])[0])
     assert drag.value == Estimate.around(-2.5, 0.1) and drag.half_width == pytest.approx(0.04)
     assert chains.half_width == pytest.approx(0.1)

@@ -9,16 +9,19 @@ import pandas as pd
 import pytest
 from loading_files import SIZE, case_json, made_contacts, write_run
 from made_run import run_json, stl
-from report_files import process_findings
+from report_files import process_findings, write_measured
 from scipy.spatial.transform import Rotation
 
 from dragchain.cli import main
 from dragchain.errors import TableError
 from dragchain.loading.contact_events import AMOUNTS, POINT
+from dragchain.loading.document import FILE as LOADING
+from dragchain.loading.document import Loading
 from dragchain.loading.write import write_loading
 from dragchain.report.findings import FILE
 from dragchain.report.projection import Target, write_projection
 from dragchain.run.workpiece import Surface
+from dragchain.statistics.estimate import Estimate
 from dragdeck.errors import InputError
 
 GIVEN = {"coefficient_m2_n": 2e-11, "sd_m2_n": 1e-12}
@@ -49,6 +52,9 @@ def packing(folder: Path, seed: int, law: bool = True) -> Path:
     (run / "run.json").write_text(json.dumps(run_json()))
     write_loading(run)
     process_findings().write(run / FILE)
+    load = Loading.read(run / LOADING)
+    per_metre = load.totals["force_slide_n_m"] / load.path_m
+    write_measured(run, force_slide=Estimate.around(per_metre, 0.1 * per_metre))
     return run
 
 

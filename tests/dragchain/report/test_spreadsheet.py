@@ -45,7 +45,7 @@ def test_cells_keep_their_values_and_types() -> None:
 @pytest.mark.parametrize(
     ("column", "unit", "heading"),
     [
-        ("drag_ci95_low_n", "N", "Drag 95 % CI lower end (N)"),
+        ("drag_mean_ci95_low_n", "N", "Drag mean 95 % CI lower end (N)"),
         ("depth_slope_n_per_m", "N/m", "Depth slope (N/m)"),
         ("input_gravity_m_s2", "m/s2", "Input gravity (m/s2)"),
         ("input_materials_x_youngs_modulus_pa", "Pa", "Input materials x Young's modulus (Pa)"),
@@ -63,7 +63,7 @@ def test_headings_are_words_with_units(column: str, unit: str, heading: str) -> 
 
 def test_the_overview_has_a_row_per_quantity_with_formats(tmp_path: Path) -> None:
     case = case_json("process", "workpiece-1")
-    folder = make_run(tmp_path, case, process_findings(-2.5), PICTURES)
+    folder = make_run(tmp_path, case, process_findings(), PICTURES)
     write_quantities(folder, corrected=0.8)
     book = read(summary_workbook(pd.DataFrame({"a": [1]}), {}, cases_of([read_study_runs(folder)])))
     rows = {row[0].value: row for row in book["Overview"].iter_rows()}

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from made_run import with_motion
+from report_files import write_measured
 from scipy import stats
 from tiny_run_files import DENSITY_KG_M3, GRAVITY_M_S2, RADIUS_M, WORKPIECE_RADIUS_M, case_json
 
@@ -24,6 +25,7 @@ from dragchain.scaling.fit import (
     table,
     write_scaling,
 )
+from dragchain.statistics.correlated import estimate_mean
 
 DEPTH = "motion.immersion_depth_m"
 LEVELS = (0.01, 0.02, 0.04)
@@ -50,14 +52,7 @@ def write_run(tmp_path: Path) -> Writer:
         noise = np.random.default_rng(seed).normal(size=2000)
         smooth = np.convolve(noise, np.full(10, 10**-0.5), "same")
         drag = -drag_n * (1.0 + 0.05 * (smooth - smooth.mean()))
-        zero = np.zeros(2000)
-        columns = {
-            "in_statistics": zero == 0,
-            "drag_n": drag,
-            "lateral_n": noise,
-            "vertical_n": zero,
-        }
-        pd.DataFrame(columns).to_parquet(folder / "tables" / "workpiece_force.parquet")
+        write_measured(folder, drag_mean=estimate_mean(drag).estimate)
         return folder
 
     return write

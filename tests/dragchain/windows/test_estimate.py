@@ -5,18 +5,13 @@ import math
 import numpy as np
 import pytest
 
+from dragchain.quantities.known import UNKNOWN
 from dragchain.statistics.estimate import Estimate, student_quantile
-from dragchain.windows.estimate import (
-    UNKNOWN,
-    Known,
-    corrected_map,
-    joined,
-    joined_squares,
-    of_one_run,
-    windows_needed,
-)
+from dragchain.windows.estimate import corrected_map, joined, joined_squares, windows_needed
 
-DRAG = Known(ratio_log=0.1, ratio_log_std=0.05, variance_ratio=1.0, degrees=10.0, packing_std=0.0)
+DRAG = UNKNOWN.model_copy(
+    update={"ratio_log": 0.1, "ratio_log_std": 0.05, "variance_ratio": 1.0, "degrees": 10.0}
+)
 
 
 def test_without_knowledge_it_is_the_mean_with_students_interval() -> None:
@@ -26,12 +21,6 @@ def test_without_knowledge_it_is_the_mean_with_students_interval() -> None:
     assert found.value == pytest.approx(-2.3)
     assert found.half_width(4) == pytest.approx(half)
     assert found.estimate(4).ci95_low == pytest.approx(-2.3 - half)
-
-
-def test_a_quantity_that_is_zero_all_along_has_no_interval() -> None:
-    found = of_one_run(np.zeros(3), 0.0, DRAG)
-    assert found.value == 0.0
-    assert not found.known
 
 
 def test_the_root_of_a_mean_square_has_half_its_relative_errors() -> None:

@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from paths import WINDOWS_RECORD
 
 from dragchain.quantities.along import PathQuantities
-from dragchain.windows.estimate import Round, WindowOfRun, WindowsRecord
+from dragchain.quantities.known import WindowsRecord
+from dragchain.windows.estimate import Round, WindowOfRun
 from dragchain.windows.rounds import judged, unsettled
 
-RECORD = WindowsRecord.read(WINDOWS_RECORD)
+RECORD = WindowsRecord.shipped()
 SOFT = PathQuantities(
     arc_m=0.1, block_m=0.01, blocks={"workpiece_contacts": (19.0, 20.0, 21.0, 20.0) * 3}
 )
@@ -35,9 +35,8 @@ def judge(values: Sequence[float], tolerance: float, most: int = 16) -> Round:
 def test_it_stops_when_the_tolerance_is_reached() -> None:
     found = judge([15.0, 15.5, 14.5], 0.2)
     assert found.tolerance.reached and found.last and found.wanted == 3
-    (contacts,) = found.quantities
-    assert contacts.value and contacts.value.contains(15.0)
-    assert contacts.value.relative_half_width <= 0.2
+    contacts = found.values["workpiece_contacts"]
+    assert contacts.contains(15.0) and contacts.relative_half_width <= 0.2
 
 
 def test_a_round_asks_for_the_windows_that_would_do_but_at_most_twice_as_many() -> None:
@@ -61,8 +60,7 @@ def test_a_refused_window_does_not_enter_and_is_made_up_for() -> None:
     good = windows([15.0, 15.1, 14.9, 15.0])
     bad = good[3].model_copy(update={"refused": "lost", "values": {"workpiece_contacts": 99.0}})
     found = judged(SOFT, [*good[:3], bad], 0.05, ["workpiece_contacts"], 16, RECORD)
-    (contacts,) = found.quantities
-    assert contacts.value and contacts.value.value == pytest.approx(15.0)
+    assert found.values["workpiece_contacts"].value == pytest.approx(15.0)
     assert found.tolerance.runs == ("w-0", "w-1", "w-2")
     assert found.tolerance.refused == {"w-3": "lost"}
     assert found.wanted == min(8, 4 + max(1, found.tolerance.needed.windows - 3)) > 4
@@ -72,7 +70,7 @@ def test_a_quantity_that_a_window_lacks_is_never_reached() -> None:
     some = windows([15.0, 15.0, 15.0])
     some[1] = some[1].model_copy(update={"values": {}})
     found = judged(SOFT, some, 0.5, ["workpiece_contacts"], 3, RECORD)
-    assert not found.tolerance.reached and found.quantities[0].value is None
+    assert not found.tolerance.reached and not found.values
 
 
 def test_an_asked_quantity_that_the_run_lacks_is_never_reached() -> None:
@@ -93,9 +91,9 @@ def test_the_drag_fluctuates_between_windows_as_within_them() -> None:
         for mean in (-1.0, -2.0, -3.0)
     ]
     soft = SOFT.model_copy(update={"blocks": blocks})
-    found = {one.name: one.value for one in judged(soft, some, 0.5, [], 3, RECORD).quantities}
+    values = judged(soft, some, 0.5, [], 3, RECORD).values
     within, between = 1.0, 1.0
-    assert found["drag_std"] and found["drag_std"].value == pytest.approx((within + between) ** 0.5)
+    assert values["drag_std"].value == pytest.approx((within + between) ** 0.5)
 
 
 @pytest.mark.parametrize(("early", "settled"), [(3.4, True), (0.3, False), (4.5, False)])

@@ -12,8 +12,8 @@ from changed import changed
 from scipy import stats
 from tradeoff_files import measures
 
+from dragchain.quantities.document import RunQuantities
 from dragchain.statistics.estimate import Estimate
-from dragchain.tradeoff.measures import Measures
 from dragdeck.records.case import load_case
 from dragdeck.study.reference import Drag, Reference
 from evidence.validation import force
@@ -52,7 +52,7 @@ def made_run(
     inputs = {"bowl.radius_m": 0.04, **(varied or {})}
     content = measures((*parameters, 1.0), seed, np.random.default_rng(1), inputs=inputs)
     content |= {"run": folder.name, "arc_m": 20 * DIAMETER_M}
-    return MeasuredRun(folder, case, Measures.model_validate(content), varied or {})
+    return MeasuredRun(folder, case, RunQuantities.model_validate(content), varied or {})
 
 
 def series(mean: float, rng: np.random.Generator, count: int = 4000) -> np.ndarray[Any, Any]:

@@ -11,8 +11,9 @@ import pytest
 from paths import ROOT, SNAKEFILES
 
 from dragchain.errors import SeriesError
-from dragchain.tradeoff.measures import RunCost
-from dragchain.windows.estimate import WindowsRecord, joined
+from dragchain.quantities.document import RunCost
+from dragchain.quantities.known import WindowsRecord
+from dragchain.windows.estimate import joined
 from dragdeck.physics.contact_mechanics import damping_ratio
 from dragdeck.records.case import FidelityOfRun
 from dragdeck.records.stability import StableStepRecord
@@ -86,6 +87,7 @@ def test_the_command_makes_records_that_the_product_reads(tmp_path: Path) -> Non
     assert drag.ratio_log == pytest.approx(math.log(1.1), abs=0.01)
     assert 0 < drag.ratio_log_std < 0.02 and drag.degrees == 10
     assert drag.variance_ratio == pytest.approx(1, abs=0.15)
+    assert drag.correlation == pytest.approx(0.0, abs=0.1)  # blocks are drawn independently
     assert joined([2.0, 2.1], np.full(9, 1.85), drag).value == pytest.approx(2.04, abs=0.03)
     law = StableStepRecord.read(tmp_path / "stable_step.json").stable_step
     assert {name: getattr(law, name) for name in LAW} == pytest.approx(LAW, rel=1e-3)

@@ -1,4 +1,4 @@
-"""What a run says of the quantities of a trade-off: bands of the drag, blocks, a run by hand."""
+"""What a run says of its quantities: bands of the drag, blocks, a run by hand."""
 
 import json
 import math
@@ -6,14 +6,19 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
-from made_run import particles_kept, run_json
+from finished_runs import TRANSIENT_S, write_finished_run
+from made_run import particles_kept, run_json, with_motion, write_documents
+from tiny_run_files import SPEED_M_S, case_json
 
 from dragchain.errors import TableError
-from dragchain.quantities.along import CountedPath, band_pass
-from dragchain.quantities.registry import COMPARED
-from dragchain.tradeoff.measure_run import write_measures
-from dragchain.tradeoff.measures import Measures
+from dragchain.quantities.along import CountedPath, band_pass, quantities_along
+from dragchain.quantities.document import MEASURED_FILE, RunQuantities
+from dragchain.quantities.measure import estimates_along, write_quantities
+from dragchain.quantities.registry import MEASURED
+from dragchain.run.case import upstream_folders
+from dragdeck.records.case import load_case
 from dragdeck.records.packing import Packing
 
 SPACING, COUNT = 0.1, 600
@@ -72,7 +77,10 @@ STEPS, VALUES = np.array([110, 150, 200, 210, 500]), np.array([1.0, 2.0, 6.0, 5.
 
 
 def test_means_of_blocks() -> None:
-    assert PATH.mean(STEPS, VALUES) == pytest.approx([3.0, 5.0, np.nan, 7.0], nan_ok=True)
+    blocks = PATH.mean(STEPS, VALUES)
+    assert blocks.values == pytest.approx([3.0, 5.0, np.nan, 7.0], nan_ok=True)
+    assert blocks.weights.tolist() == [3, 1, 0, 1]
+    assert blocks.mean == pytest.approx(VALUES.mean())
 
 
 @pytest.mark.parametrize("cuts", [[], [1], [3], [1, 2, 3, 4]])
@@ -82,35 +90,33 @@ def test_a_block_is_whole_wherever_the_table_is_cut(cuts: list[int]) -> None:
     assert found == {0: [1.0, 2.0, 6.0], 1: [5.0], 3: [7.0]}
 
 
-def test_squares_are_rooted_after_their_mean() -> None:
-    named = {quantity.name: quantity for quantity in COMPARED}
-    blocks = np.array([1.0, 7.0])
-    assert named["drag_mean"].of_blocks(blocks) == 4.0
-    assert named["drag_std"].of_blocks(blocks) == 2.0
-
-
-def measured(folder: Path, **outcome: object) -> Measures:
-    """The measures of the tiny run as they are read from their file."""
+def measured(folder: Path, **outcome: object) -> RunQuantities:
+    """The quantities of the tiny run as they are read from their file."""
+    (folder.parent / "process").mkdir()
+    folder = folder.rename(folder.parent / "process" / "run")
     (folder / "outcome.json").write_text(
         json.dumps(run_json(steps=50, wall_time_s=2.0, checks=[]) | outcome)
     )
-    (folder / "packing.json").write_text(BED.as_text())
-    found = write_measures(folder, folder / "packing.json")
-    assert Measures.read(folder / "measures.json") == found
-    return found
+    packing = upstream_folders(folder, load_case(folder))["filling"] / "tables" / "packing.json"
+    packing.parent.mkdir(parents=True)
+    packing.write_text(BED.as_text())
+    quantities = write_quantities(folder)
+    assert RunQuantities.read(folder / MEASURED_FILE).as_text() == quantities.as_text()
+    return quantities
 
 
 def test_a_run_by_hand(tiny_run: Path) -> None:
     """One contact of (4 N + 1e5 N/m workpiece_x) / 3, seven frames and 31 samples of the force."""
     found = measured(tiny_run)
     blocks = {name: values[0] for name, values in found.blocks.items()}
-    assert set(blocks) | set(found.single) == {quantity.name for quantity in COMPARED}
+    names = {quantity.name for quantity in MEASURED}
+    assert names - set(blocks) - set(found.single) == {
+        *("torque_mean", "events", "drag_std_long", "peaks")  # no spin, no events, a short path
+    }
     assert found.arc_m == pytest.approx(6.2e-6) and found.block_m == found.arc_m
     assert blocks["drag_mean"] == pytest.approx(-1.5)
-    assert blocks["drag_std"] == pytest.approx((31**2 - 1) / 12 / 150**2)
-    bands = [blocks[f"drag_std_{name}"] for name in ("long", "middle", "short")]
-    assert bands[0] is None  # the path is shorter than its waves
-    assert math.fsum(one or 0.0 for one in bands) == pytest.approx(blocks["drag_std"])
+    assert blocks["drag_std"] == pytest.approx((31**2 - 1) / 12 / 150**2 * 31 / 30)
+    assert blocks["drag_std_middle"] is not None and blocks["drag_std_short"] is not None
     assert blocks["workpiece_contacts"] == 1.0
     assert blocks["contact_force_mean"] == pytest.approx(1.5)
     assert blocks["contact_force_p50"] == pytest.approx(1.5)
@@ -134,6 +140,30 @@ def test_a_failed_run_says_only_how_it_failed(tiny_run: Path) -> None:
     assert found.cost.steps_per_m == pytest.approx(1.0 / (1e-4 * 1e-3))
 
 
-def test_a_run_without_outcome_is_refused(tiny_run: Path) -> None:
-    with pytest.raises(TableError, match="run --outcome"):
-        write_measures(tiny_run, tiny_run / "packing.json")
+def test_a_run_without_a_record_is_refused(tiny_run: Path) -> None:
+    with pytest.raises(TableError, match="dragdeck run"):
+        write_quantities(tiny_run)
+
+
+def test_contact_events_are_counted_where_they_begin(tmp_path: Path) -> None:
+    """One particle that stays from the first counted sample to the last: one event."""
+    run = write_finished_run(tmp_path / "process" / "run-1")
+    assert len(pd.read_parquet(run / "tables/contact_events.parquet")) == 1
+    along = quantities_along(run, load_case(run))
+    assert along.values()["events"] == pytest.approx(1.0 / along.arc_m)
+
+
+def test_the_torque_is_about_the_axis_of_a_workpiece_that_spins(tmp_path: Path) -> None:
+    folder = write_finished_run(tmp_path / "process" / "run-1")
+    file = folder / "tables/workpiece_force.parquet"
+    force = pd.read_parquet(file).assign(torque_x_n_m=1.0, torque_y_n_m=2.0)
+    force.assign(torque_z_n_m=force["step"] % 4 + 2.0).to_parquet(file)
+    path = {"kind": "line", "start_m": [0.0, 0.0]}
+    upright, inclined = {"spin": {"rpm": 60}}, {"spin": {"rpm": 60}, "tilt_deg": 30}
+    for motion, axis in (({}, None), (upright, (0, 0, 1)), (inclined, (0.5, 0, math.cos(0.5236)))):
+        case = case_json(statistics={"transient_s": TRANSIENT_S})
+        write_documents(folder, with_motion(case, path, SPEED_M_S, **motion))
+        torque = estimates_along(folder, load_case(folder)).get("torque_mean")
+        assert (torque is None) == (axis is None)
+        if torque:
+            assert torque.value == pytest.approx(np.dot(axis, (1, 2, 3)), rel=0.03)
