@@ -117,11 +117,12 @@ def estimate_of(quantity: Quantity, blocks: Blocks, known: Known = UNKNOWN) -> E
     if len(series) < 2 or value == 0.0:
         return Estimate(value, math.nan, math.nan, reliable=False)
     half, reliable = half_width_of_mean(series, known.correlation)
-    rare = not (blocks.values < 0.0).any() and half > LARGEST_REACH * mean
     if quantity.kind == "odds":
         estimate = Estimate.around(mean, half).within_one.mapped(quantity.of_mean)
     else:  # the root of a mean has half of its relative error
         half = half / (2.0 * value) if quantity.squared else half
         between = NORMAL_QUANTILE * known.packing_std * abs(value)
         estimate = Estimate.around(value, math.hypot(half, between))
+    negative = bool((blocks.values < 0.0).any())
+    rare = not negative and estimate.half_width > LARGEST_REACH * value
     return replace(estimate, reliable=reliable and not rare)
