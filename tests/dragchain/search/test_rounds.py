@@ -432,7 +432,8 @@ def test_a_search_that_cannot_be_is_refused(
     ],
 )  # fmt: skip
 def test_a_workpiece_that_turns_in_any_way_has_a_torque(load: Load, motion: Any) -> None:
-    block = SEARCH | {"vary": {"motion.immersion_depth_m": [0.005, 0.01]}, "objective": {"quantity": "torque_mean"}}
+    vary, torque = {"motion.immersion_depth_m": [0.005, 0.01]}, {"quantity": "torque_mean"}
+    block = SEARCH | {"vary": vary, "objective": torque}
     load({"motion": motion, "search": block, "sweep": {"seed": [1, 2]}})
 
 
