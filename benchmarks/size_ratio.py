@@ -106,7 +106,8 @@ def run(
         f"{number} 1 {diameter:.12g} {CERAMIC.density_kg_m3:.12g} {x:.12g} {y:.12g} {z:.12g}"
         for number, (diameter, x, y, z) in enumerate(particles, 1)
     ]
-    sides = [f"{low} {high} {axis}lo {axis}hi" for axis, (low, high) in zip("xyz", box, strict=True)]
+    ends = zip("xyz", box, strict=True)
+    sides = [f"{low} {high} {axis}lo {axis}hi" for axis, (low, high) in ends]
     head = ["particles", "", f"{len(rows)} atoms", "1 atom types", *sides, "", "Atoms", "", *rows]
     (folder / "particles.data").write_text("\n".join(head) + "\n", encoding="utf-8")
     (folder / "in.liggghts").write_text(script, encoding="utf-8")
@@ -186,8 +187,8 @@ def bed(folder: Path, ratio: float, friction: float, fraction: float) -> dict[st
         tilts += [f"run {round(seconds / dt)}", "unfix gravity"]
     script += _BED.format(every=max(1, round(0.01 / dt)), tilts="\n".join(tilts))
     rows = np.column_stack([2 * particles.radii_m, particles.positions_m]).tolist()
-    across = (-_BOWL_M - large, _BOWL_M + large)  # empty cells of the neighbour grid cost time
-    run(folder, script, rows, (across, across, (-large, particles.top_m + large)))
+    across = (-2 * _BOWL_M, 2 * _BOWL_M)  # no more: empty cells of the neighbour grid cost time
+    run(folder, script, rows, (across, across, (-_BOWL_M, 2 * particles.top_m)))
     last = np.loadtxt(folder / "bed.txt", skiprows=9)
     places, radii = last[:, 1:4], last[:, 4]
     pairs = cKDTree(places).query_pairs(2 * radii.max(), output_type="ndarray")
