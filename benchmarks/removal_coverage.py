@@ -28,6 +28,8 @@ from dragdeck.study.removal import Removal
 
 TRUE_M2_N, DENSITY, TIME_S, PATCHES, FRAMES = 1e-15, 7800.0, 3600.0, 12, 1500
 PACKINGS = (1, 2, 3, 5)
+KINDS = ("log-normal", "two groups", "rod")
+"""Of maps, see `loads_of`."""
 
 Random = np.random.Generator
 Hits = Mapping[str, bool | None]
@@ -94,9 +96,11 @@ def volume(random: Random, packings: int, trials: int) -> Hits:
 
 
 def loads_of(random: Random, kind: str, patches: int) -> Floats:
-    """True loads of a map: skewed, or those of a rod with a lee side."""
+    """True loads of a map: skewed, two groups of equal ones, or those of a rod with a lee side."""
     if kind == "log-normal":
         return np.asarray(np.exp(random.normal(0.0, 0.7, patches)))
+    if kind == "two groups":
+        return np.repeat([0.3, 1.7], patches // 2)
     around = 0.15 + np.maximum(np.cos(np.linspace(-np.pi, np.pi, 10, endpoint=False)), 0.0)
     return np.asarray(np.outer(np.linspace(0.3, 1.0, patches // 10), around).ravel())
 
@@ -165,7 +169,7 @@ def settings() -> Iterator[tuple[dict[str, Any], Callable[[Random], Hits]]]:
     for trials, scatter, unequal in product((2, 3, 5, 10), (1.0, 3.0), (False, True)):
         said = f"scatter of {scatter:g} {'unequal' if unequal else 'equal'} uncertainties"
         yield case(rates, trials, scatter, unequal, trials=trials, said=said)
-    for packings, kind, events in product(PACKINGS, ("log-normal", "rod"), (30, 120)):
+    for packings, kind, events in product(PACKINGS, KINDS, (30, 120)):
         said = f"{kind}, {events} events per patch"
         yield case(percentiles, packings, kind, events, packings=packings, said=said)
     for packings, rounding in product(PACKINGS, (0.0, 2.0)):

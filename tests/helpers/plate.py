@@ -1,5 +1,6 @@
 """A square plate as a mesh, and one particle on it, for tests of what LIGGGHTS does there."""
 
+import os
 import subprocess
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,7 +12,7 @@ from paths import ROOT
 
 from dragdeck.decks.outputs import ColumnsFile, Output
 from dragdeck.decks.templates import environment
-from dragdeck.engine.process import find_engine
+from dragdeck.engine.process import command, find_engine
 from dragdeck.study.drive import Drive
 from dragdeck.study.superposed.motion import SuperposedMotion
 
@@ -79,11 +80,19 @@ run {{ steps }}
 """
 
 
-def engine(folder: Path, *words: str) -> None:
+def engine(folder: Path, *words: str, ranks: int = 1) -> None:
     """Run the input script of a folder as it stands."""
-    command = [find_engine().path, "-in", "in.liggghts", "-log", "none", *words]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout[-2000:]
+    whole = [*command(find_engine(), "in.liggghts", ranks, 1, None), *words]
+    allowed = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+    done = subprocess.run(
+        whole,
+        cwd=folder,
+        env={**os.environ, **allowed},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout[-2000:] + done.stderr
 
 
 def static_overlap(mass: float) -> float:

@@ -1,5 +1,6 @@
 """The whole workflow on the real engine: a small study from its file to its report."""
 
+import contextlib
 import json
 import shutil
 from fnmatch import fnmatchcase
@@ -21,9 +22,13 @@ from snakemake_calls import jobs, snakemake, succeed
 
 from dragchain import read_dump, write_tables
 from dragchain.network.write import write_chains
+from dragchain.quantities.registry import REPORTED
+from dragchain.report.cases import ReportedCase, read_study_runs
 from dragchain.tables.network_contacts import contact_rows
 from dragchain.tables.run_folder import Run
+from dragdeck.errors import InputError
 from dragdeck.scenes.process import SCENES
+from dragdeck.study.check import validate
 from dragdeck.study.contact_law import FrictionLimit
 
 pytestmark = [pytest.mark.engine, pytest.mark.slow]
@@ -90,6 +95,21 @@ def test_cases_share_their_filling_and_drop_and_the_forces_on_the_workpiece_clos
         assert len(list((results / place).iterdir())) == count
     for file in results.glob("process/*/tables/closure.json"):
         assert json.loads(file.read_text())["verdict"] == "pass"
+
+
+def test_a_search_may_name_each_quantity_that_a_run_has_and_no_other(finished: Path) -> None:
+    """Of the registry of the report: any other would make every setting infeasible."""
+    run = next((finished / "results/small/process").iterdir())
+    values, file = ReportedCase((read_study_runs(run),)).values, finished / "studies/small"
+    study = yaml.safe_load(SMALL_STUDY.read_text()) | {"sweep": {"seed": [1, 2]}}
+    bounds, accepted = {"motion.speed_m_s": [0.01, 0.02]}, set()
+    for quantity in REPORTED:
+        search = {"vary": bounds, "objective": {"quantity": quantity.name}}
+        with contextlib.suppress(InputError):
+            validate(study | {"search": search}, file / "study.yaml")
+            accepted.add(quantity.name)
+    assert accepted == {standing.quantity.name for standing in values.standings}
+    assert {quantity.name for quantity in REPORTED} - accepted == {"torque_mean"}
 
 
 def test_the_workpiece_goes_where_it_should(finished: Path) -> None:

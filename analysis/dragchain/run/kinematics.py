@@ -224,7 +224,7 @@ def drag_surface_speed(case: CaseOfRun) -> float:
 
 def spins(case: CaseOfRun) -> bool:
     """Whether the workpiece turns in the frame of its path."""
-    return motion_of(case).turns
+    return motion_of(case).motion.turns
 
 
 def workpiece_velocity(steps: Ints, point_m: Floats, ref_m: Floats, case: CaseOfRun) -> Floats:

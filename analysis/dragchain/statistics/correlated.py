@@ -10,6 +10,7 @@ Oehlert 1992, Am. Stat. 46, 27).
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -164,6 +165,7 @@ def slow_error(series: ArrayLike) -> tuple[float, int]:
     return float(np.sqrt(np.mean(amplitudes**2) / len(samples))), len(amplitudes)
 
 
+@lru_cache(maxsize=1)
 def slow_waves(count: int) -> Floats:
     """Orthonormal cosines of the lowest frequencies, the constant left out, (8, count)."""
     number = np.arange(1, min(SLOW_WAVES, count - 1) + 1)

@@ -5,6 +5,11 @@ The values are shrunk: a prior distribution of the true values is fitted to the 
 (empirical Bayes), and true maps are drawn from the posterior of each patch, for priors fitted to
 resampled patches (Laird and Louis 1987, J. Am. Stat. Assoc. 82, 739; Efron 2016, Biometrika 103,
 1). A percentile of the drawn maps has their median and, as its interval, their percentiles.
+
+Whether the true values at an end of the map are spread by a part of their errors or all alike, the
+measured ones do not show. A prior is wide after a few steps of its fit and narrows with further
+ones. The interval spans those of wide and of narrow priors (Imbens and Manski 2004, Econometrica
+72, 1845), so that it covers in maps of groups of equal values too.
 """
 
 import math
@@ -19,8 +24,8 @@ from dragchain.statistics.estimate import CONFIDENCE, Estimate
 LARGEST_ERROR = 0.4
 """With a larger relative error of a patch there, a percentile is not available."""
 
-_PRIORS, _DRAWS, _STEPS, _SPACING, _MOST = 40, 5, 24, 0.5, 250
-"""Fitted priors, maps drawn of each, and steps of the fit (EM).
+_PRIORS, _DRAWS, _STEPS, _MORE, _SPACING, _MOST = 40, 5, 24, 16, 0.5, 250
+"""Fitted priors, maps drawn of each, steps of the fit (EM) of wide ones, and more of narrow ones.
 
 Distance of the values of a prior in errors of a patch, and the largest number of values.
 """
@@ -75,7 +80,7 @@ def map_spread(values: Floats, errors: Floats, areas: Floats, patch: Ints) -> Ma
         square = float((area * (value**2 - variance)).sum())
         differences = max(0.0, beyond / square) if square > 0.0 else 0.0
     maps = _drawn(value, area, max(events, 1e-9 * float(area.mean())), differences)
-    maps /= np.average(maps, axis=1, weights=area)[:, None]
+    maps /= np.average(maps, axis=-1, weights=area)[..., None]
     spreads, relative = [], []
     for part in (0.05, 0.95):
         estimate = _estimate(_quantiles(maps, area, part), _quantiles(value, area, part))
@@ -87,16 +92,16 @@ def map_spread(values: Floats, errors: Floats, areas: Floats, patch: Ints) -> Ma
 
 
 def _estimate(drawn: Floats, measured: float | Floats) -> Estimate:
-    """Median of drawn numbers; its interval joins theirs with the correction of the measured one.
+    """Of numbers drawn from wide and narrow priors, (2, draws): the median of the former.
 
-    The form of prior and likelihood are assumptions, so that half of the correction counts as its
-    standard error.
+    An interval joins theirs with the correction of the measured number: the form of prior and
+    likelihood are assumptions, so that half of the correction counts as its standard error.
     """
     ends = 0.5 - CONFIDENCE / 2, 0.5, 0.5 + CONFIDENCE / 2
-    low, value, high = np.quantile(drawn, ends).tolist()
-    correction = value - float(measured)
-    below, above = math.hypot(value - low, correction), math.hypot(high - value, correction)
-    return Estimate(value, max(0.0, value - below), value + above)
+    low, value, high = np.quantile(drawn, ends, axis=1)
+    lowest = value - np.hypot(value - low, value - measured)
+    highest = value + np.hypot(high - value, value - measured)
+    return Estimate(float(value[0]), max(0.0, float(lowest.min())), float(highest.max()))
 
 
 def _quantiles(maps: Floats, area: Floats, part: float) -> Floats:
@@ -108,7 +113,13 @@ def _quantiles(maps: Floats, area: Floats, part: float) -> Floats:
 
 
 def _drawn(value: Floats, area: Floats, events: float, differences: float) -> Floats:
-    """Maps of true values, (draws, M), from those measured with these variances."""
+    """Maps of true values from those measured with these variances.
+
+    Returns
+    -------
+    (2, draws, M) array
+        From wide priors, and from narrow ones.
+    """
     root, mean_area = math.sqrt(differences), float(area.mean())
 
     def true(scale: Floats) -> Floats:
@@ -130,17 +141,20 @@ def _drawn(value: Floats, area: Floats, events: float, differences: float) -> Fl
     random = np.random.default_rng(0)
     weights = random.dirichlet(np.ones(len(value)), _PRIORS).T
     prior = np.full((count, _PRIORS), 1 / count)
-    for _ in range(_STEPS):
-        prior *= chance.T @ (weights / (chance @ prior))
+    priors = list[Floats]()
+    for steps in (_STEPS, _MORE):
+        for _ in range(steps):
+            prior *= chance.T @ (weights / (chance @ prior))
+        priors.extend((prior if priors else _smooth(prior, scale, len(value))).T)
     maps = []
-    for column in _smooth(prior, scale, len(value)).T:
+    for column in priors:
         summed = (chance * column).cumsum(axis=1)
         for _ in range(_DRAWS):
             place = random.random(len(value)) * summed[:, -1]
             number = (summed < place[:, None]).sum(axis=1)
             within = (random.random(len(value)) - 0.5) * scale[0]
             maps.append(true(np.maximum(scale[number] + within, 0.0)))
-    return np.array(maps)
+    return np.array(maps).reshape(2, -1, len(value))
 
 
 def _smooth(prior: Floats, scale: Floats, patches: int) -> Floats:

@@ -390,6 +390,7 @@ def test_check_warns_of_bounds_that_are_infeasible_and_refuses_a_field_that_is_a
         ({"search.runs": 5}, "runs 5 is fewer than the 6 of the first round"),
         ({"search.objective": {"quantity": "minutes"}}, "no run has minutes.*removal"),
         ({"search.objective": {"quantity": "peak_pressure"}}, "first_touch_fraction"),
+        ({"search.objective": {"quantity": "torque_mean"}}, "no run has torque_mean.*motion.spin"),
         ({"search.objective": {"quantity": "drag", "goal": "minimise"}}, "the value is unknown"),
         ({"search.objective": {"quantity": "drag_mean", "goal": "target"}}, "belongs to the goal"),
         (
@@ -417,6 +418,23 @@ def test_a_search_that_cannot_be_is_refused(
             own[first] = value
     with pytest.raises(InputError, match=f"(?s){words}"):
         load({**own, "search": block})
+
+
+@pytest.mark.parametrize(
+    "motion",
+    [
+        {"spin": {"rpm": 30}},
+        *(
+            {"speed_m_s": None, "path": {"kind": "waypoints", "points": [
+                [0, 0.01, 0, 0], [1, 0.01, 0.01, 0, *turned], [2, -0.01, 0, 0, *turned]]}}
+            for turned in ([60], [0, 5])
+        ),
+    ],
+)  # fmt: skip
+def test_a_workpiece_that_turns_in_any_way_has_a_torque(load: Load, motion: Any) -> None:
+    vary, torque = {"motion.immersion_depth_m": [0.005, 0.01]}, {"quantity": "torque_mean"}
+    block = SEARCH | {"vary": vary, "objective": torque}
+    load({"motion": motion, "search": block, "sweep": {"seed": [1, 2]}})
 
 
 def test_a_study_without_search_says_how_to_ask(

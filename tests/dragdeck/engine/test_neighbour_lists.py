@@ -13,6 +13,7 @@ pytestmark = pytest.mark.engine
 
 RADIUS, STEP = 1e-3, 2e-5
 DECK = f"""units si
+processors {{ranks}} 1 1
 soft_particles yes
 atom_style granular
 atom_modify map array
@@ -46,7 +47,9 @@ run {{steps}}
 """
 
 
-def contacts(folder: Path, *, skin: float, lists: str = "delay 0", speed: float, move: bool):
+def contacts(
+    folder: Path, *, skin: float, speed: float, move: bool, lists: str = "delay 0", ranks: int = 1
+):
     """Overlaps that LIGGGHTS evaluates and that it overlooks, between spheres and at the plate.
 
     Of 216 spheres, which fly at random at three times the speed, or rest while the plate moves
@@ -68,9 +71,11 @@ def contacts(folder: Path, *, skin: float, lists: str = "delay 0", speed: float,
     steps = 150 if move else int(0.014 / (speed * STEP))
     integrate = "fix integrate all nve/sphere" if move else ""
     (folder / "in.liggghts").write_text(
-        DECK.format(skin=skin, lists=lists, speed=speed, integrate=integrate, steps=steps)
+        DECK.format(
+            ranks=ranks, skin=skin, lists=lists, speed=speed, integrate=integrate, steps=steps
+        )
     )
-    engine(folder)
+    engine(folder, ranks=ranks)
     names = ("spheres", "pairs", "touched")
     spheres, pairs, touched = (text_frames((folder / f"{name}.txt").read_bytes()) for name in names)
     seen: dict[str, list[float]] = {"pair": [], "late pair": [], "plate": [], "late plate": []}
@@ -89,10 +94,12 @@ def contacts(folder: Path, *, skin: float, lists: str = "delay 0", speed: float,
     return seen
 
 
-@pytest.mark.parametrize("skin", [0.3, 0.02])
-def test_no_contact_of_particles_is_late_however_thin_the_skin(tmp_path: Path, skin: float) -> None:
+@pytest.mark.parametrize(("skin", "ranks"), [(0.3, 1), (0.02, 1), (0.02, 2)])
+def test_no_contact_of_particles_is_late_however_thin_the_skin(
+    tmp_path: Path, skin: float, ranks: int
+) -> None:
     """Even where LIGGGHTS calls nearly every build of its lists dangerous."""
-    seen = contacts(tmp_path, skin=skin * RADIUS, speed=1.0, move=True)
+    seen = contacts(tmp_path, skin=skin * RADIUS, speed=1.0, move=True, ranks=ranks)
     assert len(seen["pair"]) > 500 and not seen["late pair"]
     assert len(seen["plate"]) > 20 and not seen["late plate"]
 
@@ -102,13 +109,14 @@ def test_lists_that_wait_miss_contacts(tmp_path: Path) -> None:
     assert len(seen["late pair"]) > 20
 
 
+@pytest.mark.parametrize("ranks", [1, 2])
 @pytest.mark.parametrize("skins", [1.05, 0.5])
 def test_a_mesh_that_moves_by_more_than_the_skin_touches_a_step_late(
-    tmp_path: Path, skins: float
+    tmp_path: Path, skins: float, ranks: int
 ) -> None:
     """No particle moves, so that only the mesh asks for new lists: a step after it needs them."""
     speed = 4.0
-    seen = contacts(tmp_path, skin=skins * speed * STEP, speed=speed, move=False)
+    seen = contacts(tmp_path, skin=skins * speed * STEP, speed=speed, move=False, ranks=ranks)
     assert len(seen["plate"]) > 200
     late = seen["late plate"]
     assert (len(late) > 10) is (skins < 1)

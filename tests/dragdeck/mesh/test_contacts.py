@@ -2,7 +2,6 @@
 
 import math
 import re
-import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +10,7 @@ from blades import knife, twisted_blade
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from plate import engine
 from trimesh import Trimesh
 from trimesh.convex import convex_hull
 
@@ -18,7 +18,6 @@ from dragdeck.decks import outputs
 from dragdeck.decks.deck import Body, data_file
 from dragdeck.decks.outputs import WORKPIECE_FORCE
 from dragdeck.engine.acceptance import check_run
-from dragdeck.engine.process import find_engine
 from dragdeck.errors import InputError
 from dragdeck.mesh import files, shapes
 from dragdeck.mesh import surface as surfaces
@@ -162,16 +161,34 @@ fix integrate all nve/sphere
 """  # noqa: E501
 
 
-def run(folder: Path, commands: str, stl: str, centres: Floats) -> None:
-    """Run spheres that do not see each other, and a mesh, on LIGGGHTS."""
+CLUMP = """\
+region place block {low[0]} {high[0]} {low[1]} {high[1]} {low[2]} {high[2]} volume_limit 1e-20 units box
+fix template all particletemplate/multisphere 15485863 atom_type 1 density constant 2500 nspheres 2 ntry 100000 spheres {half} 0 0 {radius} -{half} 0 0 {radius} type 1
+fix clumps all particledistribution/discrete 15485867 1 template 1.0
+fix insert all insert/pack seed 32452843 distributiontemplate clumps maxattempt 100 insert_every once overlapcheck no orientation template vel constant 0. 0. 0. region place particles_in_region 1
+"""  # noqa: E501
+
+
+def clumped(head: str, centre: Floats) -> str:
+    """With a body of two spheres that overlap by half, the first one with this centre."""
+    middle, half = centre - (RADIUS / 2, 0, 0), RADIUS / 2
+    clump = CLUMP.format(low=middle - 1e-6, high=middle + 1e-6, half=half, radius=RADIUS)
+    box = "region box block -0.1 0.1 -0.1 0.1 -0.1 0.1 units box\ncreate_box 1 box"
+    head = head.replace("read_data spheres.data", box)
+    return head.replace("nve/sphere", "multisphere") + clump
+
+
+def run(
+    folder: Path, commands: str, stl: str, centres: Floats, *, ranks: int = 1, clump: bool = False
+) -> None:
+    """Run spheres that do not see each other, and a mesh, on LIGGGHTS; or one body of spheres."""
     reach = float(np.abs(centres).max()) + 0.1
     bodies = [Body(1, RADIUS, 2500, tuple(centre)) for centre in centres.tolist()]
     (folder / "spheres.data").write_text(data_file("spheres", 1, ((-reach, reach),) * 3, bodies))
     (folder / "mesh.stl").write_text(stl)
-    (folder / "in.deck").write_text(HEAD + commands)
-    command = [find_engine().path, "-in", "in.deck"]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
-    assert done.returncode == 0, done.stdout[-2000:] + done.stderr
+    head = clumped(HEAD, centres[0]) if clump else HEAD
+    (folder / "in.liggghts").write_text(f"processors {ranks} 1 1\n{head}{commands}")
+    engine(folder, ranks=ranks)
 
 
 def forces(folder: Path, stl: str, centres: Floats) -> Floats:
@@ -248,9 +265,16 @@ def largest_force(folder: Path, stl: str, case: str) -> float:
 
 
 @pytest.mark.engine
+@pytest.mark.parametrize("clump", [False, True], ids=["sphere", "clump"])
+@pytest.mark.parametrize("ranks", [1, 2])
 @pytest.mark.parametrize("name", ["raw", "written"])
-def test_a_run_with_a_thrown_particle_is_refused(tmp_path: Path, name: str):
-    """The knife throws the sphere with 34 m/s, which a fall and the knife cannot give."""
+def test_a_run_with_a_thrown_particle_is_refused(
+    tmp_path: Path, name: str, ranks: int, clump: bool
+):
+    """The knife throws the sphere with 34 m/s, which a fall and the knife cannot give.
+
+    Two ranks meet at the edge. A body of two spheres is thrown with 21.8 m/s.
+    """
     centre, move = KNIFE_MOVES["straight"]
     output = outputs.workpiece_force(50, 2500, "part")
     columns = " ".join(f"$({one.engine})" for one in output.columns)
@@ -264,6 +288,8 @@ def test_a_run_with_a_thrown_particle_is_refused(tmp_path: Path, name: str):
         "run 2500\n",
         as_given(knife()) if name == "raw" else files.stl_text(knife()),
         np.array([centre]),
+        ranks=ranks,
+        clump=clump,
     )
     raw = output.as_part()
     limit = thrown_speed(9.81, 0.2, 0.1)
@@ -275,7 +301,8 @@ def test_a_run_with_a_thrown_particle_is_refused(tmp_path: Path, name: str):
     checks = check_run(tmp_path, inputs, {WORKPIECE_FORCE: raw}, 0, [part], ranks=1)
     (check,) = (check for check in checks if check.code == "none_thrown")
     assert check.passed is (name == "written")
-    assert check.number == pytest.approx(34 if name == "raw" else 0.172, rel=0.02)
+    thrown = 21.8 if clump else 34
+    assert check.number == pytest.approx(thrown if name == "raw" else 0.172, rel=0.02)
 
 
 @pytest.mark.engine

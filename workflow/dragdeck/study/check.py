@@ -281,10 +281,14 @@ def _search(search: Search, study: Study) -> _Found:
         yield "sweep", problem, "seed: [1, 2] or more, and no other field"
     if study.workpieces is not None:
         yield "search", "a search is of one workpiece", "a study without workpieces"
-    removal, touches = study.removal, bool(study.outputs.first_touch_fraction)
-    target = bool(removal and removal.target_depth_m)
+    given = {
+        "removal": study.removal is not None,
+        "removal.target_depth_m": bool(study.removal and study.removal.target_depth_m),
+        "outputs.first_touch_fraction": bool(study.outputs.first_touch_fraction),
+        "motion.spin": study.motion.turns,
+    }
     for name, measure in search.measures.items():
-        if lacking := measure.lacks(removal is not None, target, touches):
+        if lacking := measure.lacks(given):
             limit = f"a study with {lacking}, or another quantity"
             yield f"search.{name}.quantity", f"no run has {measure.quantity}", limit
     for field in search.vary:

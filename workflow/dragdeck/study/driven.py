@@ -75,15 +75,9 @@ class DrivenMotion:
         return self.motion.path.fastest_m_s(self.drive)
 
     @property
-    def turns(self) -> bool:
-        """Whether the workpiece turns in the frame of its path."""
-        moving = any(superposed.turns for superposed in self.superposed.values())
-        return moving or self.motion.path.own(self.drive, np.zeros(1)) is not None
-
-    @property
     def keeps_direction(self) -> bool:
         """Whether the direction of motion is always the same in the workpiece's own frame."""
-        return not self.turns and self.motion.path.keeps_direction(self.drive.orientation)
+        return not self.motion.turns and self.motion.path.keeps_direction(self.drive.orientation)
 
     def places(self, since: StepCounts, begun: Floats) -> Floats:
         """Places of the reference point, (N, 3), after (N,) steps from where it begins, m."""

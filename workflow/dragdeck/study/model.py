@@ -183,6 +183,12 @@ class Motion(Superposed):
         return bool(self.tilt_deg) or self.path.inclined
 
     @property
+    def turns(self) -> bool:
+        """Whether the workpiece turns in the frame of its path."""
+        by_path = self.path.inclined or bool(self.path.turning)
+        return by_path or any(motion.turns for motion in self.superposed().values())
+
+    @property
     def turns_about_inclined_axis(self) -> bool:
         """Whether the workpiece spins about an axis that is not upright."""
         return bool(self.tilt_deg) and self.spin is not None

@@ -21,6 +21,14 @@ RECORD = Path("search") / "points.json"
 _OF_TARGET = ("minutes", "minutes_slowest")
 _OF_REMOVAL = ("removal_depth", "removal_variation", *_OF_TARGET)
 _OF_TOUCH = ("peak_pressure",)
+_NEEDED = {
+    "removal": _OF_REMOVAL,
+    "removal.target_depth_m": _OF_TARGET,
+    "outputs.first_touch_fraction": _OF_TOUCH,
+    "motion.spin": ("torque_mean",),
+}
+"""Fields, and the quantities that no run has without them."""
+
 _SIGNED = {row["name"] for row in QUANTITIES if row["negative"]}
 """Quantities that may be negative."""
 
@@ -59,14 +67,16 @@ class SearchedMeasure(Model):
         """Below which the quantity never is."""
         return -math.inf if self.quantity in _SIGNED else 0.0
 
-    def lacks(self, removal: bool, target: bool, touches: bool) -> str:
-        """The field without which no run has this quantity, empty if there is none."""
-        lacking = {
-            "removal": self.quantity in _OF_REMOVAL and not removal,
-            "removal.target_depth_m": self.quantity in _OF_TARGET and not target,
-            "outputs.first_touch_fraction": self.quantity in _OF_TOUCH and not touches,
-        }
-        return next((name for name, missing in lacking.items() if missing), "")
+    def lacks(self, given: Mapping[str, bool]) -> str:
+        """The field without which no run has this quantity, empty if there is none.
+
+        Parameters
+        ----------
+        given : mapping
+            Whether a study has each of these fields, or what does the same.
+        """
+        needed = (field for field, quantities in _NEEDED.items() if self.quantity in quantities)
+        return next((field for field in needed if not given[field]), "")
 
 
 class Objective(SearchedMeasure):
