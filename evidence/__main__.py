@@ -7,32 +7,26 @@ from dragchain.cli import OUT_DIR, RUN_DIRS
 from dragdeck.cli import FIDELITY, STUDY
 from dragdeck.command_line import Argument, Command, Program
 
+CORES = Argument("--cores", type=int, default=1, metavar="N",
+                 help="runs at the same time; default: 1")  # fmt: skip
+
 COMMANDS = (
     Command("verify", "run the verification suite and compare it with reference solutions",
             "Run the verification suite and compare it with reference solutions.",
             "verification.report:verify", (
-        STUDY, FIDELITY, OUT_DIR,
-        Argument("--cores", type=int, default=1, metavar="N",
-                 help="runs at the same time; default: 1"))),
+        STUDY, FIDELITY, OUT_DIR, CORES)),
     Command("verdict", "print the verdict of the verification suite; fail if a quantity failed",
             "Print the verdict of the verification suite; fail if a quantity failed.",
             "verification.report:verdict", (
         Argument("report_dir", type=Path, metavar="REPORT_DIR",
                  help="folder of the report on the verification suite"),)),
-    Command("run-map", "run all points of one regime of the stability map",
-            "Run all points of one regime of the stability map.",
-            "stability.runs:stability_command", (
-        Argument("regime", metavar="REGIME",
-                 help="impact, settle, column or drag; beds: only the packings from which drags "
-                 "start"),
-        Argument("--map", type=Path, required=True, dest="points", metavar="FILE",
-                 help="map.yaml, the points of the stability map; required"))),
-    Command("report-map", "write the report on a stability map",
-            "Write the report on a stability map.",
-            "stability.report:write_stability", (
+    Command("stability", "run the points of a stability map and judge them",
+            "Run the points of a stability map and judge them; write the report.",
+            "stability.report:map_stability", (
         OUT_DIR,
-        Argument("lists", type=Path, nargs="+", metavar="POINTS",
-                 help="points/REGIME.json of each regime, made by run-map"))),
+        Argument("--map", type=Path, required=True, dest="points", metavar="FILE",
+                 help="map.yaml, the points of the stability map; required"),
+        CORES)),
     Command("validate", "compare the runs of a study with the publication it reproduces",
             "Compare the runs of a study with the publication it reproduces; write the report.",
             "validation.report:write_validation", (
