@@ -118,7 +118,7 @@ def main() -> None:
     case = project.cases("droptest")[0]
     batch = Batch(options.folder, environment(project.templates, study_templates(case)))
     drops = run_drops(case, [drop_of(case, options.seed)], batch, say)
-    text = synthetic_record(read_drops(drops).runs[0], sensor, options.seed)
+    text = synthetic_record(read_drops(drops, batch.folder).runs[0], sensor, options.seed)
     options.out.write_text(text, encoding="utf-8")
 
 

@@ -26,7 +26,6 @@ from dragdeck.engine.process import find_engine
 from dragdeck.errors import DragdeckError, EngineError, InputError, choices
 from dragdeck.files import file_checksum, write_text
 from dragdeck.outlook.runs import StudyRun, expected_runs
-from dragdeck.physics.contact_mechanics import fall_time
 from dragdeck.project import (
     OUTCOMES,
     PLACES,
@@ -455,11 +454,6 @@ class Workflow:
         """How to name the advice on the command line, if there is or will be one."""
         known = self.needed_advice or (self.project.root / self.advice).is_file()
         return f"--advice {self.advice}" if known else ""
-
-    def fall_time_s(self, _: object = None) -> float:
-        """Free fall before the first impact of the drop test, s."""
-        study = self.cases[0].study
-        return fall_time(study.drop_test.height_m, study.gravity_m_s2)
 
     def licence_option(self, _: object = None) -> str:
         """How to name the licence of the results on the command line, if the study states one."""

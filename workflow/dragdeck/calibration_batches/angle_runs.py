@@ -7,7 +7,7 @@ from dragdeck.decks import RUN_FILE
 from dragdeck.engine.batch import Batch
 from dragdeck.engine.reports import Report
 from dragdeck.errors import InputError
-from dragdeck.records.calibration import AngleRun, AnglesFile
+from dragdeck.records.calibration import AngleRun, AngleSet
 from dragdeck.scenes.angles import angle_scene
 from dragdeck.study.calibration import Angles
 
@@ -41,14 +41,14 @@ def angle_runs(angles: Angles) -> dict[str, AngleRun]:
     return scenes
 
 
-def run_angles(case: Case, batch: Batch, report: Report, cores: int = 1) -> None:
-    """Simulate all measurements, each run in a folder of its own, and list them in ``runs.json``.
+def run_angles(case: Case, batch: Batch, report: Report, cores: int = 1) -> AngleSet:
+    """Simulate all measurements, each run in a folder of its own.
 
     Parameters
     ----------
     case : Case
     batch : Batch
-        Its folder gets a folder for each run, and the list.
+        Its folder gets a folder for each run.
     report : callable
         Gets a line for each run.
     cores : int
@@ -71,7 +71,7 @@ def run_angles(case: Case, batch: Batch, report: Report, cores: int = 1) -> None
     batch.each(
         {name: partial(angle_scene, case, scene) for name, scene in runs.items()}, report, cores
     )
-    AnglesFile(
+    return AngleSet(
         study=case.study_name,
         title=case.study.title,
         pair=f"{material}-{material}",
@@ -79,4 +79,4 @@ def run_angles(case: Case, batch: Batch, report: Report, cores: int = 1) -> None
         rolling_friction=angles.rolling_friction,
         measured={name: (rig.angle_deg, rig.angle_std_deg) for name, rig in angles.rigs.items()},
         runs=tuple(name for name in runs if (batch.folder / name / RUN_FILE).is_file()),
-    ).write(batch.folder / "runs.json")
+    )

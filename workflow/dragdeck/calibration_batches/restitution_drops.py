@@ -16,7 +16,7 @@ from dragdeck.engine.reports import Report
 from dragdeck.errors import InputError
 from dragdeck.physics import contact_mechanics as mechanics
 from dragdeck.physics.rounding import timestep
-from dragdeck.records.calibration import IMPACTS, DropOfList, DropsFile, Purpose
+from dragdeck.records.calibration import IMPACTS, DropOfList, DropSet, Purpose
 from dragdeck.scenes.drop_test import DropFidelity, drop_scene
 from dragdeck.study.calibration import Calibration
 from dragdeck.study.model import Study
@@ -174,22 +174,17 @@ def drop_case(case: Case, drop: Drop) -> Case:
     return Case(case.file, case.settings, changed)
 
 
-def run_drops(case: Case, drops: Sequence[Drop], batch: Batch, report: Report) -> Path:
-    """Run drops, each in a folder of its own, and list them in ``drops.json``.
+def run_drops(case: Case, drops: Sequence[Drop], batch: Batch, report: Report) -> DropSet:
+    """Run drops, each in a folder of its own.
 
     Parameters
     ----------
     case : Case
     drops : sequence of Drop
     batch : Batch
-        Its folder gets a folder for each drop, and the list.
+        Its folder gets a folder for each drop.
     report : callable
         Gets a line now and then.
-
-    Returns
-    -------
-    Path
-        The list.
 
     Raises
     ------
@@ -206,19 +201,17 @@ def run_drops(case: Case, drops: Sequence[Drop], batch: Batch, report: Report) -
         rows.append(DropOfList.model_validate(known))
         if number % 20 == 0 or number == len(drops):
             report(f"{number} of {len(drops)} drops done")
-    file = batch.folder / "drops.json"
-    _listed(case, rows).write(file)
-    return file
+    return _listed(case, rows)
 
 
-def _listed(case: Case, rows: Sequence[DropOfList]) -> DropsFile:
+def _listed(case: Case, rows: Sequence[DropOfList]) -> DropSet:
     study, section = case.study, settings(case)
     particle, plate = study.media.main_material, study.workpiece.material
     material, radius = particle_material(study), study.media.typical_radius_m
     modulus = mechanics.effective_modulus(material, study.materials[plate])
     height, gravity = study.drop_test.height_m, study.gravity_m_s2
     mass, speed = mechanics.particle_mass(material, radius), mechanics.fall_speed(height, gravity)
-    return DropsFile(
+    return DropSet(
         study=case.study_name,
         title=study.title,
         pair=f"{particle}-{plate}",

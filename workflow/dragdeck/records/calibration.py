@@ -1,4 +1,4 @@
-"""The runs of a calibration, ``drops.json`` and ``runs.json``, and the fits in ``result.json``."""
+"""What a calibration measures: drops of a particle, heaps and drums."""
 
 from collections.abc import Mapping
 from typing import Literal
@@ -16,7 +16,7 @@ Purpose = Literal["production", "reference", "confirm"]
 
 
 class DropTest(Document):
-    """The drop test of the study, as in ``drops.json``.
+    """The drop test of the study, as in ``result.json``.
 
     Attributes
     ----------
@@ -62,12 +62,12 @@ class Settings(Part):
 
 
 class DropOfList(Settings):
-    """A drop that was run and that ``drops.json`` lists.
+    """A drop that was run.
 
     Attributes
     ----------
     folder : str
-        Beside the list.
+        Beside those of the other drops.
     purpose : str
         ``production``, ``reference`` or ``confirm``.
     restitution : float
@@ -81,62 +81,14 @@ class DropOfList(Settings):
     height_m: PositiveFloat
 
 
-class DropsFile(DropTest):
-    """The content of ``drops.json``."""
+class DropSet(DropTest):
+    """The drop test and drops for it."""
 
     drops: tuple[DropOfList, ...]
 
 
-class Fit(Part):
-    """The fitted coefficient of restitution for the input script.
-
-    Attributes
-    ----------
-    restitution, ci95_low, ci95_high : float
-        Best value and its 95 % interval.
-    height_m : float
-        Drop height that fits best, m.
-    chi2 : float
-        Weighted sum of squares at the best value.
-    degrees : int
-        Degrees of freedom; 0: the fit cannot be tested.
-    p_value : float or None
-        Probability of a larger `chi2` if the model is right.
-    inflation : float
-        Factor by which the interval is widened if the residuals exceed their uncertainties:
-        sqrt(chi2 / degrees), at least 1.
-    residuals : tuple of float
-        (Measured - simulated) / standard uncertainty.
-    """
-
-    restitution: float
-    ci95_low: float
-    ci95_high: float
-    height_m: float
-    chi2: float
-    degrees: int
-    p_value: float | None
-    inflation: float
-    residuals: tuple[float, ...]
-
-
-class FitFile(Document):
-    """The fits in ``result.json``; `dragchain.calibration.results` adds what follows from them.
-
-    Attributes
-    ----------
-    fit, fit_full : Fit
-        At the production settings, and at the physical modulus.
-    """
-
-    remedy = "make it with: ./run calibrate"
-
-    fit: Fit
-    fit_full: Fit
-
-
-class AnglesFile(Document):
-    """The measured angles of a study, and the runs that they are compared with: ``runs.json``.
+class AngleSet(Document):
+    """The measured angles of a study, and the runs that they are compared with.
 
     Attributes
     ----------
@@ -147,7 +99,7 @@ class AnglesFile(Document):
     measured : mapping
         Measured angle and its standard uncertainty, degrees, by ``repose`` and ``drum``.
     runs : tuple of str
-        Folders beside the list; a run that failed is absent.
+        Names of their folders; a run that failed is absent.
     """
 
     remedy = "make it with: ./run calibrate"
