@@ -2,14 +2,14 @@
 
     python benchmarks/solid_fraction.py docs/data/scenes/solid_fraction.csv [--folder FOLDER]
 
-Fills a bowl with each of the media below, several times, and writes a row for each packing: shape,
-spread of the sizes, friction and width of the bowl, and the solid fraction obtained. The runs are
-ordinary fillings; the same command resumes an interrupted measurement.
+Fills a bowl with each of the media in ``solid_fraction.yaml`` and writes a row for each packing:
+shape, spread of the sizes, friction and width of the bowl, and the solid fraction obtained. The
+runs are ordinary fillings; the same command resumes an interrupted measurement.
 """
 
 import argparse
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -27,78 +27,24 @@ from dragdeck.engine.reports import say
 from dragdeck.project import find_project
 from dragdeck.records.packing import Packing
 from dragdeck.scenes.filling import FILLING
-from dragdeck.sweep.cases import settle_case
+from dragdeck.study.yaml import read_yaml
+from dragdeck.sweep.cases import Design, Variation, settle_case
 
-_RADIUS_M = 3.27e-3
-
-_STUDY: Mapping[str, Any] = {
-    "title": "Solid fraction of poured beds",
-    "materials": {
-        "ceramic": {"youngs_modulus_pa": 77e9, "poissons_ratio": 0.19, "density_kg_m3": 2656},
-        "steel": {"youngs_modulus_pa": 210e9, "poissons_ratio": 0.30, "density_kg_m3": 7610},
-    },
-    "pairs": {
-        "ceramic-ceramic": {"restitution": 0.86, "friction": 0.34},
-        "ceramic-steel": {"restitution": 0.68, "friction": 0.28},
-    },
-    "bowl": {"material": "steel", "radius_m": 7 * _RADIUS_M, "height_m": 0.5},
-    "workpiece": {"material": "steel", "shape": {"kind": "cylinder", "radius_m": 0.004}},
-    "motion": {
-        "path": {"kind": "circle", "radius_m": 0.010, "revolutions": 0.1},
-        "speed_m_s": 0.02, "immersion_depth_m": 0.01,
-        "plunge_speed_m_s": 0.1, "approach_speed_m_s": 0.05, "transient_m": 0.001,
-    },
-    "fidelity": {
-        "youngs_modulus_scale": 3e-4, "timestep_fraction": 0.5,
-        "filling_timestep_fraction": 0.5, "ranks": 1, "skin_m": 1e-3,
-    },
-}  # fmt: skip
-
-_MEAN = {"material": "ceramic", "radius_mean_m": _RADIUS_M}
-_COUNT, _COUNT_OF_CLUMPS = 300, 240
-
-_SHAPES: Mapping[str, Mapping[str, Any]] = {
-    "cylinder 1.2, cut": {"kind": "cylinder", "aspect": 1.2, "cut_deg": 30, "spheres": 4},
-    "tetrahedron": {"kind": "tetrahedron", "spheres": 4},
-    "cylinder 2": {"kind": "cylinder", "aspect": 2.0, "spheres": 4},
-    "ellipsoid 2": {"kind": "ellipsoid", "axes": [2, 1, 1], "spheres": 4},
-    "prism 1": {"kind": "triangular_prism", "aspect": 1.0, "spheres": 4},
-    "cylinder 1": {"kind": "cylinder", "aspect": 1.0, "spheres": 6},
-    "cylinder 3": {"kind": "cylinder", "aspect": 3.0, "spheres": 5},
-    "cone 1": {"kind": "cone", "aspect": 1.0, "spheres": 4},
-}
+DESIGN = Path(__file__).with_suffix(".yaml")
 
 
-def _classes(ratio: float, fine: float) -> dict[str, Any]:
-    """Two sizes, the smaller one with this fraction of the mass."""
-    small = {"material": "ceramic", "radius_mean_m": _RADIUS_M / ratio, "fraction": fine}
-    large = {**_MEAN, "fraction": 1 - fine}
-    return {"classes": {"coarse": large, "fine": small}}
+class Beds(Variation):
+    """Beds of the design with the name of their shape."""
 
-
-def media() -> Iterator[tuple[str, dict[str, Any], dict[str, Any]]]:
-    """Name, `media` and other fields of each bed."""
-    for name, shape in _SHAPES.items():
-        yield name, {**_MEAN, "shape": shape, "count": _COUNT_OF_CLUMPS}, {}
-    spheres = {**_MEAN, "count": _COUNT}
-    mass = 2656 * 4 / 3 * np.pi * _RADIUS_M**3 * _COUNT
-    for seed in (1, 2):
-        for spread in (0.0, 0.1, 0.2):
-            yield "sphere", {**spheres, "radius_std_m": spread * _RADIUS_M}, {"seed": seed}
-        for ratio in (1.5, 2.0):
-            yield "sphere", {**_classes(ratio, 0.3), "mass_kg": mass}, {"seed": seed}
-        for friction in (0.1, 0.7):
-            fields = {"pairs.ceramic-ceramic.friction": friction, "seed": seed}
-            yield "sphere", dict(spheres), fields
-    yield "sphere", {**spheres, "count": 3 * _COUNT}, {"bowl.radius_m": 12 * _RADIUS_M}
-    yield "sphere", {**_classes(3.0, 0.3), "mass_kg": mass}, {}
+    shape: str = "sphere"
 
 
 def cases() -> Iterator[tuple[str, Case]]:
     """Shape and case of each packing."""
-    for name, media_of_case, others in media():
-        values = {"seed": 1, **others}
-        yield name, settle_case(Path("study.yaml"), {**_STUDY, "media": media_of_case}, values)
+    study, design = read_yaml(DESIGN)["study"], Design[Beds].read(DESIGN, "beds")
+    for block in (design.reference, *design.points):
+        for _, values in block.points():
+            yield block.shape, settle_case(DESIGN, study, {**design.base, **values})
 
 
 def row(shape: str, case: Case, bed: Packing) -> dict[str, Any]:
