@@ -17,12 +17,12 @@ from scipy.optimize import brentq, minimize_scalar
 from scipy.stats import chi2
 
 from dragchain.arrays import Floats
+from dragchain.calibration.drops import IMPACTS
 from dragchain.calibration.measured_impacts import Impact, Measured, pulse
 from dragchain.calibration.simulated_drops import DropRun, Drops, Emulator, Waveform
 from dragchain.statistics.estimate import CONFIDENCE
 from dragdeck.documents import Part
 from dragdeck.errors import RecordError
-from dragdeck.records.calibration import IMPACTS
 
 # --- sampling ------------------------------------------------------------------------------------
 

@@ -13,13 +13,13 @@ import numpy as np
 import pandas as pd
 
 from dragchain.arrays import Floats
+from dragchain.calibration.angle_runs import AngleSet
 from dragchain.calibration.angles import read_angle
 from dragchain.errors import TableError
 from dragchain.statistics.bed_effects import EffectsFit, fit_effects
 from dragchain.statistics.estimate import CONFIDENCE, Estimate
 from dragdeck.documents import Part
 from dragdeck.files import write_text
-from dragdeck.records.calibration import AngleSet
 from dragdeck.study.calibration import Rig
 
 GRID = 121

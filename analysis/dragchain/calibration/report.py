@@ -12,6 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from dragchain.arrays import Floats
+from dragchain.calibration.angle_runs import run_angles
+from dragchain.calibration.drops import Drop, confirmation, run_drops, sweep
 from dragchain.calibration.fit import RecordFit, calibrate
 from dragchain.calibration.friction import FrictionFile, Posterior, angle_models, write_friction
 from dragchain.calibration.measured_impacts import measure_impacts
@@ -27,22 +29,15 @@ from dragchain.calibration.simulated_drops import DropRun, Drops, read_drops
 from dragchain.figures.panels import key, legend_below, new_figure, new_panels
 from dragchain.figures.style import BLUE, COLOURS, GREY, LIGHT, ORANGE
 from dragchain.report.campaign import write_report
-from dragdeck.calibration_batches.angle_runs import run_angles
-from dragdeck.calibration_batches.restitution_drops import (
-    Drop,
-    confirmation,
-    record_file,
-    run_drops,
-    settings,
-    sweep,
-)
 from dragdeck.cases.case import Case
 from dragdeck.decks.templates import environment
 from dragdeck.engine.batch import Batch
 from dragdeck.engine.reports import say
 from dragdeck.physics.contact_mechanics import fall_time
 from dragdeck.project import find_project, study_templates
+from dragdeck.study.calibration import measurements
 from dragdeck.study.force_record import Record, read_record
+from dragdeck.study.recorded import recorded_file
 
 # --- figures -------------------------------------------------------------------------------------
 
@@ -160,7 +155,8 @@ def calibrate_study(study: str, fidelity: str | None, out_dir: Path, cores: int)
     project = find_project(Path.cwd())
     case = project.cases(study, fidelity)[0]
     templates = environment(project.templates, study_templates(case))
-    measured, drops, angles, words = settings(case), None, None, []
+    measured = measurements(case.study.calibration, case.file)
+    drops, angles, words = None, None, []
     if measured.record is not None:
         drops = calibrate_restitution(case, out_dir, templates)
         words.append(_put_restitution(write_calibration(drops.fit, out_dir)))
@@ -188,7 +184,8 @@ def calibrate_restitution(case: Case, folder: Path, templates: jinja2.Environmen
         batch = Batch(folder / name, templates)
         return read_drops(run_drops(case, list(drops), batch, say), batch.folder)
 
-    record, study = read_record(record_file(case)), case.study
+    study, name = case.study, measurements(case.study.calibration, case.file).record or ""
+    record = read_record(recorded_file(name, case.file, "calibration.record"))
     fall_s = fall_time(study.drop_test.height_m, study.gravity_m_s2)
     measured = measure_impacts(record, fall_time_s=fall_s)
     fit = calibrate(measured, simulated("sweep", sweep(study)))

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 import pandas as pd
 
+from dragchain.calibration.drops import DropTest, Settings
 from dragchain.calibration.fit import Fit, RecordFit
 from dragchain.calibration.measured_impacts import Measured
 from dragchain.calibration.simulated_drops import Drops, Emulator
@@ -16,7 +17,6 @@ from dragchain.errors import TableError
 from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate
 from dragdeck.documents import Document, Part
 from dragdeck.files import write_text
-from dragdeck.records.calibration import DropTest, Settings
 
 SweepPurpose = Literal["production", "reference"]
 PURPOSES: tuple[SweepPurpose, ...] = ("production", "reference")

@@ -13,11 +13,11 @@ from numpy.polynomial.polynomial import polyfit, polyval
 from scipy.optimize import brentq
 
 from dragchain.arrays import Floats
+from dragchain.calibration.drops import IMPACTS, DropSet, DropTest, Purpose, SimulatedDrop
 from dragchain.errors import TableError
 from dragchain.run.run_parts import iter_prints
 from dragchain.tables.impacts import speed_at_plate
 from dragdeck.decks.outputs import load_outputs
-from dragdeck.records.calibration import IMPACTS, DropOfList, DropSet, DropTest, Purpose
 from dragdeck.records.case import load_case
 
 _SAMPLES = ("step", "time_s", "z_m", "vz_m_s", "force_n")
@@ -54,7 +54,7 @@ class DropRun:
 
     Attributes
     ----------
-    drop : DropOfList
+    drop : SimulatedDrop
         What it simulates.
     speeds_m_s : (K + 1,) ndarray
         Speed at the plate's surface before the first impact and after each.
@@ -62,7 +62,7 @@ class DropRun:
         K of them.
     """
 
-    drop: DropOfList
+    drop: SimulatedDrop
     speeds_m_s: Floats
     impacts: tuple[Waveform, ...]
 
@@ -121,7 +121,7 @@ def read_drops(known: DropSet, folder: Path) -> Drops:
     return Drops(known, tuple(_read_drop(folder / drop.folder, drop) for drop in known.drops))
 
 
-def _read_drop(folder: Path, drop: DropOfList) -> DropRun:
+def _read_drop(folder: Path, drop: SimulatedDrop) -> DropRun:
     case = load_case(folder)
     blocks = iter_prints(folder, load_outputs(folder)["impacts"])
     rows = pd.concat([pd.DataFrame({name: block[name] for name in _SAMPLES}) for block in blocks])

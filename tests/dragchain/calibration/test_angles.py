@@ -8,11 +8,11 @@ import pandas as pd
 import pytest
 
 from dragchain.arrays import Floats
+from dragchain.calibration.angle_runs import AngleSet
 from dragchain.calibration.angles import drum_angle, exposed, heap_angle
 from dragchain.calibration.friction import AngleModel, Posterior, find_friction
 from dragchain.calibration.report import write_calibration_report
 from dragchain.errors import TableError
-from dragdeck.records.calibration import AngleSet
 from dragdeck.study.calibration import Rig
 
 R = 0.003

@@ -6,22 +6,20 @@ import pytest
 from made_study import Made
 from make_record import Sensor, synthetic_record
 
-from dragchain.calibration.fit import calibrate
-from dragchain.calibration.measured_impacts import measure_impacts
-from dragchain.calibration.report import FittedRecord, write_calibration_report
-from dragchain.calibration.results import confirmed, write_calibration
-from dragchain.calibration.simulated_drops import Drops, read_drops
-from dragdeck.calibration_batches.restitution_drops import (
+from dragchain.calibration.drops import (
     Drop,
     confirmation,
     drop_case,
     full,
     production,
-    record_file,
     run_drops,
-    settings,
     sweep,
 )
+from dragchain.calibration.fit import calibrate
+from dragchain.calibration.measured_impacts import measure_impacts
+from dragchain.calibration.report import FittedRecord, write_calibration_report
+from dragchain.calibration.results import confirmed, write_calibration
+from dragchain.calibration.simulated_drops import Drops, read_drops
 from dragdeck.cases.case import Case
 from dragdeck.decks.templates import environment
 from dragdeck.engine.batch import Batch
@@ -30,6 +28,7 @@ from dragdeck.errors import InputError
 from dragdeck.physics.contact_mechanics import hertz_contact_time, rayleigh_time
 from dragdeck.project import Project
 from dragdeck.scenes.drop_test import DROP_TEST, DropFidelity, drop_scene
+from dragdeck.study.calibration import measurements
 from dragdeck.study.force_record import read_record
 
 
@@ -100,13 +99,9 @@ def test_a_calibration_does_not_rename_any_run(case: Case, measured_case: Case) 
     assert DROP_TEST.run_id(case) == DROP_TEST.run_id(measured_case)
 
 
-def test_a_study_without_a_record_is_told_so(case: Case, measured_case: Case) -> None:
+def test_a_study_without_a_record_is_told_so(case: Case) -> None:
     with pytest.raises(InputError, match="has no measured drop test and no measured angle"):
-        settings(case)
-    with pytest.raises(InputError, match="the record of the drop test does not exist"):
-        record_file(measured_case)
-    (measured_case.file.parent / "record.csv").write_text("")
-    assert record_file(measured_case).name == "record.csv"
+        measurements(case.study.calibration, case.file)
 
 
 # --- the real engine -------------------------------------------------------------------------
