@@ -27,6 +27,21 @@ COMMANDS = (
         Argument("--map", type=Path, required=True, dest="points", metavar="FILE",
                  help="map.yaml, the points of the stability map; required"),
         CORES)),
+    Command("costs", "time what each omitted option would cost",
+            "Time what each option that input scripts omit would cost. Run it on a machine that "
+            "does nothing else.", "costs:measure_costs", (
+        STUDY, FIDELITY,
+        Argument("--rounds", type=int, default=3, metavar="N",
+                 help="number of runs of each option; default: 3"),
+        Argument("--seconds", type=float, default=0.5, metavar="S",
+                 help="process time of the drag; default: 0.5"),
+        Argument("--only", nargs="+", default=[], metavar="NAME", help="time only these options"),
+        Argument("--out", type=Path, required=True, metavar="FILE", help="costs.json; required")),
+        "python -m evidence costs uhlmann2015 --out results/costs.json"),
+    Command("solid-fraction", "fill bowls and measure the solid fraction of the beds",
+            "Fill bowls with media of several shapes and sizes, and measure the solid fraction of "
+            "the beds. The runs are in results/solid_fraction.", "solid_fraction:measure_beds", (
+        Argument("out", type=Path, metavar="FILE", help="CSV file to write"),)),
     Command("validate", "compare the runs of a study with the publication it reproduces",
             "Compare the runs of a study with the publication it reproduces; write the report.",
             "validation.report:write_validation", (

@@ -6,7 +6,6 @@ from functools import partial
 from itertools import chain
 from pathlib import Path
 
-from dragchain.tables.write import write_tables
 from dragdeck.cases.bed import particle_material
 from dragdeck.cases.case import Case
 from dragdeck.decks import PACKING_FILE
@@ -22,6 +21,7 @@ from dragdeck.scenes.process import process_scene
 from dragdeck.scenes.scene import read_bed
 from dragdeck.study.model import Motion, Study
 from dragdeck.sweep.cases import load_cases, study_file
+from evidence.beds import settled
 from evidence.stability.measures import PointRun
 from evidence.stability.points import REGIMES, Point, Settings, bed_name, bed_settings, load_points
 from evidence.stability.scenes import ImpactSettings, LoadedPacking, column_scene, impact_scene
@@ -117,10 +117,7 @@ def _settled_bed(base: Case, name: str, settings: Settings, batch: Batch) -> Bed
     case = point_case(base, settings, _SAFE_FILLING_FRACTION)
     filling = case.study.filling.model_copy(update={"energy_ratio": _BED_ENERGY_RATIO})
     study = case.study.model_copy(update={"filling": filling})
-    batch.result(name, filling_scene(replace(case, study=study)))
-    say(f"bed settled: {name}")
-    write_tables(batch.folder / name)
-    return read_bed(batch.folder / name / "tables" / "packing.json")
+    return read_bed(settled(batch, name, filling_scene(replace(case, study=study))))
 
 
 def _scene_of(point: Point, base: Case, beds: Mapping[str, Bed]) -> AnyScene:
