@@ -7,32 +7,41 @@ from dragchain.cli import OUT_DIR, RUN_DIRS
 from dragdeck.cli import FIDELITY, STUDY
 from dragdeck.command_line import Argument, Command, Program
 
+CORES = Argument("--cores", type=int, default=1, metavar="N",
+                 help="runs at the same time; default: 1")  # fmt: skip
+
 COMMANDS = (
     Command("verify", "run the verification suite and compare it with reference solutions",
             "Run the verification suite and compare it with reference solutions.",
             "verification.report:verify", (
-        STUDY, FIDELITY, OUT_DIR,
-        Argument("--cores", type=int, default=1, metavar="N",
-                 help="runs at the same time; default: 1"))),
+        STUDY, FIDELITY, OUT_DIR, CORES)),
     Command("verdict", "print the verdict of the verification suite; fail if a quantity failed",
             "Print the verdict of the verification suite; fail if a quantity failed.",
             "verification.report:verdict", (
         Argument("report_dir", type=Path, metavar="REPORT_DIR",
                  help="folder of the report on the verification suite"),)),
-    Command("run-map", "run all points of one regime of the stability map",
-            "Run all points of one regime of the stability map.",
-            "stability.runs:stability_command", (
-        Argument("regime", metavar="REGIME",
-                 help="impact, settle, column or drag; beds: only the packings from which drags "
-                 "start"),
-        Argument("--map", type=Path, required=True, dest="points", metavar="FILE",
-                 help="map.yaml, the points of the stability map; required"))),
-    Command("report-map", "write the report on a stability map",
-            "Write the report on a stability map.",
-            "stability.report:write_stability", (
+    Command("stability", "run the points of a stability map and judge them",
+            "Run the points of a stability map and judge them; write the report.",
+            "stability.report:map_stability", (
         OUT_DIR,
-        Argument("lists", type=Path, nargs="+", metavar="POINTS",
-                 help="points/REGIME.json of each regime, made by run-map"))),
+        Argument("--map", type=Path, required=True, dest="points", metavar="FILE",
+                 help="map.yaml, the points of the stability map; required"),
+        CORES)),
+    Command("costs", "time what each omitted option would cost",
+            "Time what each option that input scripts omit would cost. Run it on a machine that "
+            "does nothing else.", "costs:measure_costs", (
+        STUDY, FIDELITY,
+        Argument("--rounds", type=int, default=3, metavar="N",
+                 help="number of runs of each option; default: 3"),
+        Argument("--seconds", type=float, default=0.5, metavar="S",
+                 help="process time of the drag; default: 0.5"),
+        Argument("--only", nargs="+", default=[], metavar="NAME", help="time only these options"),
+        Argument("--out", type=Path, required=True, metavar="FILE", help="costs.json; required")),
+        "python -m evidence costs uhlmann2015 --out results/costs.json"),
+    Command("solid-fraction", "fill bowls and measure the solid fraction of the beds",
+            "Fill bowls with media of several shapes and sizes, and measure the solid fraction of "
+            "the beds. The runs are in results/solid_fraction.", "solid_fraction:measure_beds", (
+        Argument("out", type=Path, metavar="FILE", help="CSV file to write"),)),
     Command("validate", "compare the runs of a study with the publication it reproduces",
             "Compare the runs of a study with the publication it reproduces; write the report.",
             "validation.report:write_validation", (

@@ -4,6 +4,7 @@ import math
 import sys
 from pathlib import Path
 
+from dragdeck.cli import FIDELITY, STUDY
 from dragdeck.command_line import Argument, Command, Program
 
 RUN_DIR = Argument("run_dir", type=Path, metavar="RUN_DIR",
@@ -14,10 +15,6 @@ OUT_DIR = Argument("--out", type=Path, required=True, metavar="DIR", dest="out_d
                     help="folder for the results; required")  # fmt: skip
 MADE_BY = Argument("--command", metavar="TEXT",
                     help="command that made the runs, to be recorded with the results")  # fmt: skip
-DROPS = Argument("--drops", type=Path, required=True, metavar="FILE", dest="drops_file",
-                  help="drops.json of the simulated drop tests (sweep); required")  # fmt: skip
-RECORD = Argument("record", type=Path, metavar="RECORD",
-                   help="measured drop test: CSV file of force against time")  # fmt: skip
 MEASURES = Argument("measures", type=Path, nargs="+", metavar="MEASURES",
                      help="quantities.json of each run: ./run dragchain quantities")  # fmt: skip
 
@@ -171,7 +168,7 @@ STEPS = (
             "writes points.json and search.html to results/STUDY/search, and prints unfinished, "
             "the number of the round, or complete.",
             "search.report:write_round", (
-        Argument("study", metavar="STUDY", help="name of the study"),)),
+        STUDY,)),
     Command("scaling", "fit a power law to the mean drag",
             "Fit a power law of the mean drag as a function of one field of the study. It reads "
             "the tables of the runs and writes scaling.json, .csv and .png to the folder.",
@@ -196,36 +193,14 @@ STEPS = (
                   help="study files, templates and meshes to include (default: none)"),
         Argument("--licence", metavar="TEXT",
                   help="licence of the results: SPDX name or address (default: unknown)"))),
-    Command("record", "find the impacts of a measured drop test",
-            "Find the impacts in the force record of a drop test. It reads the CSV file and writes "
-            "record.json.",
-            "calibration.results:write_record", (
-        RECORD,
-        Argument("--fall-time", type=float, required=True, metavar="S", dest="fall_time_s",
-                  help="duration of the free fall before the first impact, s; required"),
-        Argument("--out", type=Path, required=True, metavar="FILE",
-                  help="file to write: record.json; required"))),
-    Command("calibrate", "fit the restitution to a measured drop test",
-            "Fit the coefficient of restitution to a measured drop test. It reads the CSV file and "
-            "the simulated drop tests, writes result.json, impacts.csv and bias.csv to the folder, "
-            "and prints the value for the study.",
-            "calibration.results:calibrate_command", (RECORD, DROPS, OUT_DIR)),
-    Command("angles", "fit friction and rolling friction to measured angles",
-            "Fit friction and rolling friction to measured angles. It reads the simulated heaps "
-            "and drums, writes angles.json and angles.csv to the folder, and prints the values "
-            "for the study.",
-            "calibration.friction:write_friction", (
-                Argument("runs_file", type=Path, metavar="RUNS",
-                          help="runs.json, made by ./run dragdeck step angles"), OUT_DIR)),
-    Command("calibration-report", "write the report on a calibration",
-            "Write the report on a calibration. It reads the results in DIR, and writes "
-            "report.html and figures to DIR.",
-            "calibration.report:write_calibration_report", (
-                Argument("folder", type=Path, metavar="DIR", help="folder of the calibration"),
-                Argument("--record", type=Path, nargs="?", metavar="RECORD",
-                          help="measured drop test: CSV file of force against time"),
-                Argument("--angles", action="store_true",
-                          help="report on measured angles, from angles.json and angles.csv"))),
+    Command("calibrate", "fit coefficients to the measurements of a study",
+            "Run the drop tests, heaps and drums that the calibration of a study requires, fit "
+            "restitution, friction and rolling friction, and write results and report to the "
+            "folder. It prints the values for the study.",
+            "calibration.report:calibrate_study", (
+        STUDY, FIDELITY, OUT_DIR,
+        Argument("--cores", type=int, default=1, metavar="N",
+                  help="runs at the same time (default: %(default)s)"))),
 )  # fmt: skip
 """What the rules call: ``dragchain step NAME``."""
 

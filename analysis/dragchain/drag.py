@@ -161,11 +161,6 @@ def within_angle(azimuth_rad: Floats, limit_rad: float) -> Floats:
     return beyond(limit_rad - np.abs(azimuth_rad))
 
 
-def to_the_left(azimuth_rad: Floats) -> Floats:
-    """Share of each contact that lies to the left of the motion."""
-    return beyond(np.sin(azimuth_rad))
-
-
 def circumference(bins: int) -> Floats:
     """Limits of equal parts of the circumference, (bins + 1,), from -pi to pi."""
     return np.linspace(-np.pi, np.pi, bins + 1)

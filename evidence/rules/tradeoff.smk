@@ -6,7 +6,7 @@ rule measure_costs:
     input:
         WORK.templates_of("filling"),
         WORK.templates_of("process"),
-        script=WORK.files("benchmarks/costs.*"),
+        design="evidence/costs.yaml",
     output:
         WORK.of_tradeoff("costs.json"),
     threads: workflow.cores
@@ -17,9 +17,9 @@ rule measure_costs:
         fidelity=WORK.fidelity_option,
         rounds=lambda wildcards: WORK.points_of(PLAN).cost_rounds,
         cases=[scene.digest(CASES[0]) for scene in SCENES.values()],
-        source=source_hash("dragdeck.engine.batch", "dragdeck.project", "dragchain.tables.write"),
+        source=source_hash("evidence.costs"),
     shell:
-        "python benchmarks/costs.py {params.study} {params.fidelity} --rounds {params.rounds}"
+        "python -m evidence costs {params.study} {params.fidelity} --rounds {params.rounds}"
         " --out {output} 2>&1 | tee -i {log}"
 
 

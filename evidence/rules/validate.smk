@@ -15,7 +15,6 @@ rule write_validation:
             WORK.of_study("validation", ""),
             "packings.parquet",
             "effects.parquet",
-            "statements.parquet",
         ),
     params:
         command=f"./run validate --config study={STUDY} plan={VALIDATION}",

@@ -254,7 +254,7 @@ def _seen(run: PointRun, row: Row | None, fine: Row | None) -> Seen:
         state=record.state if record else "refused",
         steps=record.last_step if record else 0,
         failed=record.failed_checks if record else (),
-        refused=run.point.refused,
+        refused=run.refused,
         energy_ratio=measure.energy_ratio(row, fine) if row else None,
         overlap_ratio=row["overlap_ratio"] if row else None,
         errors=measure.errors(row, fine) if row and fine else {},

@@ -1,7 +1,7 @@
 """What is measured of a run of the map: contacts, energy, and deviations from the fine step."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -10,7 +10,6 @@ from typing import NamedTuple
 import numpy as np
 
 from dragchain.arrays import Floats, Ints
-from dragchain.errors import TableError
 from dragchain.run.case import friction_with
 from dragchain.run.kinematics import drag_phase, needed
 from dragchain.statistics.correlated import estimate_mean
@@ -22,6 +21,7 @@ from dragchain.tables.write import workpiece_force_rows
 from dragdeck.decks import CASE_FILE
 from dragdeck.decks.outputs import load_outputs
 from dragdeck.dumps.frame import Frame
+from dragdeck.engine.part import STATE_FILE
 from dragdeck.physics.contact_mechanics import (
     damping_ratio,
     fall_energy,
@@ -31,7 +31,7 @@ from dragdeck.physics.contact_mechanics import (
 )
 from dragdeck.records.case import CaseOfRun
 from dragdeck.records.run import RunRecord
-from evidence.stability.points import Point, PointsFile
+from evidence.stability.points import Point
 from evidence.stability.scenes import ImpactCase, ImpactOfRun
 
 Row = Mapping[str, float]
@@ -58,10 +58,11 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class PointRun:
-    """A point with its run."""
+    """A point with its run, or why no input script could be written for it."""
 
     point: Point
     folder: Path
+    refused: str | None = None
 
     @cached_property
     def case(self) -> CaseOfRun | None:
@@ -77,22 +78,9 @@ class PointRun:
 
     @cached_property
     def record(self) -> RunRecord | None:
-        """How the run ended; None of a point that was not run.
-
-        Raises
-        ------
-        TableError
-            The run was interrupted.
-        """
-        file = self.folder / "state.json"
-        if not file.is_file():
-            return None
-        record = RunRecord.read(file)
-        if record.state in ("running", "stopped"):
-            raise TableError(
-                f"{self.folder}: this run was interrupted; `./run stability` goes on with it"
-            )
-        return record
+        """How the run ended; None of a point that was not run."""
+        file = self.folder / STATE_FILE
+        return RunRecord.read(file) if file.is_file() else None
 
     @property
     def sticks(self) -> bool:
@@ -116,21 +104,6 @@ class PointRun:
         if self.case is None or not self.measurable:
             return None
         return Run(self.folder, self.case, load_outputs(self.folder))
-
-
-def read_points(lists: Sequence[Path]) -> list[PointRun]:
-    """The points of lists.
-
-    Raises
-    ------
-    InputError
-        A list cannot be used.
-    """
-    return [
-        PointRun(point, file.parent.parent / point.folder)
-        for file in lists
-        for point in PointsFile.read(file).points
-    ]
 
 
 # --- the critical time step of a loaded contact network ----------------------------------------

@@ -2,17 +2,16 @@
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import get_args
 
 from pydantic import TypeAdapter, ValidationError, model_validator
 
-from dragdeck.documents import Document, Part
+from dragdeck.documents import Part
 from dragdeck.scenes.scene import Regime
 from dragdeck.study.base import Number
 from dragdeck.study.check import explained
-from dragdeck.study.yaml import read_yaml
 from dragdeck.sweep.cases import Design, Variation
 from evidence.stability.scenes import Packing
 
@@ -88,8 +87,6 @@ class Point(Part):
         Time step over the Rayleigh time of the smallest particle.
     reference : bool
         Whether it is the fine-step run that the others are compared with.
-    refused : str or None
-        Why no deck could be made.
     """
 
     regime: Regime
@@ -98,7 +95,6 @@ class Point(Part):
     settings: Settings
     fraction: float
     reference: bool
-    refused: str | None = None
 
     @property
     def name(self) -> str:
@@ -123,14 +119,6 @@ class Point(Part):
             and (self.settings[name] != base.get(name) or name == self.axis)
         ]
         return ", ".join(shown) or "base point"
-
-
-class PointsFile(Document):
-    """``points/<regime>.json``: the points of a regime, once they were run."""
-
-    remedy = "run `./run stability`"
-
-    points: Sequence[Point]
 
 
 def _digest(content: Mapping[str, str | float]) -> str:
@@ -165,17 +153,13 @@ def load_points(file: Path, regime: str) -> list[Point]:
 # --- the beds that columns and drags start from ----------------------------------------------
 
 
-def bed_settings(map_file: Path) -> dict[str, Settings]:
-    """Every bed that a point of the map starts from, by its run id in ``filling/``."""
-    known = read_yaml(map_file)
-    points = [
-        point
-        for regime in ("column", "drag")
-        if regime in known
-        for point in load_points(map_file, regime)
-        if point.settings.get("packing", "bed") == "bed"
-    ]
-    return {bed_name(point.settings): _bed(point.settings) for point in points}
+def bed_settings(points: Iterable[Point]) -> dict[str, Settings]:
+    """Every bed that a column or a drag among the points starts from, by its run id."""
+    return {
+        bed_name(point.settings): _bed(point.settings)
+        for point in points
+        if point.regime in ("column", "drag") and point.settings.get("packing", "bed") == "bed"
+    }
 
 
 def bed_name(settings: Settings) -> str:

@@ -30,30 +30,40 @@ from evidence.stability.judge import (
     judge_points,
     summarise_map,
 )
-from evidence.stability.measures import read_points
+from evidence.stability.measures import PointRun
 from evidence.stability.points import REGIMES
+from evidence.stability.runs import run_map
 from evidence.stability.scenes import PHASES
 
 
-def write_stability(out_dir: Path, lists: Sequence[Path]) -> None:
-    """Write tables, figures and page of a map whose points were run.
+def map_stability(out_dir: Path, points: Path, cores: int) -> None:
+    """Run the points of a map and write tables, figures and page.
 
     Parameters
     ----------
     out_dir : Path
-        Gets ``points.csv``, ``points.parquet``, ``conditions.csv``, ``conditions.parquet``,
-        ``stability.json``, ``figures/*.png`` and ``report.html``.
-    lists : sequence of Path
-        ``points/<regime>.json``, as ``python -m evidence run-map`` wrote them.
+        Gets a folder for each regime with its runs, ``points.csv``, ``points.parquet``,
+        ``conditions.csv``, ``conditions.parquet``, ``stability.json``, ``figures/*.png`` and
+        ``report.html``.
+    points : Path
+        The map.
+    cores : int
+        Runs at the same time.
 
     Raises
     ------
-    DocumentError, DumpError
-        A list or a file of a run cannot be used.
-    TableError
-        A run was interrupted.
+    InputError
+        The map or its study cannot be used.
+    EngineError
+        No LIGGGHTS, or it was interrupted.
+    RejectedRunError
+        A bed did not come to rest.
     """
-    runs = read_points(lists)
+    write_stability(out_dir, run_map(points, out_dir, cores))
+
+
+def write_stability(out_dir: Path, runs: Sequence[PointRun]) -> None:
+    """Write tables, figures and page of a map whose points were run."""
     points, verdicts = judge_points(runs)
     found_conditions = conditions(points)
     summary = summarise_map(points, found_conditions, runs)

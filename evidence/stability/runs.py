@@ -1,11 +1,10 @@
 """The runs of a stability map: the scene of each point, in a batch for each regime."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
+from itertools import chain
 from pathlib import Path
-
-import jinja2
 
 from dragdeck.cases.bed import particle_material
 from dragdeck.cases.case import Case
@@ -13,23 +12,18 @@ from dragdeck.decks import PACKING_FILE
 from dragdeck.decks.deck import AnyScene
 from dragdeck.decks.templates import environment
 from dragdeck.engine.batch import Batch
-from dragdeck.engine.reports import Report, say
+from dragdeck.engine.reports import say
 from dragdeck.errors import InputError
 from dragdeck.physics.packing import Bed
-from dragdeck.project import find_project
+from dragdeck.project import find_project, study_templates
 from dragdeck.scenes.filling import filling_scene
 from dragdeck.scenes.process import process_scene
 from dragdeck.scenes.scene import read_bed
 from dragdeck.study.model import Motion, Study
-from dragdeck.sweep.cases import load_cases
-from evidence.stability.points import (
-    Point,
-    PointsFile,
-    Settings,
-    bed_name,
-    bed_settings,
-    load_points,
-)
+from dragdeck.sweep.cases import load_cases, study_file
+from evidence.beds import settled
+from evidence.stability.measures import PointRun
+from evidence.stability.points import REGIMES, Point, Settings, bed_name, bed_settings, load_points
 from evidence.stability.scenes import ImpactSettings, LoadedPacking, column_scene, impact_scene
 
 _BED_ENERGY_RATIO = 1e-4
@@ -82,74 +76,51 @@ def _motion(study: Study, speed: float) -> Motion:
     return motion.model_copy(update={"transient_m": _TRANSIENT_FRACTION * length})
 
 
-@dataclass(frozen=True)
-class MapRuns:
-    """Runs the points of a map, and the beds that they start from.
+def run_map(map_file: Path, folder: Path, cores: int) -> list[PointRun]:
+    """Run the points of a map in folders of their regimes, after the beds that they start from.
 
-    Runs of the same inputs are not repeated; one that was interrupted is gone on with.
+    Runs of the same inputs are not repeated; one that was interrupted is gone on with. A point
+    that fails is a finding.
 
-    Attributes
-    ----------
-    base : Case
-        Of the map's study.
-    results : Path
-        Gets ``<regime>/<point>/``, ``filling/<bed>/`` and ``points/<regime>.json``.
-    templates : jinja2.Environment
-    report : callable
-        Gets lines.
+    Raises
+    ------
+    InputError
+        The map or its study cannot be used.
+    EngineError
+        No LIGGGHTS, or it was interrupted.
+    RejectedRunError
+        A bed did not come to rest.
     """
-
-    base: Case
-    results: Path
-    templates: jinja2.Environment
-    report: Report
-
-    def settle_beds(self, map_file: Path) -> None:
-        """Settle the beds with a small step.
-
-        Raises
-        ------
-        EngineError
-            No LIGGGHTS, or it was interrupted.
-        RejectedRunError
-            A bed did not come to rest.
-        """
-        batch = Batch(self.results / "filling", self.templates)
-        for name, settings in bed_settings(map_file).items():
-            case = point_case(self.base, settings, _SAFE_FILLING_FRACTION)
-            filling = case.study.filling.model_copy(update={"energy_ratio": _BED_ENERGY_RATIO})
-            study = case.study.model_copy(update={"filling": filling})
-            batch.result(name, filling_scene(replace(case, study=study)))
-            self.report(f"bed settled: {name}")
-
-    def run_points(self, map_file: Path, regime: str) -> Path:
-        """Run all points of a regime; the list of them. A run that fails is a finding.
-
-        Raises
-        ------
-        InputError
-            The map cannot be used, or a bed is not there yet.
-        EngineError
-            No LIGGGHTS, or it was interrupted.
-        """
-        points = load_points(map_file, regime)
-        batch = Batch(self.results / regime, self.templates)
-        refused = batch.each({point.name: self._scene(point) for point in points}, self.report)
-        rows = [point.model_copy(update={"refused": refused.get(point.name)}) for point in points]
-        file = self.results / "points" / f"{regime}.json"
-        PointsFile(points=rows).write(file)
-        return file
-
-    def _scene(self, point: Point) -> Callable[[], AnyScene]:
-        """What makes the scene of a point; the bed of a drag has to be there before."""
-        bed = None
-        if point.regime == "drag":
-            folder = self.results / "filling" / bed_name(point.settings)
-            bed = read_bed(folder / "tables" / "packing.json")
-        return partial(_scene_of, point, self.base, bed)
+    project = find_project(Path.cwd())
+    (base,) = load_cases(study_file(project.studies, "stability"))
+    templates = environment(project.templates, study_templates(base))
+    points = {regime: load_points(map_file, regime) for regime in REGIMES}
+    starts = bed_settings(chain.from_iterable(points.values()))
+    beds = {
+        name: _settled_bed(base, name, settings, Batch(folder / "filling", templates))
+        for name, settings in starts.items()
+    }
+    runs = []
+    for regime, of_regime in points.items():
+        batch = Batch(folder / regime, templates)
+        scenes = {point.name: partial(_scene_of, point, base, beds) for point in of_regime}
+        refused = batch.each(scenes, say, cores)
+        runs += [
+            PointRun(point, batch.folder / point.name, refused.get(point.name))
+            for point in of_regime
+        ]
+    return runs
 
 
-def _scene_of(point: Point, base: Case, bed: Bed | None) -> AnyScene:
+def _settled_bed(base: Case, name: str, settings: Settings, batch: Batch) -> Bed:
+    """A bed, settled with a small step."""
+    case = point_case(base, settings, _SAFE_FILLING_FRACTION)
+    filling = case.study.filling.model_copy(update={"energy_ratio": _BED_ENERGY_RATIO})
+    study = case.study.model_copy(update={"filling": filling})
+    return read_bed(settled(batch, name, filling_scene(replace(case, study=study))))
+
+
+def _scene_of(point: Point, base: Case, beds: Mapping[str, Bed]) -> AnyScene:
     case, source = point_case(base, point.settings, point.fraction), bed_name(point.settings)
     if point.regime == "impact":
         how = ImpactSettings(*map(point.number, ("speed_m_s", "angle_deg", "size_ratio")))
@@ -159,29 +130,6 @@ def _scene_of(point: Point, base: Case, bed: Bed | None) -> AnyScene:
     if point.regime == "column":
         load = LoadedPacking.model_validate({"packing": "bed", **point.settings})
         return column_scene(case, point.name, load, point.fraction, source)
-    scene = process_scene(case, bed)
+    scene = process_scene(case, beds[source])
     deck = replace(scene.deck, source=f"../../filling/{source}/{PACKING_FILE}")
     return replace(scene, deck=deck)
-
-
-def map_runs(study_file: Path, results: Path, templates: Path, report: Report) -> MapRuns:
-    """The runs of the map of a study.
-
-    Raises
-    ------
-    InputError
-        The study cannot be used.
-    """
-    (base,) = load_cases(study_file)
-    return MapRuns(base, results, environment(templates, study_file.parent / "templates"), report)
-
-
-def stability_command(regime: str, points: Path) -> None:
-    """Run one regime of the map, or settle its beds."""
-    project = find_project(Path.cwd())
-    study = project.studies / "stability" / "study.yaml"
-    runs = map_runs(study, project.results("stability"), project.templates, say)
-    if regime == "beds":
-        runs.settle_beds(points)
-    else:
-        runs.run_points(points, regime)

@@ -10,21 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from dragchain.drag import drag_peaks, read_counted
-from dragchain.figures.panels import (
-    band,
-    compass,
-    compass_bars,
-    depth_bars,
-    legend_below,
-    new_figure,
-    new_panels,
-    row,
-    row_names,
-)
+from dragchain.figures.panels import legend_below, new_panels, row, row_names
 from dragchain.figures.style import BLUE, COLOURS, GREY
 from dragchain.report.campaign import write_report
 from dragchain.run.kinematics import drag_start_s
-from dragchain.statistics.estimate import Estimate, EstimateColumns
+from dragchain.statistics.estimate import Estimate
 from dragdeck.documents import Document
 from evidence.validation.force import (
     Compared,
@@ -38,14 +28,6 @@ from evidence.validation.force import (
     setting_effects,
 )
 from evidence.validation.runs import MeasuredRun, RunsByBed, read_validation_runs
-from evidence.validation.statements import (
-    Claim,
-    PackingProfile,
-    Statements,
-    claim_table,
-    claims,
-    of_packings,
-)
 
 
 class Validation(Document):
@@ -59,8 +41,6 @@ class Validation(Document):
     force: Force
     comparison: tuple[Compared, ...]
     load: LoadingOverPackings
-    statements: Statements
-    claims: tuple[Claim, ...]
     effects: tuple[Effect, ...]
 
 
@@ -105,7 +85,7 @@ def write_validation(out_dir: Path, run_dirs: Sequence[Path], command: str) -> N
 def validation_of(runs: RunsByBed, command: str) -> Validation:
     """All numbers of the page."""
     first = runs.packings[0]
-    force, statements = force_of_packings(runs.packings), of_packings(runs.packings)
+    force = force_of_packings(runs.packings)
     return Validation(
         study=first.case.study,
         command=command,
@@ -115,49 +95,24 @@ def validation_of(runs: RunsByBed, command: str) -> Validation:
         force=force,
         comparison=compare_drag(force.together["drag_n"], first.case),
         load=load_of_packings(runs.packings),
-        statements=statements,
-        claims=claims(statements),
         effects=tuple(setting_effects(runs)),
     )
 
 
 def _tables(validation: Validation) -> dict[str, pd.DataFrame]:
     """The numbers of the page as tables, by name."""
-    force, statements = validation.force, validation.statements
-    network = statements.network
     compared = [
         row.model_dump(exclude={"std_ratio"} if row.std_ratio is None else None)
         for row in validation.comparison
     ]
     return {
-        "packings": pd.json_normalize([row.model_dump() for row in force.packings], sep="_"),
+        "packings": pd.json_normalize(
+            [row.model_dump() for row in validation.force.packings], sep="_"
+        ),
         "effects": effect_table(validation.effects),
         "load": pd.DataFrame([dict(row) for row in validation.load.rows]),
         "comparison": pd.json_normalize(compared, sep="_"),
-        "statements": claim_table(validation.claims),
-        "corridor": pd.DataFrame(
-            {
-                **_bins(network.edges_diameters, "diameters"),
-                **_side("ahead", network.ahead_n),
-                **_side("behind", network.behind_n),
-            }
-        ),
-        "around": _profile(statements.azimuth, "rad"),
-        "depth": _profile(statements.depth, "m"),
     }
-
-
-def _bins(edges: Sequence[float], unit: str) -> dict[str, Sequence[float]]:
-    return {f"from_{unit}": edges[:-1], f"to_{unit}": edges[1:]}
-
-
-def _side(side: str, columns: EstimateColumns) -> dict[str, Sequence[float]]:
-    return {f"{side}_{name}_n": values for name, values in vars(columns).items()}
-
-
-def _profile(profile: PackingProfile, unit: str) -> pd.DataFrame:
-    values = profile.model_dump(exclude={"edges"})
-    return pd.DataFrame({**_bins(profile.edges, unit), **values})
 
 
 # --- figures -----------------------------------------------------------------------------------
@@ -168,8 +123,6 @@ def _draw(runs: RunsByBed, validation: Validation) -> dict[str, Figure]:
     return {
         "comparison": _comparison(validation.force, validation.comparison, validation.effects),
         "traces": _traces(runs.packings, validation.comparison),
-        "around": _around(validation.statements),
-        "corridor": _corridor(validation.statements),
     }
 
 
@@ -246,38 +199,4 @@ def _rows(rows: Sequence[_Row], label: str) -> Figure:
         row(axes, place, estimate.value, estimate, colour)
     row_names(axes, [name for name, *_ in rows])
     axes.set(xlabel=label)
-    return figure
-
-
-def _around(statements: Statements) -> Figure:
-    """Normal force on the workpiece by azimuth, and that of a contact by depth."""
-    figure = new_figure(3.9)
-    left, right = compass(figure, 1, 2, 1), figure.add_subplot(1, 2, 2)
-    edges = statements.azimuth.edges
-    compass_bars(left, edges, statements.azimuth.columns, 100.0, "%")
-    depth_bars(right, statements.depth.edges, statements.depth.columns)
-    right.set(xlabel="mean normal force per contact (N)", ylabel="depth (mm)")
-    right.set_title("bars: 95 % CI over packings")
-    return figure
-
-
-def _corridor(statements: Statements) -> Figure:
-    """Mean contact force of the network ahead of the workpiece and behind it."""
-    network, far = statements.network, statements.numbers["far_n"]
-    figure, (axes,) = new_panels(3.2)
-    edges = np.array(network.edges_diameters)
-    middle = (edges[1:] + edges[:-1]) / 2
-    sides = (("ahead", network.ahead_n), ("behind", network.behind_n))
-    for name, side in sides:
-        colour = COLOURS[name]
-        band(axes, middle, side, colour)
-        axes.plot(middle, side.value, "o-", color=colour, label=name)
-    wall = network.wall_diameters
-    if far is not None:
-        axes.axhline(far.value, color="black", linestyle="--", label="far field")
-    axes.axvline(wall, color=GREY, linewidth=2.0)
-    axes.text(wall, 0.0, " bowl wall", color=GREY, va="bottom")
-    axes.set(ylabel="mean normal force\nper contact (N)", xlim=(0, wall + 0.5), ylim=(0, None))
-    axes.set_xlabel("distance from the workpiece's surface (particle diameters)")
-    axes.legend()
     return figure

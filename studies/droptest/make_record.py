@@ -10,14 +10,14 @@ from pathlib import Path
 
 import numpy as np
 
+from dragchain.calibration.drops import IMPACTS, Drop, full, run_drops
 from dragchain.calibration.simulated_drops import DropRun, read_drops
-from dragdeck.calibration_batches.restitution_drops import Drop, full, run_drops, settings
 from dragdeck.cases.case import Case
 from dragdeck.decks.templates import environment
 from dragdeck.engine.batch import Batch
 from dragdeck.engine.reports import say
 from dragdeck.project import find_project, study_templates
-from dragdeck.records.calibration import IMPACTS
+from dragdeck.study.calibration import measurements
 from dragdeck.study.force_record import Record, check_samples
 
 LEAD_S, TAIL_S = 0.02, 0.01
@@ -72,8 +72,9 @@ def record_of(run: DropRun, sensor: Sensor, random: np.random.Generator) -> Reco
 def drop_of(case: Case, seed: int) -> Drop:
     """A drop with a seeded restitution and a seeded height, as if it had been set by hand."""
     random, study = np.random.default_rng(seed), case.study
+    measured = measurements(study.calibration, case.file)
     value = round(float(random.uniform(*RESTITUTIONS)), 4)
-    height = study.drop_test.height_m + float(random.normal(0.0, settings(case).height_std_m))
+    height = study.drop_test.height_m + float(random.normal(0.0, measured.height_std_m))
     option = study.contact.limit_force
     return Drop("drop", "reference", value, option, height, full(study, STEP_FRACTION))
 
@@ -118,7 +119,7 @@ def main() -> None:
     case = project.cases("droptest")[0]
     batch = Batch(options.folder, environment(project.templates, study_templates(case)))
     drops = run_drops(case, [drop_of(case, options.seed)], batch, say)
-    text = synthetic_record(read_drops(drops).runs[0], sensor, options.seed)
+    text = synthetic_record(read_drops(drops, batch.folder).runs[0], sensor, options.seed)
     options.out.write_text(text, encoding="utf-8")
 
 

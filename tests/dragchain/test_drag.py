@@ -4,14 +4,7 @@ import numpy as np
 import pytest
 
 from dragchain import SeriesError, load_case
-from dragchain.drag import (
-    circumference,
-    find_drag_peaks,
-    parts,
-    peak_separation_s,
-    to_the_left,
-    within_angle,
-)
+from dragchain.drag import circumference, find_drag_peaks, parts, peak_separation_s, within_angle
 
 
 def test_peaks_of_the_resistance_are_minima_of_the_drag() -> None:
@@ -66,7 +59,6 @@ def test_a_contact_on_a_limit_counts_half_on_either_side(noise: float) -> None:
     azimuth = EDGES[1:] + noise
     assert within_angle(azimuth, np.pi / 2).sum() == pytest.approx(12.0)
     assert within_angle(azimuth, np.pi / 4).sum() == pytest.approx(6.0)
-    assert to_the_left(azimuth).sum() == pytest.approx(12.0)
     halves = np.concatenate(parts(azimuth, 24))
     assert np.bincount(halves, minlength=24).tolist() == [2] * 24
 
@@ -74,7 +66,6 @@ def test_a_contact_on_a_limit_counts_half_on_either_side(noise: float) -> None:
 def test_a_contact_off_the_limits_is_whole() -> None:
     azimuth = np.array([0.1, -0.1, 1.7, -3.0])
     assert within_angle(azimuth, np.pi / 2).tolist() == [1.0, 1.0, 0.0, 0.0]
-    assert to_the_left(azimuth).tolist() == [1.0, 0.0, 1.0, 0.0]
     lower, upper = parts(azimuth, 4)
     assert lower.tolist() == upper.tolist() == [2, 1, 3, 0]
 

@@ -6,8 +6,8 @@ from typing import Literal
 
 import numpy as np
 
+from dragchain.calibration.drops import DropTest, Purpose, SimulatedDrop
 from dragchain.calibration.simulated_drops import DropRun, Drops, Waveform
-from dragdeck.records.calibration import DropOfList, DropTest, Purpose
 
 G, HEIGHT = 9.81, 0.010
 FALL_S = math.sqrt(2 * HEIGHT / G)
@@ -43,7 +43,7 @@ def paper_drop(
         impacts.append(Waveform(time, force, down, down + contact_s, middle, peak))
         down += contact_s + 2 * float(after) / G
     modulus = 1.0 if purpose != "production" else 0.01
-    drop = DropOfList(
+    drop = SimulatedDrop(
         folder="",
         purpose=purpose,
         restitution=deck,

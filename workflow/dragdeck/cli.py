@@ -149,22 +149,6 @@ STEPS = (
     Command("set-up", "draw the set-up of a study for its report",
             "Draw the first case of a study obliquely from above, to results/STUDY/set_up.png.",
             "commands:draw_set_up", (STUDY, FIDELITY)),
-    Command("drops", "run the drop tests of a calibration",
-            "Run the drop tests that the calibration of the restitution requires, and write "
-            "drops.json to the folder.",
-            "commands:drops_command", (
-                STUDY, FIDELITY, OUT_DIR,
-                Argument("set", choices=("sweep", "confirm"),
-                          help="sweep: a range of restitutions; confirm: the fitted one"),
-                Argument("--fit", type=Path, metavar="FILE",
-                          help="result.json of the fit; required for confirm"))),
-    Command("angles", "simulate the measured angles of a calibration",
-            "Simulate the heaps and drums that the calibration of friction and rolling friction "
-            "requires, and write runs.json to the folder.",
-            "commands:angles_command", (
-                STUDY, FIDELITY, OUT_DIR,
-                Argument("--cores", type=int, default=1, metavar="N",
-                          help="runs at the same time (default: %(default)s)"))),
 )  # fmt: skip
 """What the rules call: ``dragdeck step NAME``."""
 

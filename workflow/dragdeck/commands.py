@@ -17,8 +17,6 @@ from rich.table import Table
 
 from dragdeck.advice.advise import advised_settings
 from dragdeck.advice.forecast import advice_file, advice_tables, advised_case, question
-from dragdeck.calibration_batches.angle_runs import run_angles
-from dragdeck.calibration_batches.restitution_drops import confirmation, run_drops, sweep
 from dragdeck.cases.bed import clump_of
 from dragdeck.cases.case import Case
 from dragdeck.cases.ranks import check_ranks, cores_here
@@ -34,7 +32,6 @@ from dragdeck.decks.render import (
     write_workpiece,
 )
 from dragdeck.decks.templates import environment
-from dragdeck.engine.batch import Batch
 from dragdeck.engine.process import LAUNCHER_VARIABLE, find_engine
 from dragdeck.engine.reports import say
 from dragdeck.engine.space import check_amount
@@ -64,7 +61,6 @@ from dragdeck.project import (
     study_templates,
 )
 from dragdeck.records.advice import AdviceFile
-from dragdeck.records.calibration import FitFile
 from dragdeck.records.run import changed_in_words
 from dragdeck.records.tradeoff import TradeoffRecord, measured_tradeoff, tradeoff_if_measured
 from dragdeck.scenes.lead import with_leads
@@ -504,35 +500,3 @@ def _bed(kind: SceneType, packing: Path | None) -> Bed | None:
             remedy="give the packing.json that ./run dragchain tables made of the filling",
         )
     return read_bed(packing)
-
-
-def drops_command(study: str, fidelity: str | None, out: Path, set: str, fit: Path | None) -> None:
-    """Run one set of drop tests.
-
-    Raises
-    ------
-    InputError
-        A confirmation without a fit.
-    """
-    project = find_project(Path.cwd())
-    case = project.cases(study, fidelity)[0]
-    if set == "sweep":
-        drops = list(sweep(case.study))
-    elif fit is not None:
-        fitted = FitFile.read(fit)
-        drops = list(confirmation(case.study, fitted.fit.restitution, fitted.fit_full.restitution))
-    else:
-        raise InputError(
-            "the result of the fit is missing",
-            field="--fit",
-            remedy="give the path of its result.json",
-        )
-    batch = Batch(out, environment(project.templates, study_templates(case)))
-    run_drops(case, drops, batch, say)
-
-
-def angles_command(study: str, fidelity: str | None, out: Path, cores: int) -> None:
-    """Simulate the measured angles of a study."""
-    project = find_project(Path.cwd())
-    case = project.cases(study, fidelity)[0]
-    run_angles(case, Batch(out, environment(project.templates, study_templates(case))), say, cores)

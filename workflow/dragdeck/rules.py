@@ -18,7 +18,6 @@ from uuid import uuid4
 from jsonschema import Draft202012Validator
 from snakemake_interface_common.exceptions import WorkflowError
 
-from dragdeck.calibration_batches.restitution_drops import record_file
 from dragdeck.cases.case import Case, digest
 from dragdeck.decks import RUN_FILE
 from dragdeck.decks.templates import environment, template_files
@@ -26,7 +25,6 @@ from dragdeck.engine.process import find_engine
 from dragdeck.errors import DragdeckError, EngineError, InputError, choices
 from dragdeck.files import file_checksum, write_text
 from dragdeck.outlook.runs import StudyRun, expected_runs
-from dragdeck.physics.contact_mechanics import fall_time
 from dragdeck.project import (
     OUTCOMES,
     PLACES,
@@ -43,6 +41,7 @@ from dragdeck.records.run import RunRecord
 from dragdeck.scenes.lead import FIRST_WINDOWS, windows_of, with_lead, with_leads
 from dragdeck.scenes.process import SCENES
 from dragdeck.study.base import Json
+from dragdeck.study.calibration import measurements
 from dragdeck.study.recorded import recorded_file
 
 RECORD = {place: "outcome.json" if place in OUTCOMES else "run.json" for place in PLACES}
@@ -313,8 +312,11 @@ class Workflow:
 
     def drop_record(self, _: object = None) -> str | list[str]:
         """The measured drop test of the study; nothing if it has measured angles only."""
-        there = self.if_measured("record", "") or not self.if_measured("angles", "")
-        return self.relative(or_stop(record_file, self.cases[0])) if there else []
+        case = self.cases[0]
+        record = or_stop(measurements, case.study.calibration, case.file).record
+        if record is None:
+            return []
+        return self.relative(or_stop(recorded_file, record, case.file, "calibration.record"))
 
     @property
     def whole_study(self) -> str:
@@ -455,11 +457,6 @@ class Workflow:
         """How to name the advice on the command line, if there is or will be one."""
         known = self.needed_advice or (self.project.root / self.advice).is_file()
         return f"--advice {self.advice}" if known else ""
-
-    def fall_time_s(self, _: object = None) -> float:
-        """Free fall before the first impact of the drop test, s."""
-        study = self.cases[0].study
-        return fall_time(study.drop_test.height_m, study.gravity_m_s2)
 
     def licence_option(self, _: object = None) -> str:
         """How to name the licence of the results on the command line, if the study states one."""

@@ -12,9 +12,9 @@ from dragchain.run.run_parts import iter_frames
 from dragchain.statistics.correlated import estimate_mean
 from dragdeck.decks.outputs import load_outputs
 from dragdeck.dumps.frame import Frame
-from dragdeck.records.calibration import AngleRun
 from dragdeck.records.case import CaseOfRun
 from dragdeck.records.run import read_accepted
+from dragdeck.scenes.angles import AngleRun
 
 _SECTORS = 8
 """Sectors of a heap; the scatter of its angle is that without one of them."""

@@ -10,7 +10,6 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -18,12 +17,12 @@ from scipy.optimize import brentq, minimize_scalar
 from scipy.stats import chi2
 
 from dragchain.arrays import Floats
-from dragchain.calibration.measured_impacts import Impact, Measured, measure_impacts, pulse
+from dragchain.calibration.drops import IMPACTS
+from dragchain.calibration.measured_impacts import Impact, Measured, pulse
 from dragchain.calibration.simulated_drops import DropRun, Drops, Emulator, Waveform
 from dragchain.statistics.estimate import CONFIDENCE
+from dragdeck.documents import Part
 from dragdeck.errors import RecordError
-from dragdeck.records.calibration import IMPACTS, Fit
-from dragdeck.study.force_record import read_record
 
 # --- sampling ------------------------------------------------------------------------------------
 
@@ -217,6 +216,39 @@ class Misfit:
         return float(left @ left + ((scale - 1.0) / self._spread) ** 2)
 
 
+class Fit(Part):
+    """The fitted coefficient of restitution for the input script.
+
+    Attributes
+    ----------
+    restitution, ci95_low, ci95_high : float
+        Best value and its 95 % interval.
+    height_m : float
+        Drop height that fits best, m.
+    chi2 : float
+        Weighted sum of squares at the best value.
+    degrees : int
+        Degrees of freedom; 0: the fit cannot be tested.
+    p_value : float or None
+        Probability of a larger `chi2` if the model is right.
+    inflation : float
+        Factor by which the interval is widened if the residuals exceed their uncertainties:
+        sqrt(chi2 / degrees), at least 1.
+    residuals : tuple of float
+        (Measured - simulated) / standard uncertainty.
+    """
+
+    restitution: float
+    ci95_low: float
+    ci95_high: float
+    height_m: float
+    chi2: float
+    degrees: int
+    p_value: float | None
+    inflation: float
+    residuals: tuple[float, ...]
+
+
 def fit(misfit: Misfit) -> Fit:
     """The deck value with the least misfit, and its interval by profile likelihood.
 
@@ -297,12 +329,6 @@ class RecordFit:
     def with_peaks(self) -> bool:
         """Whether the peaks are compared."""
         return len(self.observed.log_peaks) > 0
-
-
-def calibrate_file(record: Path, drops: Drops) -> RecordFit:
-    """Fit the restitution to the CSV of a record."""
-    measured = measure_impacts(read_record(record), fall_time_s=drops.known.fall_time_s)
-    return calibrate(measured, drops)
 
 
 def calibrate(measured: Measured, drops: Drops) -> RecordFit:

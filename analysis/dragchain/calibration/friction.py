@@ -13,13 +13,13 @@ import numpy as np
 import pandas as pd
 
 from dragchain.arrays import Floats
+from dragchain.calibration.angle_runs import AngleSet
 from dragchain.calibration.angles import read_angle
 from dragchain.errors import TableError
 from dragchain.statistics.bed_effects import EffectsFit, fit_effects
 from dragchain.statistics.estimate import CONFIDENCE, Estimate
 from dragdeck.documents import Part
 from dragdeck.files import write_text
-from dragdeck.records.calibration import AnglesFile
 from dragdeck.study.calibration import Rig
 
 GRID = 121
@@ -95,7 +95,7 @@ class Coefficients(Part):
     narrowed: tuple[float, float]
 
 
-class FrictionFile(AnglesFile):
+class FrictionFile(AngleSet):
     """The content of ``angles.json``; docs/evidence/calibration.md explains it.
 
     Attributes
@@ -178,7 +178,7 @@ class Posterior:
         )
 
 
-def angle_models(known: AnglesFile, runs: pd.DataFrame) -> dict[Rig, AngleModel]:
+def angle_models(known: AngleSet, runs: pd.DataFrame) -> dict[Rig, AngleModel]:
     """The angle of each measurement as a function of the coefficients, from ``angles.csv``."""
     ranges, models = np.array([known.friction, known.rolling_friction]), {}
     for name in known.measured:
@@ -188,7 +188,7 @@ def angle_models(known: AnglesFile, runs: pd.DataFrame) -> dict[Rig, AngleModel]
     return models
 
 
-def find_friction(known: AnglesFile, runs: pd.DataFrame) -> FrictionFile:
+def find_friction(known: AngleSet, runs: pd.DataFrame) -> FrictionFile:
     """What the measured angles of a study say of the coefficients.
 
     Raises
@@ -209,25 +209,18 @@ def find_friction(known: AnglesFile, runs: pd.DataFrame) -> FrictionFile:
     )
 
 
-def write_friction(runs_file: Path, out_dir: Path) -> str:
-    """Read simulated angles, write ``angles.json`` and ``angles.csv``; what to put into the study.
+def write_friction(
+    known: AngleSet, folder: Path, out_dir: Path
+) -> tuple[FrictionFile, pd.DataFrame]:
+    """Read the simulated angles in a folder, and write ``angles.json`` and ``angles.csv``.
 
     Raises
     ------
     DragdeckError
         A run cannot be used, or there are too few.
     """
-    known = AnglesFile.read(runs_file)
-    runs = pd.DataFrame([read_angle(runs_file.parent / name) for name in known.runs])
+    runs = pd.DataFrame([read_angle(folder / name) for name in known.runs])
     result = find_friction(known, runs)
     write_text(out_dir / "angles.csv", runs.to_csv(index=False, lineterminator="\n"))
     result.write(out_dir / "angles.json")
-    last, (friction, rolling) = [*result.found.values()][-1], result.best
-    ends = [
-        f"{coefficient.ci95_low:.3g} to {coefficient.ci95_high:.3g}"
-        for coefficient in (last.friction, last.rolling_friction)
-    ]
-    return (
-        f"set pairs.{known.pair}.friction: {friction:.3g}, rolling_friction: {rolling:.3g}\n"
-        f"  95 % CI {ends[0]} and {ends[1]}, correlation {last.correlation:.2f}"
-    )
+    return result, runs

@@ -11,9 +11,9 @@ from pydantic.json_schema import SkipJsonSchema
 from scipy.signal import find_peaks, peak_widths
 
 from dragchain.arrays import Floats
+from dragchain.calibration.drops import IMPACTS
 from dragdeck.documents import Document, Part
 from dragdeck.errors import RecordError
-from dragdeck.records.calibration import IMPACTS
 from dragdeck.study.force_record import Note, Record, quiet_line
 
 _QUIET_SAMPLES = 20

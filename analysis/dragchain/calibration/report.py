@@ -1,23 +1,43 @@
-"""The report on a calibration: a figure and one self-contained page."""
+"""The command that calibrates a study: runs, fits, figures and one self-contained page."""
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import jinja2
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from dragchain.arrays import Floats
-from dragchain.calibration.fit import RecordFit, calibrate_file
-from dragchain.calibration.friction import FrictionFile, Posterior, angle_models
-from dragchain.calibration.results import bias_table, confirmed, impact_table, result
+from dragchain.calibration.angle_runs import run_angles
+from dragchain.calibration.drops import Drop, confirmation, run_drops, sweep
+from dragchain.calibration.fit import RecordFit, calibrate
+from dragchain.calibration.friction import FrictionFile, Posterior, angle_models, write_friction
+from dragchain.calibration.measured_impacts import measure_impacts
+from dragchain.calibration.results import (
+    CalibrationFile,
+    bias_table,
+    confirmed,
+    impact_table,
+    result,
+    write_calibration,
+)
 from dragchain.calibration.simulated_drops import DropRun, Drops, read_drops
 from dragchain.figures.panels import key, legend_below, new_figure, new_panels
 from dragchain.figures.style import BLUE, COLOURS, GREY, LIGHT, ORANGE
 from dragchain.report.campaign import write_report
+from dragdeck.cases.case import Case
+from dragdeck.decks.templates import environment
+from dragdeck.engine.batch import Batch
+from dragdeck.engine.reports import say
+from dragdeck.physics.contact_mechanics import fall_time
+from dragdeck.project import find_project, study_templates
+from dragdeck.study.calibration import measurements
 from dragdeck.study.force_record import Record, read_record
+from dragdeck.study.recorded import recorded_file
 
 # --- figures -------------------------------------------------------------------------------------
 
@@ -116,54 +136,123 @@ def draw_angles(friction: FrictionFile, runs: pd.DataFrame) -> Figure:
 # --- report --------------------------------------------------------------------------------------
 
 
-def write_calibration_report(folder: Path, record: Path | None, angles: bool = False) -> None:
+def calibrate_study(study: str, fidelity: str | None, out_dir: Path, cores: int) -> str:
+    """Run what a study's measurements are compared with, fit them and write the report.
+
+    Runs of the same inputs are not repeated; one that was interrupted is gone on with. A record
+    that cannot be used is refused before any run.
+
+    Returns
+    -------
+    str
+        What to put into the study.
+
+    Raises
+    ------
+    DragdeckError
+        A measurement or a run cannot be used.
+    """
+    project = find_project(Path.cwd())
+    case = project.cases(study, fidelity)[0]
+    templates = environment(project.templates, study_templates(case))
+    measured = measurements(case.study.calibration, case.file)
+    drops, angles, words = None, None, []
+    if measured.record is not None:
+        drops = calibrate_restitution(case, out_dir, templates)
+        words.append(_put_restitution(write_calibration(drops.fit, out_dir)))
+    if measured.angles is not None:
+        batch = Batch(out_dir / "angles", templates)
+        angles = write_friction(run_angles(case, batch, say, cores), batch.folder, out_dir)
+        words.append(_put_friction(angles[0]))
+    write_calibration_report(out_dir, drops, angles)
+    return "\n".join(words)
+
+
+@dataclass(frozen=True)
+class FittedRecord:
+    """The record of a drop test, its fit, and drops at the fitted value."""
+
+    record: Record
+    fit: RecordFit
+    confirm: Drops
+
+
+def calibrate_restitution(case: Case, folder: Path, templates: jinja2.Environment) -> FittedRecord:
+    """Run the drops that a record is compared with, in ``sweep/`` and ``confirm/``, and fit it."""
+
+    def simulated(name: str, drops: Iterable[Drop]) -> Drops:
+        batch = Batch(folder / name, templates)
+        return read_drops(run_drops(case, list(drops), batch, say), batch.folder)
+
+    study, name = case.study, measurements(case.study.calibration, case.file).record or ""
+    record = read_record(recorded_file(name, case.file, "calibration.record"))
+    fall_s = fall_time(study.drop_test.height_m, study.gravity_m_s2)
+    measured = measure_impacts(record, fall_time_s=fall_s)
+    fit = calibrate(measured, simulated("sweep", sweep(study)))
+    values = fit.fit.restitution, fit.fit_reference.restitution
+    return FittedRecord(record, fit, simulated("confirm", confirmation(study, *values)))
+
+
+def _put_restitution(result: CalibrationFile) -> str:
+    return (
+        f"set pairs.{result.known.pair}.restitution: {result.put.value:g}\n"
+        f"  95 % CI {result.fit.ci95_low:.4f} to {result.fit.ci95_high:.4f}\n"
+        f"  effective restitution {result.effective:.4f}; measured {result.measured.value:.4f}"
+    )
+
+
+def _put_friction(result: FrictionFile) -> str:
+    last, (friction, rolling) = [*result.found.values()][-1], result.best
+    ends = [
+        f"{coefficient.ci95_low:.3g} to {coefficient.ci95_high:.3g}"
+        for coefficient in (last.friction, last.rolling_friction)
+    ]
+    return (
+        f"set pairs.{result.pair}.friction: {friction:.3g}, rolling_friction: {rolling:.3g}\n"
+        f"  95 % CI {ends[0]} and {ends[1]}, correlation {last.correlation:.2f}"
+    )
+
+
+def write_calibration_report(
+    folder: Path, drops: FittedRecord | None, angles: tuple[FrictionFile, pd.DataFrame] | None
+) -> None:
     """Draw the figures and write ``report.html`` of a calibration.
 
     Parameters
     ----------
     folder : Path
-        With ``sweep/drops.json`` and ``confirm/drops.json`` of a drop test, and ``angles.json``
-        and ``angles.csv`` of measured angles.
-    record : Path, optional
-        The CSV of a measured drop test.
-    angles : bool
-        Whether angles were measured.
-
-    Raises
-    ------
-    DragdeckError
-        A file is missing, or the record cannot be used.
+    drops : FittedRecord, optional
+        Of a measured drop test.
+    angles : (FrictionFile, DataFrame), optional
+        What measured angles say, and the simulated ones.
     """
-    figures, drops, friction = dict[str, Figure](), None, None
-    if record:
-        sweep, confirm = (read_drops(folder / name / "drops.json") for name in ("sweep", "confirm"))
-        fit = calibrate_file(record, sweep)
-        drops = _of_drops(fit, sweep, confirm)
-    if angles:
-        friction = FrictionFile.read(folder / "angles.json")
 
     def draw() -> Mapping[str, Figure]:
-        if record:
-            figures["impacts"] = draw_impacts(read_record(record), fit, confirm)
-        if friction:
-            figures["angles"] = draw_angles(friction, pd.read_csv(folder / "angles.csv"))
+        figures = dict[str, Figure]()
+        if drops:
+            figures["impacts"] = draw_impacts(drops.record, drops.fit, drops.confirm)
+        if angles:
+            figures["angles"] = draw_angles(*angles)
         return figures
 
     template = "calibration/calibration.html.j2"
-    write_report(folder, template, draw=draw, friction=friction, drops=drops)
+    friction = angles[0] if angles else None
+    write_report(
+        folder, template, draw=draw, friction=friction, drops=_of_drops(drops) if drops else None
+    )
 
 
-def _of_drops(fit: RecordFit, sweep: Drops, confirm: Drops) -> Mapping[str, object]:
+def _of_drops(drops: FittedRecord) -> Mapping[str, object]:
     """What the page shows of a drop test."""
-    observed = fit.observed
+    fit, observed = drops.fit, drops.fit.observed
     names = [f"time of impact {k + 2}" for k in range(len(observed.times_s))]
     names += [f"peak {k + 2} / peak 1" for k in range(len(observed.log_peaks))]
     return {
         "result": result(fit),
         "impacts": impact_table(fit).to_dict("records"),
         "residuals": list(zip(names, fit.fit.residuals, strict=True)),
-        "bias": _by_deck_value(bias_table(sweep)),
-        "confirm": confirmed(confirm),
+        "bias": _by_deck_value(bias_table(fit.drops)),
+        "confirm": confirmed(drops.confirm),
     }
 
 

@@ -9,15 +9,14 @@ from typing import Literal
 import numpy as np
 import pandas as pd
 
-from dragchain.calibration.fit import RecordFit, calibrate_file
-from dragchain.calibration.measured_impacts import Measured, measure_impacts
-from dragchain.calibration.simulated_drops import Drops, Emulator, read_drops
+from dragchain.calibration.drops import DropTest, Settings
+from dragchain.calibration.fit import Fit, RecordFit
+from dragchain.calibration.measured_impacts import Measured
+from dragchain.calibration.simulated_drops import Drops, Emulator
 from dragchain.errors import TableError
 from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate
-from dragdeck.documents import Part
+from dragdeck.documents import Document, Part
 from dragdeck.files import write_text
-from dragdeck.records.calibration import DropTest, Fit, FitFile, Settings
-from dragdeck.study.force_record import read_record
 
 SweepPurpose = Literal["production", "reference"]
 PURPOSES: tuple[SweepPurpose, ...] = ("production", "reference")
@@ -80,11 +79,13 @@ class PutFor(Part):
     ci95_high: float | None
 
 
-class CalibrationFile(FitFile):
+class CalibrationFile(Document):
     """The content of ``result.json``; docs/evidence/calibration.md explains it.
 
     Attributes
     ----------
+    fit, fit_full : Fit
+        At the production settings, and at the physical modulus.
     measured : Estimate
         Measured coefficient of restitution.
     effective : float
@@ -109,6 +110,10 @@ class CalibrationFile(FitFile):
         Impacts of the measured record.
     """
 
+    remedy = "make it with: ./run calibrate"
+
+    fit: Fit
+    fit_full: Fit
     known: DropTest
     put: Put
     measured: Estimate
@@ -122,35 +127,8 @@ class CalibrationFile(FitFile):
     record: Measured
 
 
-def write_record(record: Path, fall_time_s: float, out: Path) -> None:
-    """Read a record, find its impacts and write ``record.json``.
-
-    Raises
-    ------
-    RecordError
-        The record cannot be used.
-    """
-    measure_impacts(read_record(record), fall_time_s=fall_time_s).write(out)
-
-
-def write_calibration(record: Path, drops_file: Path, out: Path) -> CalibrationFile:
-    """Fit a record and write ``result.json``, ``impacts.csv`` and ``bias.csv``.
-
-    Parameters
-    ----------
-    record : Path
-        The CSV.
-    drops_file : Path
-        ``drops.json`` of the sweep.
-    out : Path
-        Their folder.
-
-    Raises
-    ------
-    DragdeckError
-        The record or the sweep cannot be used.
-    """
-    fit = calibrate_file(record, read_drops(drops_file))
+def write_calibration(fit: RecordFit, out: Path) -> CalibrationFile:
+    """Write ``result.json``, ``impacts.csv`` and ``bias.csv`` of a fit."""
     content = result(fit)
     for name, table in (("bias", bias_table(fit.drops)), ("impacts", impact_table(fit))):
         text = table.to_csv(index=False, float_format="%.9g", lineterminator="\n")
@@ -309,13 +287,3 @@ def confirmed(drops: Drops) -> Confirmed:
     std = float(rebound.std(ddof=1))
     restitution, mean = runs[0].drop.restitution, float(rebound.mean())
     return Confirmed(restitution, len(runs), mean, std / math.sqrt(len(runs)), std)
-
-
-def calibrate_command(record: Path, drops_file: Path, out_dir: Path) -> str:
-    """Fit a drop test as the command line asks for; what to put into the study."""
-    result = write_calibration(record, drops_file, out_dir)
-    return (
-        f"set pairs.{result.known.pair}.restitution: {result.put.value:g}\n"
-        f"  95 % CI {result.fit.ci95_low:.4f} to {result.fit.ci95_high:.4f}\n"
-        f"  effective restitution {result.effective:.4f}; measured {result.measured.value:.4f}"
-    )

@@ -13,11 +13,11 @@ from numpy.polynomial.polynomial import polyfit, polyval
 from scipy.optimize import brentq
 
 from dragchain.arrays import Floats
+from dragchain.calibration.drops import IMPACTS, DropSet, DropTest, Purpose, SimulatedDrop
 from dragchain.errors import TableError
 from dragchain.run.run_parts import iter_prints
 from dragchain.tables.impacts import speed_at_plate
 from dragdeck.decks.outputs import load_outputs
-from dragdeck.records.calibration import IMPACTS, DropOfList, DropsFile, DropTest, Purpose
 from dragdeck.records.case import load_case
 
 _SAMPLES = ("step", "time_s", "z_m", "vz_m_s", "force_n")
@@ -54,15 +54,15 @@ class DropRun:
 
     Attributes
     ----------
-    drop : DropOfList
-        As it is listed.
+    drop : SimulatedDrop
+        What it simulates.
     speeds_m_s : (K + 1,) ndarray
         Speed at the plate's surface before the first impact and after each.
     impacts : tuple of Waveform
         K of them.
     """
 
-    drop: DropOfList
+    drop: SimulatedDrop
     speeds_m_s: Floats
     impacts: tuple[Waveform, ...]
 
@@ -79,7 +79,7 @@ class DropRun:
 
 @dataclass(frozen=True)
 class Drops:
-    """The drops of a folder and what ``drops.json`` says of the study."""
+    """Drops, and the drop test of the study."""
 
     known: DropTest
     runs: tuple[DropRun, ...]
@@ -108,25 +108,20 @@ class Drops:
         return self.emulator("reference", self.known.limit_force)
 
 
-def read_drops(file: Path) -> Drops:
-    """Read the drops that a ``drops.json`` lists.
+def read_drops(known: DropSet, folder: Path) -> Drops:
+    """Read drops that were run in a folder.
 
     Raises
     ------
     TableError
-        A drop is not complete, or has too few impacts.
-    DocumentError, DumpError
-        The list cannot be used, or as from the readers of a run.
+        A drop has too few impacts.
+    DumpError
+        As from the readers of a run.
     """
-    listed = DropsFile.read(file)
-    return Drops(
-        listed, tuple(_read_drop(file.parent / drop.folder, drop) for drop in listed.drops)
-    )
+    return Drops(known, tuple(_read_drop(folder / drop.folder, drop) for drop in known.drops))
 
 
-def _read_drop(folder: Path, drop: DropOfList) -> DropRun:
-    if not (folder / "run.json").is_file():
-        raise TableError(f"{folder}: this drop is not complete; run `./run calibrate` again")
+def _read_drop(folder: Path, drop: SimulatedDrop) -> DropRun:
     case = load_case(folder)
     blocks = iter_prints(folder, load_outputs(folder)["impacts"])
     rows = pd.concat([pd.DataFrame({name: block[name] for name in _SAMPLES}) for block in blocks])

@@ -109,25 +109,16 @@ def as_compass(axes: Any) -> Any:
     return axes
 
 
-def compass_bars(
-    axes: Any,
-    edges_rad: Sequence[float],
-    columns: EstimateColumns,
-    unit: float = 1.0,
-    symbol: str = "N",
-) -> None:
-    """Draw mean normal forces by azimuth with their intervals; ahead and behind differ in colour.
-
-    The radial axis is in so many `unit`, of this symbol, per bin.
-    """
-    edges, (value, reach) = np.array(edges_rad), _with_reach(columns, unit)
+def compass_bars(axes: Any, edges_rad: Sequence[float], columns: EstimateColumns) -> None:
+    """Draw mean normal forces by azimuth with intervals; ahead and behind differ in colour."""
+    edges, (value, reach) = np.array(edges_rad), _with_reach(columns, 1.0)
     middle = (edges[:-1] + edges[1:]) / 2
     colours = np.where(np.abs(middle) < np.pi / 2, COLOURS["ahead"], COLOURS["behind"])
     axes.bar(middle, value, np.diff(edges), color=colours, edgecolor="white", linewidth=0.6)
     reach[0] = np.minimum(reach[0], value)
     axes.errorbar(middle, value, reach, fmt="none", ecolor="black", elinewidth=0.8)
     axes.set_rmin(0.0)
-    axes.set_xlabel(f"mean normal force ({symbol} per {np.degrees(edges[1] - edges[0]):.0f}°)")
+    axes.set_xlabel(f"mean normal force (N per {np.degrees(edges[1] - edges[0]):.0f}°)")
 
 
 def row(axes: Axes, place: float, value: float, interval: _Interval, colour: str) -> None:

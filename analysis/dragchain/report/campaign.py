@@ -1,10 +1,11 @@
 """The shape of every campaign, and the report that each ends with.
 
-Trade-off, stability map, verification, validation, scalings and costs are campaigns:
+Trade-off, stability map, verification, validation, calibration, scalings and costs are campaigns:
 
 1. **A design of runs**, in YAML: `dragdeck.sweep.cases`.
 2. **Runs.** Those of a study are jobs of their own (``workflow/rules/runs.smk``); many short ones
-   are a batch in one job (`dragdeck.engine.batch.Batch.each`), and one that fails is a finding.
+   are a batch (`dragdeck.engine.batch.Batch.each`), which the same command judges and reports on.
+   One that fails is a finding.
 3. **Measures:** a function that makes of a finished run one row, whose uncertain numbers are of
    type `dragchain.statistics.estimate.Estimate`.
 4. **A judgement:** rows against a reference become a `Document`, whose verdicts come from whole

@@ -8,11 +8,11 @@ import pandas as pd
 import pytest
 
 from dragchain.arrays import Floats
+from dragchain.calibration.angle_runs import AngleSet
 from dragchain.calibration.angles import drum_angle, exposed, heap_angle
 from dragchain.calibration.friction import AngleModel, Posterior, find_friction
 from dragchain.calibration.report import write_calibration_report
 from dragchain.errors import TableError
-from dragdeck.records.calibration import AnglesFile
 from dragdeck.study.calibration import Rig
 
 R = 0.003
@@ -131,15 +131,13 @@ def test_the_report_states_the_most_likely_pair(tmp_path: Path) -> None:
         rows += [(rig, *pair, angle) for pair, angle in zip(design(), angles, strict=True)]
     runs = pd.DataFrame(rows, columns=["rig", "friction", "rolling_friction", "angle_deg"])
     measured = {rig: (float(law(rig, truth)[0]), 0.1) for rig in _PARTS}
-    known = AnglesFile(
+    known = AngleSet(
         study="s", title="t", pair="a-a", friction=RANGES[0], rolling_friction=RANGES[1],
         measured=measured, runs=("x",),
     )  # fmt: skip
     found = find_friction(known, runs)
     assert found.best == pytest.approx((0.4, 0.1), rel=0.25)
-    found.write(tmp_path / "angles.json")
-    runs.to_csv(tmp_path / "angles.csv", index=False)
-    write_calibration_report(tmp_path, None, angles=True)
+    write_calibration_report(tmp_path, None, (found, runs))
     page = (tmp_path / "report.html").read_text()
     assert f"friction: {found.best[0]:.3g}, rolling_friction: {found.best[1]:.3g}" in page
     assert "standard uncertainties" not in page  # no warning

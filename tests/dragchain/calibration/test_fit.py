@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from make_record import Sensor, record_of
 from paper_drops import BIAS, FALL_S, HEIGHT, G, paper_drop, paper_drops, rebound
 
+from dragchain.calibration.drops import Purpose
 from dragchain.calibration.fit import WIDTH_LIMIT, calibrate, observe, sample_impacts
 from dragchain.calibration.measured_impacts import Measured, measure_impacts
 from dragchain.calibration.results import bias_table, read_off, result
@@ -16,7 +17,6 @@ from dragchain.calibration.simulated_drops import Drops, emulate, waveform
 from dragchain.errors import TableError
 from dragchain.statistics.estimate import Estimate
 from dragdeck.errors import RecordError
-from dragdeck.records.calibration import Purpose
 
 
 @pytest.fixture(scope="module")

@@ -2,18 +2,16 @@
 
 import json
 from pathlib import Path
-from typing import Any
 
 import pytest
 from made_run import run_json
 from paths import ROOT
 
-from dragchain.errors import TableError
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
 from dragdeck.scenes.filling import filling_scene
 from dragdeck.sweep.cases import load_cases
-from evidence.stability.measures import PointRun, read_points
+from evidence.stability.measures import PointRun
 from evidence.stability.points import REGIMES, load_points
 from evidence.stability.runs import point_case
 from evidence.stability.scenes import ImpactSettings, impact_scene
@@ -97,27 +95,7 @@ def test_impacts_begin_at_different_moments_of_a_step(base: Case) -> None:
     assert phases == pytest.approx([(n + 0.5) / 16 for n in range(16)], abs=1e-6)
 
 
-# --- lists of points, and the runs that they name ----------------------------------------------
-
-SETTINGS = {"youngs_modulus_pa": 77e6, "restitution": 0.86, "friction": 0.34}
-
-
-def listed(root: Path, **changes: Any) -> Path:
-    """A list of one point."""
-    row = {
-        "regime": "settle",
-        "axis": "base",
-        "condition": "c",
-        "settings": SETTINGS,
-        "fraction": 0.4,
-        "reference": True,
-        "refused": None,
-        **changes,
-    }
-    file = root / "points" / "settle.json"
-    file.parent.mkdir(exist_ok=True)
-    file.write_text(json.dumps({"schema": 2, "points": [row]}))
-    return file
+# --- how the runs of points end ------------------------------------------------------------------
 
 
 def ended(run: PointRun, state: str, *failed: str) -> PointRun:
@@ -131,16 +109,9 @@ def ended(run: PointRun, state: str, *failed: str) -> PointRun:
     return PointRun(run.point, run.folder)
 
 
-def test_a_list_that_cannot_be_used_is_named_with_its_field(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"(?s)settle\.json.*points\[0\]\.regime"):
-        read_points([listed(tmp_path, regime="bounce")])
-
-
 def test_a_run_counts_if_it_ended(tmp_path: Path) -> None:
-    (run,) = read_points([listed(tmp_path)])
+    run = PointRun(load_points(MAP, "settle")[0], tmp_path)
     assert run.record is None and not run.measurable
     assert ended(run, "complete").measurable
     assert ended(run, "failed", "stable_timestep").measurable
     assert not ended(run, "failed", "stable_timestep", "at_rest").measurable
-    with pytest.raises(TableError, match="interrupted"):
-        _ = ended(run, "stopped").record

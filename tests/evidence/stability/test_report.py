@@ -1,5 +1,6 @@
 """A coarse map on the real engine."""
 
+import contextlib
 import json
 import math
 import shutil
@@ -10,7 +11,6 @@ import pytest
 from pages import stands_alone
 from paths import DATA, ROOT
 
-from dragchain.cli import main as dragchain
 from dragdeck.records.stability import StabilityFile
 from evidence.__main__ import main as evidence
 from evidence.stability.judge import (
@@ -21,10 +21,17 @@ from evidence.stability.judge import (
     UNSTABLE,
     restitution_errors,
 )
-from evidence.stability.points import bed_settings
-from evidence.stability.runs import map_runs
 
 pytestmark = [pytest.mark.engine, pytest.mark.slow]
+
+
+def run_coarse_map(results: Path) -> None:
+    """Run the coarse map in a project and judge it."""
+    map_file = str(DATA / "coarse_map.yaml")
+    with contextlib.chdir(results.parent.parent):
+        assert (
+            evidence(["stability", "--map", map_file, "--out", str(results), "--cores", "2"]) == 0
+        )
 
 
 @pytest.fixture(scope="module")
@@ -35,15 +42,7 @@ def coarse(tmp_path_factory: pytest.TempPathFactory) -> Path:
     study.mkdir(parents=True)
     shutil.copy(ROOT / "studies" / "stability" / "study.yaml", study)
     results = root / "results" / "stability"
-    runs = map_runs(study / "study.yaml", results, ROOT / "templates", lambda line: None)
-    points = DATA / "coarse_map.yaml"
-    runs.settle_beds(points)
-    for bed in bed_settings(points):
-        assert dragchain(["tables", str(results / "filling" / bed)]) == 0
-    kept = [
-        str(runs.run_points(points, regime)) for regime in ("impact", "settle", "column", "drag")
-    ]
-    assert evidence(["report-map", "--out", str(results), *kept]) == 0
+    run_coarse_map(results)
     return results
 
 
@@ -103,9 +102,7 @@ def test_the_report_stands_alone(coarse: Path) -> None:
 
 def test_points_that_were_run_are_not_run_again(coarse: Path) -> None:
     before = {file: file.stat().st_mtime_ns for file in coarse.glob("impact/*/state.json")}
-    study = coarse.parent.parent / "studies" / "stability" / "study.yaml"
-    tests = DATA / "coarse_map.yaml"
-    map_runs(study, coarse, ROOT / "templates", lambda line: None).run_points(tests, "impact")
+    run_coarse_map(coarse)
     after = {file: file.stat().st_mtime_ns for file in coarse.glob("impact/*/state.json")}
     failed_too = any(json.loads(file.read_text())["state"] == "failed" for file in after)
     assert failed_too

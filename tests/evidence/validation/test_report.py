@@ -19,7 +19,6 @@ from dragdeck.study.reference import Drag, Reference
 from evidence.validation import force
 from evidence.validation.force import effect_table, setting_effects
 from evidence.validation.runs import MeasuredRun, RunsByBed, packing_mean
-from evidence.validation.statements import Corridor, contacts_of, relative_places
 
 RATE_HZ = 1000.0
 DIAMETER_M = 2 * 8.76e-3
@@ -159,78 +158,3 @@ def test_a_shorter_run_counts_less(runs: RunsByBed) -> None:
 
     whole = runs.packings[0].measures.arc_m
     assert half_width(whole / 4.0) > 1.4 * half_width(whole)
-
-
-# --- statements --------------------------------------------------------------------------------
-
-
-def with_contacts(runs: RunsByBed, seed: int = 0) -> list[MeasuredRun]:
-    """Contacts on the workpiece: three ahead for one behind, force 1 N/m times the depth more."""
-    rng = np.random.default_rng(seed)
-    for point in runs.packings:
-        workpiece = point.case.workpiece
-        assert workpiece is not None
-        ahead = rng.uniform(-np.pi / 2, np.pi / 2, 3000)
-        behind = rng.uniform(np.pi / 2, np.pi, 1000) * rng.choice([-1.0, 1.0], 1000)
-        depth = rng.uniform(0.0, workpiece.immersion_depth_m, 4000)
-        table = pd.DataFrame(
-            {
-                "azimuth_rad": np.concatenate([ahead, behind]),
-                "depth_m": depth,
-                "normal_force_n": 1.0 + depth,
-                "in_statistics": True,
-            }
-        )
-        table.to_parquet(point.folder / "tables" / "workpiece_contacts.parquet")
-    return runs.packings
-
-
-def test_contacts_around_the_workpiece(runs: RunsByBed) -> None:
-    rows = [contacts_of(point) for point in with_contacts(runs)]
-    assert [row.numbers["ahead_behind"] for row in rows] == pytest.approx([3.0] * 4, rel=0.01)
-    assert [row.numbers["depth_slope_n_per_m"] for row in rows] == pytest.approx([1.0] * 4)
-    assert rows[0].azimuth.sum() == pytest.approx(1.0)
-    assert rows[0].numbers["front_fraction"] == pytest.approx(0.375, abs=0.03)
-    assert rows[0].numbers["front_over_flank"] == pytest.approx(1.0, abs=0.1)
-
-
-def test_silent_contacts_do_not_count(runs: RunsByBed) -> None:
-    (point, *_) = with_contacts(runs)
-    file = point.folder / "tables" / "workpiece_contacts.parquet"
-    before = contacts_of(point)
-    table = pd.read_parquet(file)
-    silent = table.assign(normal_force_n=0.0, azimuth_rad=0.0)
-    pd.concat([table, silent]).to_parquet(file)
-    after = contacts_of(point)
-    assert after.numbers == before.numbers
-    assert np.array_equal(after.azimuth, before.azimuth)
-    assert np.array_equal(after.depth, before.depth)
-
-
-def test_the_corridor_is_along_the_motion(tmp_path: Path) -> None:
-    contacts = pd.DataFrame(
-        {
-            "point_x_m": [0.0, 0.0, 0.03],
-            "point_y_m": [0.03, -0.02, 0.0],
-            "ref_x_m": 0.0,
-            "ref_y_m": 0.02,
-            "direction_rad": np.pi / 2,
-        }
-    )
-    along, across, turned = relative_places(contacts)
-    assert along == pytest.approx([0.01, -0.04, -0.02])
-    assert across == pytest.approx([0.0, 0.0, -0.03])
-    assert np.abs(turned) == pytest.approx([0.0, np.pi, np.pi / 2])
-
-
-def test_the_reach_lies_where_half_of_the_excess_is_left() -> None:
-    corridor = Corridor(
-        edges=np.arange(0.0, 3.0, 0.5),
-        ahead=np.array([3.0, 2.5, 1.5, 1.0, 1.0]),
-        behind=np.ones(5),
-        far=1.0,
-        wall=2.5,
-    )
-    assert corridor.half_reach == pytest.approx(1.0)  # 2 N is half of the excess
-    flat = dataclasses.replace(corridor, ahead=np.full(5, 3.0))
-    assert flat.half_reach is None

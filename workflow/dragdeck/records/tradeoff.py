@@ -144,7 +144,7 @@ class CostEntry(Part):
 class CostsFile(Document):
     """What is read of ``costs.json``."""
 
-    remedy = "make it with: python benchmarks/costs.py"
+    remedy = "make it with: python -m evidence costs"
 
     fidelity: Fidelity | None = None
     costs: tuple[CostEntry, ...]

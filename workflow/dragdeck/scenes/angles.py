@@ -21,6 +21,7 @@ from dragdeck.cases.bed import (
 from dragdeck.cases.case import Case
 from dragdeck.decks import outputs
 from dragdeck.decks.deck import Body, Deck, Scene, data_file
+from dragdeck.documents import Part
 from dragdeck.errors import InputError
 from dragdeck.mesh.files import stl_text
 from dragdeck.mesh.shapes import tube
@@ -29,10 +30,9 @@ from dragdeck.physics.contact_mechanics import ENGINE_SOFTEST_PA, fall_time
 from dragdeck.physics.estimates import SOLID_FRACTION_ESTIMATE
 from dragdeck.physics.packing import pour
 from dragdeck.physics.rounding import rounded
-from dragdeck.records.calibration import AngleRun
 from dragdeck.records.case import CaseOfRun
 from dragdeck.scenes.scene import case_of_study, material_table
-from dragdeck.study.calibration import Drum, Repose
+from dragdeck.study.calibration import Drum, Repose, Rig
 from dragdeck.study.media import Array
 from dragdeck.study.model import Fidelity, Study
 
@@ -51,6 +51,32 @@ _TRANSIENT, _REVOLUTIONS, _FRAMES = 0.4, 1.1, 120
 
 _FLATTEST = math.tan(math.radians(13))
 """Slope of a heap that the glued layer still carries as a whole."""
+
+
+class AngleRun(Part):
+    """What a heap or drum is simulated with: ``inputs`` of its ``case.json``.
+
+    Attributes
+    ----------
+    rig : str
+        ``repose`` or ``drum``.
+    friction, rolling_friction : float
+        Between particles.
+    glued : int
+        Particles of the glued layer, which have the first ids.
+    drum_radius_m : float
+        0 for a heap.
+    counted_from : int
+        First step at which a drum's angle is read.
+    """
+
+    rig: Rig
+    friction: float
+    rolling_friction: float
+    seed: int
+    glued: int = 0
+    drum_radius_m: float = 0.0
+    counted_from: int = 0
 
 
 @dataclass(frozen=True, kw_only=True)

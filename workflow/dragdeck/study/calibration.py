@@ -2,10 +2,12 @@
 
 import math
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from dragdeck.errors import InputError
 from dragdeck.physics.estimates import SOLID_FRACTION_ESTIMATE
 from dragdeck.study.base import Line, Model, Number, Positive, Whole
 
@@ -143,3 +145,21 @@ class Calibration(Model):
         if self.record is None and self.angles is None:
             raise ValueError("give record, angles or both")
         return self
+
+
+def measurements(calibration: Calibration | None, file: Path) -> Calibration:
+    """The measurements of a study.
+
+    Raises
+    ------
+    InputError
+        It has none.
+    """
+    if calibration is None:
+        raise InputError(
+            "the study has no measured drop test and no measured angle",
+            file=file,
+            field="calibration",
+            remedy="add calibration: {record: FILE.csv}, see docs/howto/calibration.md",
+        )
+    return calibration

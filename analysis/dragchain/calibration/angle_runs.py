@@ -1,15 +1,16 @@
 """The heaps and drums that a calibration of friction and rolling friction needs."""
 
+from collections.abc import Mapping
 from functools import partial
 
 from dragdeck.cases.case import Case
 from dragdeck.decks import RUN_FILE
+from dragdeck.documents import Document
 from dragdeck.engine.batch import Batch
 from dragdeck.engine.reports import Report
 from dragdeck.errors import InputError
-from dragdeck.records.calibration import AngleRun, AnglesFile
-from dragdeck.scenes.angles import angle_scene
-from dragdeck.study.calibration import Angles
+from dragdeck.scenes.angles import AngleRun, angle_scene
+from dragdeck.study.calibration import Angles, Rig
 
 _POINTS, _REPEATED, _OTHER_SEED = 20, 4, 1000
 """Pairs of coefficients; every so many are simulated again, with another seed."""
@@ -18,6 +19,32 @@ _STEPS = (0.7548776662466927, 0.5698402909980532)
 """Inverses of the plastic number and of its square: the fractional parts of their multiples fill a
 square evenly, however many there are (Roberts 2018, The unreasonable effectiveness of
 quasirandom sequences)."""
+
+
+class AngleSet(Document):
+    """The measured angles of a study, and the runs that they are compared with.
+
+    Attributes
+    ----------
+    pair : str
+        The particles' material with itself.
+    friction, rolling_friction : (float, float)
+        Ranges in which the coefficients are looked for.
+    measured : mapping
+        Measured angle and its standard uncertainty, degrees, by ``repose`` and ``drum``.
+    runs : tuple of str
+        Names of their folders; a run that failed is absent.
+    """
+
+    remedy = "make it with: ./run calibrate"
+
+    study: str
+    title: str
+    pair: str
+    friction: tuple[float, float]
+    rolling_friction: tuple[float, float]
+    measured: Mapping[Rig, tuple[float, float]]
+    runs: tuple[str, ...]
 
 
 def angle_runs(angles: Angles) -> dict[str, AngleRun]:
@@ -41,14 +68,14 @@ def angle_runs(angles: Angles) -> dict[str, AngleRun]:
     return scenes
 
 
-def run_angles(case: Case, batch: Batch, report: Report, cores: int = 1) -> None:
-    """Simulate all measurements, each run in a folder of its own, and list them in ``runs.json``.
+def run_angles(case: Case, batch: Batch, report: Report, cores: int = 1) -> AngleSet:
+    """Simulate all measurements, each run in a folder of its own.
 
     Parameters
     ----------
     case : Case
     batch : Batch
-        Its folder gets a folder for each run, and the list.
+        Its folder gets a folder for each run.
     report : callable
         Gets a line for each run.
     cores : int
@@ -71,7 +98,7 @@ def run_angles(case: Case, batch: Batch, report: Report, cores: int = 1) -> None
     batch.each(
         {name: partial(angle_scene, case, scene) for name, scene in runs.items()}, report, cores
     )
-    AnglesFile(
+    return AngleSet(
         study=case.study_name,
         title=case.study.title,
         pair=f"{material}-{material}",
@@ -79,4 +106,4 @@ def run_angles(case: Case, batch: Batch, report: Report, cores: int = 1) -> None
         rolling_friction=angles.rolling_friction,
         measured={name: (rig.angle_deg, rig.angle_std_deg) for name, rig in angles.rigs.items()},
         runs=tuple(name for name in runs if (batch.folder / name / RUN_FILE).is_file()),
-    ).write(batch.folder / "runs.json")
+    )

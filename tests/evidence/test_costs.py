@@ -2,21 +2,19 @@
 
 import json
 import math
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
-from paths import ROOT
 
-from benchmarks.costs import Option, cost, geometric, option_cases, options, time_options
 from dragdeck.cases.case import Case
 from dragdeck.engine.reports import silent
 from dragdeck.errors import InputError
 from dragdeck.project import Project
 from dragdeck.records.run import RunRecord
 from dragdeck.sweep.cases import load_cases
+from evidence.__main__ import main
+from evidence.costs import Option, cost, geometric, option_cases, options, time_options
 
 SECONDS = 0.05
 
@@ -83,12 +81,13 @@ def test_an_option_that_the_study_has_itself_or_cannot_have_is_left_out(
     assert "rotating_bowl" not in cases(made({"motion.path": line}))
 
 
-def test_a_measurement_is_not_overwritten(case: Case, project: Project) -> None:
+def test_a_measurement_is_not_overwritten(
+    case: Case, project: Project, monkeypatch: pytest.MonkeyPatch, capsys: Any
+) -> None:
     (project.root / "costs.json").write_text("kept")
-    words = [sys.executable, ROOT / "benchmarks/costs.py", case.study_name, "--out", "costs.json"]
-    done = subprocess.run(words, cwd=project.root, capture_output=True, text=True)
-    assert done.returncode == 1 and "there already" in done.stderr
-    assert "Traceback" not in done.stderr
+    monkeypatch.chdir(project.root)
+    assert main(["costs", case.study_name, "--out", "costs.json"]) == 1
+    assert "there already" in capsys.readouterr().err
     assert (project.root / "costs.json").read_text() == "kept"
 
 

@@ -1,29 +1,26 @@
 """The drops of a calibration, and the recovery of a known restitution on the real engine."""
 
-from pathlib import Path
 from typing import Any
 
 import pytest
 from made_study import Made
 from make_record import Sensor, synthetic_record
 
-from dragchain.calibration.fit import calibrate_file
-from dragchain.calibration.report import write_calibration_report
-from dragchain.calibration.results import confirmed, write_calibration
-from dragchain.calibration.simulated_drops import read_drops
-from dragdeck.calibration_batches.restitution_drops import (
+from dragchain.calibration.drops import (
     Drop,
     confirmation,
     drop_case,
     full,
     production,
-    record_file,
     run_drops,
-    settings,
     sweep,
 )
+from dragchain.calibration.fit import calibrate
+from dragchain.calibration.measured_impacts import measure_impacts
+from dragchain.calibration.report import FittedRecord, write_calibration_report
+from dragchain.calibration.results import confirmed, write_calibration
+from dragchain.calibration.simulated_drops import Drops, read_drops
 from dragdeck.cases.case import Case
-from dragdeck.cli import main
 from dragdeck.decks.templates import environment
 from dragdeck.engine.batch import Batch
 from dragdeck.engine.reports import silent
@@ -31,6 +28,8 @@ from dragdeck.errors import InputError
 from dragdeck.physics.contact_mechanics import hertz_contact_time, rayleigh_time
 from dragdeck.project import Project
 from dragdeck.scenes.drop_test import DROP_TEST, DropFidelity, drop_scene
+from dragdeck.study.calibration import measurements
+from dragdeck.study.force_record import read_record
 
 
 @pytest.fixture
@@ -100,21 +99,9 @@ def test_a_calibration_does_not_rename_any_run(case: Case, measured_case: Case) 
     assert DROP_TEST.run_id(case) == DROP_TEST.run_id(measured_case)
 
 
-def test_a_study_without_a_record_is_told_so(case: Case, measured_case: Case) -> None:
+def test_a_study_without_a_record_is_told_so(case: Case) -> None:
     with pytest.raises(InputError, match="has no measured drop test and no measured angle"):
-        settings(case)
-    with pytest.raises(InputError, match="the record of the drop test does not exist"):
-        record_file(measured_case)
-    (measured_case.file.parent / "record.csv").write_text("")
-    assert record_file(measured_case).name == "record.csv"
-
-
-def test_confirm_asks_for_the_fit(
-    measured_case: Case, project: Project, monkeypatch: pytest.MonkeyPatch, capsys: Any
-) -> None:
-    monkeypatch.chdir(project.root)
-    assert main(["step", "drops", "small", "confirm", "--out", "anywhere"]) == 1
-    assert "--fit" in capsys.readouterr().err
+        measurements(case.study.calibration, case.file)
 
 
 # --- the real engine -------------------------------------------------------------------------
@@ -148,32 +135,35 @@ def test_a_known_restitution_is_recovered(measured_case: Case, project: Project)
     case, folder = measured_case, project.root / "calibration"
     templates = environment(project.templates)
 
-    def run(drops: list[Drop], name: str) -> Path:
-        return run_drops(case, drops, Batch(folder / name, templates), silent)
+    def run(drops: list[Drop], name: str) -> Drops:
+        known = run_drops(case, drops, Batch(folder / name, templates), silent)
+        return read_drops(known, folder / name)
 
-    listed = run(short_sweep(case), "sweep")
+    swept = run(short_sweep(case), "sweep")
     known = [
         Drop(f"trial-{k}", "reference", value, True, height, full(case.study, 0.02))
         for k, (value, height) in enumerate([(0.68, 0.01008), (0.86, 0.00995)])
     ]
-    made = run(known, "trials")
-    swept, drops = read_drops(listed), read_drops(made)
-    production_model = swept.production
-    for drop, truth in zip(known, drops.runs, strict=True):
-        record = folder / f"{drop.name}.csv"
-        record.write_text(synthetic_record(truth, Sensor(500e3, 0.1, 3.0, 0.5, 0.01), 7))
-        got = calibrate_file(record, swept)
+    production_model, fits = swept.production, []
+    for drop, truth in zip(known, run(known, "trials").runs, strict=True):
+        file = folder / f"{drop.name}.csv"
+        file.write_text(synthetic_record(truth, Sensor(500e3, 0.1, 3.0, 0.5, 0.01), 7))
+        record = read_record(file)
+        got = calibrate(measure_impacts(record, fall_time_s=swept.known.fall_time_s), swept)
+        fits.append((record, got))
         full_fit = got.fit_reference
         assert full_fit.ci95_low <= drop.restitution <= full_fit.ci95_high
         low, high = (production_model.rebound(e) for e in (got.fit.ci95_low, got.fit.ci95_high))
         assert low < truth.effective < high
         assert got.fit_reference.height_m == pytest.approx(drop.height_m, abs=2e-5)
 
-    result = write_calibration(folder / "trial-0.csv", listed, folder)
+    (record, got), _ = fits
+    result = write_calibration(got, folder)
     values = (result.fit.restitution, result.fit_full.restitution)
-    checked = confirmed(read_drops(run(list(confirmation(case.study, *values))[::2], "confirm")))
+    confirming = run(list(confirmation(case.study, *values))[::2], "confirm")
+    checked = confirmed(confirming)
     assert checked.effective == pytest.approx(result.measured.value, abs=4 * checked.std)
-    write_calibration_report(folder, folder / "trial-0.csv")
+    write_calibration_report(folder, FittedRecord(record, got, confirming), None)
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert f"<b>{result.put.value:.4g}</b>" in page
     assert page.count("data:image/") == 1

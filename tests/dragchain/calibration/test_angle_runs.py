@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from made_study import Made
 
+from dragchain.calibration.angle_runs import angle_runs, run_angles
 from dragchain.calibration.angles import read_angle
 from dragchain.run.run_parts import iter_frames
-from dragdeck.calibration_batches.angle_runs import angle_runs, run_angles
 from dragdeck.cases.case import Case
 from dragdeck.decks.outputs import load_outputs
 from dragdeck.decks.render import write_run
@@ -20,8 +20,7 @@ from dragdeck.engine.reports import silent
 from dragdeck.engine.run_folder import run
 from dragdeck.errors import InputError
 from dragdeck.project import Project
-from dragdeck.records.calibration import AngleRun
-from dragdeck.scenes.angles import angle_scene
+from dragdeck.scenes.angles import AngleRun, angle_scene
 from dragdeck.scenes.process import SCENES
 
 REPOSE = {"angle_deg": 25, "angle_std_deg": 1, "cylinder_radius_m": 0.02, "count": 300}

@@ -1,25 +1,104 @@
 """The drops that a calibration of the restitution needs.
 
-A measured drop test is compared with drops of the same particle on the same plate,
-run as the process runs: same modulus, step and contact options. Which drops
-those are stands here; what they say is for dragchain to find out.
+A measured drop test is compared with drops of the same particle on the same plate, run as the
+process runs: same modulus, step and contact options.
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from typing import Literal
+
+from pydantic import PositiveFloat
 
 from dragdeck.cases.bed import bed_rayleigh_time, particle_material
 from dragdeck.cases.case import Case
+from dragdeck.documents import Document, Part
 from dragdeck.engine.batch import Batch
 from dragdeck.engine.reports import Report
-from dragdeck.errors import InputError
 from dragdeck.physics import contact_mechanics as mechanics
 from dragdeck.physics.rounding import timestep
-from dragdeck.records.calibration import IMPACTS, DropOfList, DropsFile, Purpose
 from dragdeck.scenes.drop_test import DropFidelity, drop_scene
-from dragdeck.study.calibration import Calibration
+from dragdeck.study.calibration import measurements
 from dragdeck.study.model import Study
+
+IMPACTS = 3
+"""Impacts compared at the most (Uhlmann et al. 2015, section 4)."""
+
+Purpose = Literal["production", "reference", "confirm"]
+"""Of a drop: as the process runs; full modulus, fine step; production at the fitted value."""
+
+
+class DropTest(Document):
+    """The drop test of the study, as in ``result.json``.
+
+    Attributes
+    ----------
+    pair : str
+        Particle and plate, as the study names their pair.
+    record : str
+        The CSV of the measured drop test.
+    height_m, height_std_m : float
+        Drop height (gap below the particle) and its standard uncertainty, m.
+    peaks : str
+        Whether to compare peak forces.
+    limit_force : bool
+        Whether tensile normal forces are suppressed, as in the study.
+    restitution_now : float
+        Coefficient of restitution of the study.
+    fall_time_s, contact_time_s : float
+        Time of the fall before the first impact, and contact time of an elastic impact, s.
+    """
+
+    remedy = "make it with: ./run calibrate"
+
+    study: str
+    title: str
+    pair: str
+    fidelity: str
+    record: str
+    height_m: PositiveFloat
+    height_std_m: PositiveFloat
+    peaks: Literal["auto", "yes", "no"]
+    gravity_m_s2: PositiveFloat
+    limit_force: bool
+    restitution_now: float
+    fall_time_s: PositiveFloat
+    contact_time_s: float
+
+
+class Settings(Part):
+    """Modulus and step of a drop; the fraction is that of this particle's Rayleigh time."""
+
+    youngs_modulus_scale: PositiveFloat
+    timestep_s: PositiveFloat
+    timestep_fraction: PositiveFloat
+
+
+class SimulatedDrop(Settings):
+    """A drop that was run.
+
+    Attributes
+    ----------
+    folder : str
+        Beside those of the other drops.
+    purpose : str
+        ``production``, ``reference`` or ``confirm``.
+    restitution : float
+        In the deck.
+    """
+
+    folder: str
+    purpose: Purpose
+    restitution: PositiveFloat
+    limit_force: bool
+    height_m: PositiveFloat
+
+
+class DropSet(DropTest):
+    """The drop test and drops for it."""
+
+    drops: tuple[SimulatedDrop, ...]
+
 
 _RESTITUTIONS = tuple(round(0.05 * k, 2) for k in range(8, 21))
 """Deck values of the sweep: 0.40, 0.45, ... 1.00."""
@@ -62,46 +141,6 @@ class Drop:
     limit_force: bool
     height_m: float
     fidelity: DropFidelity
-
-
-def settings(case: Case) -> Calibration:
-    """The calibration section of a study.
-
-    Raises
-    ------
-    InputError
-        It has none.
-    """
-    if case.study.calibration is None:
-        raise InputError(
-            "the study has no measured drop test and no measured angle",
-            file=case.file,
-            field="calibration",
-            remedy="add calibration: {record: FILE.csv}, see docs/howto/calibration.md",
-        )
-    return case.study.calibration
-
-
-def record_file(case: Case) -> Path:
-    """The record of a study, a CSV file.
-
-    Raises
-    ------
-    InputError
-        The study names none, or there is no such file in its folder.
-    """
-    folder = case.file.parent
-    file = folder / (settings(case).record or "")
-    if not file.is_file() or not file.resolve().is_relative_to(folder.resolve()):
-        raise InputError(
-            "the record of the drop test does not exist",
-            file=case.file,
-            field="calibration.record",
-            value=settings(case).record,
-            limit=f"a file in {folder}",
-            remedy="put the CSV file there, or correct its name",
-        )
-    return file
 
 
 def production(study: Study) -> DropFidelity:
@@ -174,22 +213,17 @@ def drop_case(case: Case, drop: Drop) -> Case:
     return Case(case.file, case.settings, changed)
 
 
-def run_drops(case: Case, drops: Sequence[Drop], batch: Batch, report: Report) -> Path:
-    """Run drops, each in a folder of its own, and list them in ``drops.json``.
+def run_drops(case: Case, drops: Sequence[Drop], batch: Batch, report: Report) -> DropSet:
+    """Run drops, each in a folder of its own.
 
     Parameters
     ----------
     case : Case
     drops : sequence of Drop
     batch : Batch
-        Its folder gets a folder for each drop, and the list.
+        Its folder gets a folder for each drop.
     report : callable
         Gets a line now and then.
-
-    Returns
-    -------
-    Path
-        The list.
 
     Raises
     ------
@@ -203,22 +237,20 @@ def run_drops(case: Case, drops: Sequence[Drop], batch: Batch, report: Report) -
         step = scene.case.timestep_s
         steps = {"timestep_s": step, "timestep_fraction": step / scene.case.rayleigh_time_s}
         known = {**vars(drop), **vars(drop.fidelity), **steps, "folder": drop.name}
-        rows.append(DropOfList.model_validate(known))
+        rows.append(SimulatedDrop.model_validate(known))
         if number % 20 == 0 or number == len(drops):
             report(f"{number} of {len(drops)} drops done")
-    file = batch.folder / "drops.json"
-    _listed(case, rows).write(file)
-    return file
+    return _listed(case, rows)
 
 
-def _listed(case: Case, rows: Sequence[DropOfList]) -> DropsFile:
-    study, section = case.study, settings(case)
+def _listed(case: Case, rows: Sequence[SimulatedDrop]) -> DropSet:
+    study, section = case.study, measurements(case.study.calibration, case.file)
     particle, plate = study.media.main_material, study.workpiece.material
     material, radius = particle_material(study), study.media.typical_radius_m
     modulus = mechanics.effective_modulus(material, study.materials[plate])
     height, gravity = study.drop_test.height_m, study.gravity_m_s2
     mass, speed = mechanics.particle_mass(material, radius), mechanics.fall_speed(height, gravity)
-    return DropsFile(
+    return DropSet(
         study=case.study_name,
         title=study.title,
         pair=f"{particle}-{plate}",

@@ -1,13 +1,10 @@
 """The cost of options that a study's input scripts omit (docs/development/benchmarks.md).
 
-    python benchmarks/costs.py STUDY --out FILE [--rounds 3] [--seconds 0.5] [--only NAME ...]
-
-Run it inside the project, on a machine that does nothing else. ``costs.yaml`` is the design: each
-of its options is the standard case with other values of study fields. The runs of all rounds are
-ordinary ones, in ``costs/`` beside the result; the same command resumes an interrupted measurement.
+``costs.yaml`` is the design: each of its options is the standard case with other values of study
+fields. The runs of all rounds are ordinary ones, in ``costs/`` beside the result; the same command
+resumes an interrupted measurement.
 """
 
-import argparse
 import copy
 import os
 import shlex
@@ -22,17 +19,14 @@ from typing import Any, Literal
 import numpy as np
 
 from dragchain.statistics.estimate import Estimate, finite, mean_of
-from dragchain.tables.write import write_tables
 from dragdeck import __version__
 from dragdeck.cases.case import Case
-from dragdeck.command_line import guarded
 from dragdeck.decks.templates import environment
 from dragdeck.documents import Part
 from dragdeck.engine.batch import Batch
 from dragdeck.engine.reports import Report, say
 from dragdeck.errors import InputError, choices
-from dragdeck.physics.packing import Bed
-from dragdeck.project import find_project, study_templates
+from dragdeck.project import by_run, find_project, study_templates
 from dragdeck.records.run import RunRecord
 from dragdeck.records.tradeoff import CostEntry, CostsFile, Machine
 from dragdeck.scenes.filling import FILLING
@@ -41,6 +35,7 @@ from dragdeck.scenes.scene import read_bed
 from dragdeck.study.base import Json
 from dragdeck.study.model import Study
 from dragdeck.sweep.cases import Design, Settings, Variation, settle_case
+from evidence.beds import settled
 
 DESIGN = Path(__file__).with_suffix(".yaml")
 
@@ -290,9 +285,15 @@ def time_options(
     first, *others = cases
     folder = out.resolve().parent / "costs"
     own_templates = environment(templates, study_templates(case))
-    beds = {name: _bed(Batch(folder / "filling", own_templates), option, report)
-            for name, option in cases.items()}  # fmt: skip
-    scenes = {name: partial(process_scene, option, beds[name]) for name, option in cases.items()}
+    filling = Batch(folder / "filling", own_templates)
+    beds = {
+        run: read_bed(settled(filling, run, FILLING.build(of_bed, None)))
+        for run, of_bed in by_run(cases.values(), FILLING).items()
+    }
+    scenes = {
+        name: partial(process_scene, option, beds[FILLING.run_id(option)])
+        for name, option in cases.items()
+    }
     records: dict[str, list[RunRecord]] = {name: [] for name in cases}
     for number in range(1, rounds + 1):
         batch = Batch(folder / f"round-{number}", own_templates)
@@ -317,7 +318,7 @@ def time_options(
         particles=study.particle_count,
         seconds=seconds,
         measured=datetime.now(UTC).date().isoformat(),
-        command=shlex.join(["python", "benchmarks/costs.py", *sys.argv[1:]]),
+        command=shlex.join(["python", "-m", "evidence", *sys.argv[1:]]),
         versions={"dragdeck": __version__, "engine": base[0].engine_version},
         machine=Machine.here(),
         load_average_before=load,
@@ -339,38 +340,10 @@ def _own(chosen: Mapping[str, tuple[Option, Settings]], name: str, first: str) -
     return {field: value for field, value in chosen[name][1].items() if base.get(field) != value}
 
 
-def _bed(batch: Batch, case: Case, report: Report) -> Bed:
-    """The settled packing of a case, made if it is not there yet."""
-    run = FILLING.run_id(case)
-    file = batch.folder / run / "tables" / "packing.json"
-    if not file.is_file():
-        report(f"packing {run}")
-        batch.result(run, FILLING.build(case, None))
-        write_tables(batch.folder / run)
-    return read_bed(file)
-
-
-def main() -> int:
-    """Measure and return the exit status; see `dragdeck.command_line.guarded`."""
-    parser = argparse.ArgumentParser(
-        prog="python benchmarks/costs.py", description="Time what each omitted option would cost."
-    )
-    add = parser.add_argument
-    add("study", help="name of a folder in studies/")
-    add("--fidelity", help="instead of the study's own")
-    add("--rounds", type=int, default=3, help="number of runs of each option")
-    add("--seconds", type=float, default=SECONDS, help="process time of the drag, s")
-    add("--only", nargs="+", default=[], metavar="NAME", help="time only these options")
-    add("--out", type=Path, required=True, metavar="FILE", help="costs.json")
-    return guarded("costs", partial(_measure, parser.parse_args()))
-
-
-def _measure(asked: argparse.Namespace) -> None:
+def measure_costs(
+    study: str, fidelity: str | None, out: Path, rounds: int, seconds: float, only: Sequence[str]
+) -> None:
+    """Time the options of a study by its name; see `time_options`."""
     project = find_project(Path.cwd())
-    case = project.cases(asked.study, asked.fidelity)[0]
-    how = {"rounds": asked.rounds, "seconds": asked.seconds, "only": asked.only}
-    time_options(case, project.templates, asked.out, say, **how)
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    case = project.cases(study, fidelity)[0]
+    time_options(case, project.templates, out, say, rounds=rounds, seconds=seconds, only=only)

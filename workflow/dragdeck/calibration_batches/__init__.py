@@ -1,1 +1,0 @@
-"""Batches of short runs for a calibration: drop tests, heaps and drums."""
