@@ -175,7 +175,7 @@ class FinishedRun(RunData):
         table = read_table(file, columns)
         process = self.case.scene == "process"
         table.attrs |= {
-            "study": self.case.study,
+            "study": self.case.study_name,
             "run": self.case.run,
             "units": {name: self.units[name] for name in table.columns},
             "basis": " ".join(notes(self.case)) if process else str(Basis.SIMULATED),
@@ -273,7 +273,7 @@ class Study:
     @property
     def name(self) -> str:
         """Name of the study."""
-        return next(iter(self.runs)).case.study
+        return next(iter(self.runs)).case.study_name
 
     @cached_property
     def summary(self) -> pd.DataFrame:

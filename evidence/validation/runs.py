@@ -45,7 +45,7 @@ class MeasuredRun:
     @property
     def seed(self) -> int:
         """Seed of its bed."""
-        return self.measures.seed
+        return self.measures.study.seed
 
     @property
     def but_for_bed(self) -> tuple[object, ...]:

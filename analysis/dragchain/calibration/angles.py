@@ -12,8 +12,7 @@ from dragchain.run.run_parts import iter_frames
 from dragchain.statistics.correlated import estimate_mean
 from dragdeck.decks.outputs import load_outputs
 from dragdeck.dumps.frame import Frame
-from dragdeck.records.calibration import AngleRun
-from dragdeck.records.case import CaseOfRun
+from dragdeck.records.calibration import AngleCase, AngleRun
 from dragdeck.records.run import read_accepted
 
 _SECTORS = 8
@@ -123,7 +122,7 @@ def read_angle(folder: Path) -> Mapping[str, str | float]:
         The run is not complete, or has no surface.
     """
     read_accepted(folder)
-    run, frame = AngleRun.model_validate(CaseOfRun.read(folder / "case.json").inputs), None
+    run, frame = AngleCase.read(folder / "case.json").angle, None
     angles: list[float] = []
     for frame in iter_frames(folder, load_outputs(folder)["particles"]):
         if run.drum_radius_m and frame.step >= run.counted_from:

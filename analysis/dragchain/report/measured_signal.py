@@ -30,6 +30,7 @@ from dragchain.report.cases import ReportedCase, ReportedRun
 from dragchain.report.findings import ProcessFindings
 from dragchain.report.run_data import RunData
 from dragchain.report.values import mean_over_packings
+from dragchain.run.case import study_of
 from dragchain.run.kinematics import needed, process_time
 from dragchain.statistics.correlated import MIN_SAMPLES, autocovariance, estimate_mean, estimates
 from dragchain.statistics.estimate import CONFIDENCE, Estimate, flattened, student_quantile
@@ -335,7 +336,8 @@ def compare_signal(case: ReportedCase, file: Path | None) -> SignalComparison | 
     its fluctuations take as much longer as the path does.
     """
     first = case.first.process.case
-    signal = first.reference.signal if first.reference else None
+    reference = study_of(first).reference
+    signal = reference.signal if reference else None
     if signal is None:
         return None
     if file is None:

@@ -21,6 +21,7 @@ from dragchain.arrays import Floats
 from dragchain.errors import TableError
 from dragchain.loading.wear import TOUCH_QUANTITIES, Wear
 from dragchain.report.cases import ReportedCase
+from dragchain.run.case import study_of
 from dragchain.run.kinematics import axis_speed
 from dragchain.statistics.correlated import SLOW_WAVES
 from dragchain.statistics.estimate import (
@@ -205,7 +206,8 @@ def removal_of(case: ReportedCase) -> RemovalOfCase | None:
         If a run of it lacks ``wear.json``, or nothing that the law reads has happened.
     """
     first, load = case.first.process.case, case.values.of("force_slide")
-    removal, wears = first.removal, [study.wear for study in case.studies if study.wear]
+    study = study_of(first)
+    removal, wears = study.removal, [study.wear for study in case.studies if study.wear]
     if removal is None or load is None:
         return None
     folder, factor = case.first.process.folder, 1.0
@@ -218,8 +220,7 @@ def removal_of(case: ReportedCase) -> RemovalOfCase | None:
     if not action.value:
         raise TableError(f"{folder}: the law {removal.law} finds no action: use a longer path or a "
                          "larger outputs.first_touch_fraction")  # fmt: skip
-    density = first.inputs[f"materials.{first.inputs['workpiece.material']}.density_kg_m3"]
-    assert isinstance(density, float | int)
+    density = study.materials[study.workpiece.material].density_kg_m3
     between = len(wears) > 1 and not load.corrected
     degrees = len(wears) - 1 if between else math.inf
     coefficient, rate = predict(removal, action, density, degrees)

@@ -43,6 +43,7 @@ from dragchain.report.findings import (
     ProcessFindings,
     Wake,
 )
+from dragchain.run.case import study_of
 from dragchain.run.kinematics import (
     drag_start_s,
     motion_of,
@@ -185,7 +186,7 @@ def process_findings(run: RunData) -> ProcessFindings:
         run=run.case.run,
         process_time_zero_s=drag_start_s(run.case),
         forces=forces,
-        comparison=tuple(reference_drags(run.case.reference)),
+        comparison=tuple(reference_drags(study_of(run.case).reference)),
         peaks=_peaks(samples, run),
         network={"frames": len(run.network)} | _means(run.network),
         chains=_chains(run.chains, len(run.network)),

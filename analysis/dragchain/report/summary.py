@@ -13,6 +13,7 @@ from dragchain.quantities.basis import Standing
 from dragchain.report.cases import StudyRuns, cases_of
 from dragchain.report.findings import ProcessFindings
 from dragchain.report.values import Against
+from dragchain.run.case import study_of
 from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import Estimate
 
@@ -36,13 +37,13 @@ def _summary_row(study: StudyRuns, headline: str) -> Row:
     values = study.values
     case, found, record = study.process.case, study.process.findings, study.process.record
     return {
-        "study": case.study,
+        "study": case.study_name,
         "case": case.case,
         "run": case.run,
         "headline": headline,
         "settings": " ".join(values.notes),
         "changed_scripts": "; ".join(case.changed_scripts),
-        **{input_column(name): _cell(value) for name, value in case.inputs.items()},
+        **{input_column(name): _cell(value) for name, value in study_of(case).inputs().items()},
         **{f"fidelity_{name}": value for name, value in vars(case.fidelity).items()},
         "timestep_s": case.timestep_s,
         "ranks": record.ranks,

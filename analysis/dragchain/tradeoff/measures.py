@@ -3,11 +3,9 @@
 import math
 from collections.abc import Iterable, Mapping
 
-from pydantic import JsonValue
-
 from dragchain.quantities.along import PathQuantities
 from dragdeck.documents import Document, Part
-from dragdeck.records.case import FidelityOfRun
+from dragdeck.records.case import FidelityOfRun, StudyOfRun
 from dragdeck.records.run import AcceptanceCheck
 
 FILE = "measures.json"
@@ -64,10 +62,10 @@ class Measures(PathQuantities, Document):
 
     remedy = "make it with: ./run dragchain step measure"
 
-    study: str
+    study_name: str
+    study: StudyOfRun
     run: str
     bed: str | None
-    inputs: Mapping[str, JsonValue]
     fidelity: FidelityOfRun
     numbers: Mapping[str, float] = {}
     complete: bool
@@ -76,13 +74,6 @@ class Measures(PathQuantities, Document):
     started: str
     failure: tuple[AcceptanceCheck, ...] = ()
     single: Mapping[str, float] = {}
-
-    @property
-    def seed(self) -> int:
-        """Seed of its bed."""
-        seed = self.inputs["seed"]
-        assert isinstance(seed, int)
-        return seed
 
     @property
     def why_failed(self) -> str:

@@ -6,6 +6,7 @@ from typing import Literal
 from pydantic import PositiveFloat
 
 from dragdeck.documents import Document, Part
+from dragdeck.records.case import CaseOfRun
 from dragdeck.study.calibration import Rig
 
 IMPACTS = 3
@@ -162,7 +163,7 @@ class AnglesFile(Document):
 
 
 class AngleRun(Part):
-    """What a heap or drum is simulated with: ``inputs`` of its ``case.json``.
+    """What a heap or drum is simulated with.
 
     Attributes
     ----------
@@ -185,3 +186,10 @@ class AngleRun(Part):
     glued: int = 0
     drum_radius_m: float = 0.0
     counted_from: int = 0
+
+
+class AngleCase(CaseOfRun):
+    """The ``case.json`` of a heap or drum."""
+
+    scene: Literal["angles"] = "angles"
+    angle: AngleRun

@@ -29,8 +29,7 @@ from dragdeck.physics.contact_mechanics import ENGINE_SOFTEST_PA, fall_time
 from dragdeck.physics.estimates import SOLID_FRACTION_ESTIMATE
 from dragdeck.physics.packing import pour
 from dragdeck.physics.rounding import rounded
-from dragdeck.records.calibration import AngleRun
-from dragdeck.records.case import CaseOfRun
+from dragdeck.records.calibration import AngleCase, AngleRun
 from dragdeck.scenes.scene import case_of_study, material_table
 from dragdeck.study.calibration import Drum, Repose
 from dragdeck.study.media import Array
@@ -90,7 +89,7 @@ class _Placed(NamedTuple):
     times_s: tuple[float, float, float]
 
 
-def angle_scene(case: Case, run: AngleRun, stiffness: float = STIFFNESS) -> Scene[CaseOfRun]:
+def angle_scene(case: Case, run: AngleRun, stiffness: float = STIFFNESS) -> Scene[AngleCase]:
     """A heap or drum of the study's calibration with other coefficients.
 
     Raises
@@ -138,9 +137,8 @@ def angle_scene(case: Case, run: AngleRun, stiffness: float = STIFFNESS) -> Scen
     bodies = [Body(1, radius, density, (x, y, z)) for x, y, z, radius in rows]
     side = -placed.edge_m - size, placed.edge_m + size
     box = side, side, (placed.bottom_m - size, placed.top_m + size)
-    inputs = {**run.model_dump(), **read_with, "counted_from": stop}
-    inputs["geometry"] = rig.model_dump(exclude={"angle_deg", "angle_std_deg"})
-    content = case_of_study(CaseOfRun, of, run.rig, inputs, dt, rayleigh, scene="angles")
+    angle = run.model_copy(update={**read_with, "counted_from": stop})
+    content = case_of_study(AngleCase, of, run.rig, dt, rayleigh, angle=angle)
     media = content.media.model_copy(update={"count": len(bodies)})
     files = {
         "particles.data": lambda: data_file(deck.title, len(names), box, bodies),
