@@ -21,7 +21,6 @@ from dragchain.tables.by_step import intact, read_table
 from dragchain.tables.columns import descriptions, unit_of
 from dragdeck.errors import InputError, RejectedRunError
 from dragdeck.project import by_folder, find_project
-from dragdeck.records.case import load_case
 from dragdeck.records.run import read_accepted
 from dragdeck.scenes.lead import with_leads
 from dragdeck.scenes.process import PROCESS
@@ -110,11 +109,6 @@ class FinishedRun(RunData):
     impacts = _table("impacts", "impact of the drop test")
     thermo = _table("thermo", "output of the whole system")
 
-    @classmethod
-    def open(cls, folder: Path) -> "FinishedRun":
-        """Open the folder of a run; `DocumentError` if it contains no ``case.json``."""
-        return cls(folder, load_case(folder))
-
     @property
     def name(self) -> str:
         """Name of the case; for a filling or a drop test the run id."""
@@ -123,7 +117,7 @@ class FinishedRun(RunData):
     @cached_property
     def units(self) -> Mapping[str, str]:
         """Unit of each column of all tables: ``1`` if dimensionless, empty for text and flags."""
-        return _units(self._file(name) for name in _TABLES[self.case.scene])
+        return _units(self.file(f"{name}.parquet") for name in _TABLES[self.case.scene])
 
     def describe(self, column: str) -> str:
         """Meaning and unit of a column of the run's tables.
@@ -167,7 +161,7 @@ class FinishedRun(RunData):
             others = "".join(f", a {scene} has" for scene in _TABLES if name in _TABLES[scene])
             problem = f"a {self.case.scene} has no table {name!r}{others}"
             raise UnknownNameError(problem, name, tables)
-        file = self._file(name)
+        file = self.file(f"{name}.parquet")
         with intact(file):
             known = pq.read_schema(file).names
         for column in set(columns or ()) - set(known):
@@ -227,11 +221,8 @@ class FinishedRun(RunData):
             raise UnknownNameError(f"run {self.name} has no {scene}", scene, folders)
         return FinishedRun.open(folders[scene])
 
-    def _file(self, name: str) -> Path:
-        return self.folder / "tables" / f"{name}.parquet"
-
     def __repr__(self) -> str:
-        made = [name for name in _TABLES[self.case.scene] if self._file(name).is_file()]
+        made = [name for name in _TABLES[self.case.scene] if self.file(f"{name}.parquet").is_file()]
         return f"<{self.case.scene} run {self.name}: {', '.join(made) or 'no tables'}>"
 
 

@@ -20,7 +20,6 @@ from dragchain.tables.run_folder import Run
 from dragchain.tables.workpiece_contacts import WorkpieceFrames
 from dragchain.tables.write import workpiece_force_rows
 from dragdeck.decks import CASE_FILE
-from dragdeck.decks.outputs import load_outputs
 from dragdeck.dumps.frame import Frame
 from dragdeck.physics.contact_mechanics import (
     damping_ratio,
@@ -115,7 +114,7 @@ class PointRun:
         """The run folder; None of a run that did not come to its end."""
         if self.case is None or not self.measurable:
             return None
-        return Run(self.folder, self.case, load_outputs(self.folder))
+        return Run(self.folder, self.case)
 
 
 def read_points(lists: Sequence[Path]) -> list[PointRun]:

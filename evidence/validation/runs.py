@@ -11,29 +11,26 @@ from pydantic import JsonValue
 
 from dragchain.errors import SeriesError, TableError
 from dragchain.statistics.estimate import Estimate, mean_of
+from dragchain.tables.run_folder import Run
 from dragchain.tradeoff.compare import Setting, differing_inputs
 from dragchain.tradeoff.measures import FILE, Measures
-from dragdeck.records.case import CaseOfRun, load_case
+from dragdeck.records.case import load_case
 
 _FEWEST = 2
 """Packings below which nothing is known of the differences between them."""
 
 
 @dataclass(frozen=True)
-class MeasuredRun:
+class MeasuredRun(Run):
     """A process run of a validation.
 
     Attributes
     ----------
-    folder : Path
-    case : CaseOfRun
     measures : Measures
     changed : mapping
         Dotted names and values of the inputs that differ from the reference's.
     """
 
-    folder: Path
-    case: CaseOfRun
     measures: Measures
     changed: Mapping[str, JsonValue]
 

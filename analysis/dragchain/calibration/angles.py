@@ -8,9 +8,8 @@ from numpy.typing import NDArray
 
 from dragchain.arrays import Floats
 from dragchain.errors import TableError
-from dragchain.run.run_parts import iter_frames
 from dragchain.statistics.correlated import estimate_mean
-from dragdeck.decks.outputs import load_outputs
+from dragchain.tables.run_folder import Run
 from dragdeck.dumps.frame import Frame
 from dragdeck.records.calibration import AngleCase, AngleRun
 from dragdeck.records.run import read_accepted
@@ -122,9 +121,10 @@ def read_angle(folder: Path) -> Mapping[str, str | float]:
         The run is not complete, or has no surface.
     """
     read_accepted(folder)
-    run, frame = AngleCase.read(folder / "case.json").angle, None
+    case = AngleCase.read(folder / "case.json")
+    run, frame = case.angle, None
     angles: list[float] = []
-    for frame in iter_frames(folder, load_outputs(folder)["particles"]):
+    for frame in Run(folder, case).frames("particles"):
         if run.drum_radius_m and frame.step >= run.counted_from:
             angles.append(drum_angle(*_free(frame, run), run.drum_radius_m))
     assert frame is not None  # an accepted run has all its frames

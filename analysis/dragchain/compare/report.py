@@ -33,7 +33,7 @@ from dragchain.quantities.registry import REPORTED, Quantity
 from dragchain.report.campaign import write_report
 from dragchain.report.cases import ReportedCase, StudyRuns, cases_of, read_study_runs
 from dragchain.report.page import NETWORK_PAGE, TIMES, render_page, with_interval, write_bundle
-from dragchain.run.case import changed_inputs, study_of
+from dragchain.run.case import changed_inputs
 from dragchain.statistics.bed_effects import fit_effects
 from dragchain.statistics.estimate import Estimate, flattened, mean_of
 from dragchain.tables.by_step import read_table
@@ -52,12 +52,12 @@ class ComparedCase:
     @cached_property
     def by_seed(self) -> Mapping[int, StudyRuns]:
         """Its process runs by the seed of their packing."""
-        return {study_of(runs.process.case).seed: runs for runs in self.case.studies}
+        return {runs.process.study.seed: runs for runs in self.case.studies}
 
     @cached_property
     def inputs(self) -> Mapping[str, JsonValue]:
         """Values of its study by dotted name."""
-        return study_of(self.case.first.process.case).inputs()
+        return self.case.first.process.study.inputs()
 
     @cached_property
     def load_maps(self) -> Mapping[int, Floats]:

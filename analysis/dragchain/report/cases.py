@@ -23,6 +23,7 @@ from dragchain.report.values import Values, read_optional, values_of, values_ove
 from dragchain.run.case import changed_inputs, study_of, upstream_folders, with_changes
 from dragchain.run.kinematics import axis_speed, drag_phase, motion_of, needed, path_passed
 from dragchain.statistics.estimate import mean_of
+from dragchain.tables.run_folder import Run
 from dragdeck.errors import DocumentError, RejectedRunError
 from dragdeck.records.case import CaseOfRun, ClassOfRun, load_case
 from dragdeck.records.run import RunRecord, read_accepted
@@ -185,11 +186,9 @@ F = TypeVar("F", bound=Findings, covariant=True)
 
 
 @dataclass(frozen=True)
-class ReportedRun(Generic[F]):
-    """A run that counts: its folder, case, findings and ``run.json``."""
+class ReportedRun(Run, Generic[F]):
+    """A run that counts, with its findings and ``run.json``."""
 
-    folder: Path
-    case: CaseOfRun
     findings: F
     record: RunRecord
 
@@ -327,5 +326,5 @@ def cases_of(studies: Iterable[StudyRuns]) -> list[ReportedCase]:
 def _same_but_seed(one: StudyRuns, other: StudyRuns) -> bool:
     a, b = one.process.case, other.process.case
     numbers = [case.workpiece.number if case.workpiece else 0 for case in (a, b)]
-    changed = changed_inputs(study_of(a).inputs(), study_of(b).inputs())
+    changed = changed_inputs(one.process.study.inputs(), other.process.study.inputs())
     return changed.keys() == {_SEED} and a.fidelity == b.fidelity and numbers[0] == numbers[1]

@@ -21,7 +21,6 @@ from dragchain.arrays import Floats
 from dragchain.errors import TableError
 from dragchain.loading.wear import TOUCH_QUANTITIES, Wear
 from dragchain.report.cases import ReportedCase
-from dragchain.run.case import study_of
 from dragchain.run.kinematics import axis_speed
 from dragchain.statistics.correlated import SLOW_WAVES
 from dragchain.statistics.estimate import (
@@ -206,7 +205,7 @@ def removal_of(case: ReportedCase) -> RemovalOfCase | None:
         If a run of it lacks ``wear.json``, or nothing that the law reads has happened.
     """
     first, load = case.first.process.case, case.values.of("force_slide")
-    study = study_of(first)
+    study = case.first.process.study
     removal, wears = study.removal, [study.wear for study in case.studies if study.wear]
     if removal is None or load is None:
         return None

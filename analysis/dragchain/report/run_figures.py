@@ -30,11 +30,9 @@ from dragchain.report.findings import DropFindings, DropImpacts, FillingFindings
 from dragchain.report.run_data import RunData, write_findings
 from dragchain.run.kinematics import process_time
 from dragchain.run.reference import ReferenceDrag
-from dragchain.run.run_parts import iter_prints
 from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import Estimate
-from dragdeck.decks.outputs import load_outputs
-from dragdeck.records.case import CaseOfRun, load_case
+from dragdeck.records.case import CaseOfRun
 from dragdeck.records.run import figures_of
 
 # --- panels --------------------------------------------------------------------------------------
@@ -260,7 +258,7 @@ def filling(run: RunData, found: FillingFindings) -> Figure | None:
 
 def drop_test(run: RunData, found: DropFindings) -> Figure:
     """Force and speed over time of each impact."""
-    blocks = list(iter_prints(run.folder, load_outputs(run.folder)["impacts"]))
+    blocks = list(run.prints("impacts"))
     time_s, speed_m_s, force_n = (
         np.concatenate([np.asarray(block[name], dtype=np.float64) for block in blocks])
         for name in ("time_s", "vz_m_s", "force_n")
@@ -333,7 +331,7 @@ def write_figures(run_dir: Path) -> list[Path]:
     DragdeckError
         If a table is missing, a series is too short, or pictures cannot be rendered here.
     """
-    run = RunData(run_dir, load_case(run_dir))
+    run = RunData.open(run_dir)
     findings = write_findings(run)
     written = []
     with drawing():

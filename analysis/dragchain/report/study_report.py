@@ -25,7 +25,7 @@ from dragchain.report.page import NETWORK_PAGE, data_uri, file_uri, render_page,
 from dragchain.report.removal import UM_PER_H, RemovalOfCase, removal_of, touch_rows, touches_per_s
 from dragchain.report.spreadsheet import summary_workbook
 from dragchain.report.summary import summary
-from dragchain.run.case import study_of, upstream_folders
+from dragchain.run.case import upstream_folders
 from dragchain.run.workpiece import read_surface
 from dragchain.statistics.correlated import RELIABLE_TIMES
 from dragchain.statistics.noisy_map import LARGEST_ERROR
@@ -388,7 +388,7 @@ def _engine_runs(studies: Sequence[StudyRuns]) -> list[ReportedRun[Findings]]:
 
 def _signals(cases: Sequence[ReportedCase], file: Path | None) -> list["SignalComparison"]:
     """The comparisons with a measured signal; no other part of the page needs its filters."""
-    references = [study_of(one.first.process.case).reference for one in cases]
+    references = [one.first.process.study.reference for one in cases]
     if not any(one and one.signal for one in references):
         return []
     from dragchain.report.measured_signal import compare_signal

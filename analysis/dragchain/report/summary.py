@@ -13,7 +13,6 @@ from dragchain.quantities.basis import Standing
 from dragchain.report.cases import StudyRuns, cases_of
 from dragchain.report.findings import ProcessFindings
 from dragchain.report.values import Against
-from dragchain.run.case import study_of
 from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import Estimate
 
@@ -43,7 +42,9 @@ def _summary_row(study: StudyRuns, headline: str) -> Row:
         "headline": headline,
         "settings": " ".join(values.notes),
         "changed_scripts": "; ".join(case.changed_scripts),
-        **{input_column(name): _cell(value) for name, value in study_of(case).inputs().items()},
+        **{
+            input_column(name): _cell(value) for name, value in study.process.study.inputs().items()
+        },
         **{f"fidelity_{name}": value for name, value in vars(case.fidelity).items()},
         "timestep_s": case.timestep_s,
         "ranks": record.ranks,

@@ -12,9 +12,9 @@ from dragchain.arrays import Floats
 from dragchain.errors import SeriesError, TableError
 from dragchain.quantities.registry import COMPARED
 from dragchain.run.case import changed_inputs
-from dragchain.tables.by_step import read_table
+from dragchain.tables.run_folder import Run
 from dragchain.tradeoff.compare import PlanRun, QuantityComparison, Setting, compare_quantity
-from dragdeck.records.case import DropTestCase, load_case
+from dragdeck.records.case import DropTestCase
 from dragdeck.records.run import RunRecord
 from dragdeck.records.tradeoff import CostsFile
 from dragdeck.study.base import flat, without_fields
@@ -290,10 +290,11 @@ def compare_drops(folders: Sequence[Path]) -> list[ComparedDrop]:
 
 def _read_drop(folder: Path) -> tuple[float, Mapping[str, JsonValue], Floats, float]:
     """Step over the Rayleigh time, inputs, ratios of the impacts and cost of a drop test."""
-    case = load_case(folder)
+    run = Run.open(folder)
+    case = run.case
     if not isinstance(case, DropTestCase):
         raise TableError(f"{folder}: the scene is {case.scene}, not drop_test")
-    ratios = read_table(folder / "tables" / "impacts.parquet", ["restitution"])["restitution"]
+    ratios = run.table("impacts", ["restitution"])["restitution"]
     record = RunRecord.read(folder / "run.json")
     if not record.complete:
         raise TableError(f"{folder}: its state is {record.state!r}, not 'complete'")
