@@ -23,7 +23,6 @@ from dragchain.tables.by_step import intact, read_table
 from dragchain.tables.columns import descriptions, unit_of
 from dragdeck.errors import InputError, RejectedRunError
 from dragdeck.project import by_folder, find_project
-from dragdeck.records.case import load_case
 from dragdeck.records.run import read_accepted
 from dragdeck.scenes.lead import with_leads
 from dragdeck.scenes.process import PROCESS
@@ -112,11 +111,6 @@ class FinishedRun(RunData):
     impacts = _table("impacts", "impact of the drop test")
     thermo = _table("thermo", "output of the whole system")
 
-    @classmethod
-    def open(cls, folder: Path) -> "FinishedRun":
-        """Open the folder of a run; `DocumentError` if it contains no ``case.json``."""
-        return cls(folder, load_case(folder))
-
     @property
     def name(self) -> str:
         """Name of the case; for a filling or a drop test the run id."""
@@ -125,7 +119,7 @@ class FinishedRun(RunData):
     @cached_property
     def units(self) -> Mapping[str, str]:
         """Unit of each column of all tables: ``1`` if dimensionless, empty for text and flags."""
-        return _units(self._file(name) for name in _TABLES[self.case.scene])
+        return _units(self.file(f"{name}.parquet") for name in _TABLES[self.case.scene])
 
     def describe(self, column: str) -> str:
         """Meaning and unit of a column of the run's tables.
@@ -169,7 +163,7 @@ class FinishedRun(RunData):
             others = "".join(f", a {scene} has" for scene in _TABLES if name in _TABLES[scene])
             problem = f"a {self.case.scene} has no table {name!r}{others}"
             raise UnknownNameError(problem, name, tables)
-        file = self._file(name)
+        file = self.file(f"{name}.parquet")
         with intact(file):
             known = pq.read_schema(file).names
         for column in set(columns or ()) - set(known):
@@ -177,7 +171,7 @@ class FinishedRun(RunData):
         table = read_table(file, columns)
         process = self.case.scene == "process"
         table.attrs |= {
-            "study": self.case.study,
+            "study": self.case.study_name,
             "run": self.case.run,
             "units": {name: self.units[name] for name in table.columns},
             "basis": " ".join(notes(self.case)) if process else str(Basis.SIMULATED),
@@ -233,11 +227,8 @@ class FinishedRun(RunData):
             raise UnknownNameError(f"run {self.name} has no {scene}", scene, folders)
         return FinishedRun.open(folders[scene])
 
-    def _file(self, name: str) -> Path:
-        return self.folder / "tables" / f"{name}.parquet"
-
     def __repr__(self) -> str:
-        made = [name for name in _TABLES[self.case.scene] if self._file(name).is_file()]
+        made = [name for name in _TABLES[self.case.scene] if self.file(f"{name}.parquet").is_file()]
         return f"<{self.case.scene} run {self.name}: {', '.join(made) or 'no tables'}>"
 
 
@@ -279,7 +270,7 @@ class Study:
     @property
     def name(self) -> str:
         """Name of the study."""
-        return next(iter(self.runs)).case.study
+        return next(iter(self.runs)).case.study_name
 
     @cached_property
     def summary(self) -> pd.DataFrame:

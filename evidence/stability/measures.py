@@ -19,7 +19,6 @@ from dragchain.tables.run_folder import Run
 from dragchain.tables.workpiece_contacts import WorkpieceFrames
 from dragchain.tables.write import workpiece_force_rows
 from dragdeck.decks import CASE_FILE
-from dragdeck.decks.outputs import load_outputs
 from dragdeck.dumps.frame import Frame
 from dragdeck.engine.part import STATE_FILE
 from dragdeck.physics.contact_mechanics import (
@@ -103,7 +102,7 @@ class PointRun:
         """The run folder; None of a run that did not come to its end."""
         if self.case is None or not self.measurable:
             return None
-        return Run(self.folder, self.case, load_outputs(self.folder))
+        return Run(self.folder, self.case)
 
 
 # --- the critical time step of a loaded contact network ----------------------------------------

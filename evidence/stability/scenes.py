@@ -19,7 +19,7 @@ from dragdeck.physics.rounding import timestep
 from dragdeck.physics.run_limits import RunLimits, run_limits
 from dragdeck.records.case import BowlOfRun, CaseOfRun, MediaOfRun
 from dragdeck.records.run import Phase
-from dragdeck.scenes.filling import FILLING, box_top
+from dragdeck.scenes.filling import box_top
 from dragdeck.scenes.scene import case_of_study, material_table
 
 # --- single impacts, many at once: particles on a plate, or small particles on large ones ------
@@ -148,7 +148,6 @@ def impact_scene(
         ImpactCase,
         case,
         run,
-        {},
         dt,
         rayleigh,
         media=MediaOfRun(
@@ -304,7 +303,6 @@ def column_scene(
         ColumnCase,
         case,
         run,
-        FILLING.content(case),
         dt,
         rayleigh,
         phases=[Phase(name="test", start_step=0, end_step=_TEST_STEPS)],

@@ -12,6 +12,7 @@ from dragchain.drag import FORCES, find_drag_peaks, peak_separation_s, read_coun
 from dragchain.loading.contact_events import Thresholds
 from dragchain.loading.document import FILE, ContactType, Loading
 from dragchain.quantities.document import RunQuantities
+from dragchain.run.case import study_of
 from dragchain.run.reference import reference_drags
 from dragchain.statistics.bed_effects import fit_effects
 from dragchain.statistics.correlated import MeanEstimate, estimate_mean
@@ -158,7 +159,7 @@ def compare_drag(drag: Together, case: CaseOfRun) -> tuple[Compared, ...]:
             difference=reference.difference(drag.mean),
             std_ratio=drag.std.over(reference.std_n) if reference.std_n else None,
         )
-        for reference in reference_drags(case.reference)
+        for reference in reference_drags(study_of(case).reference)
     )
 
 
@@ -249,7 +250,7 @@ def _of_quantity(runs: RunsByBed, quantity: str, sizes: Sequence[float]) -> Iter
         same = [run for run in runs.all if run.but_for_bed == setting]
         run, base = same[0], _base(runs, same[0])
         field, value = next(iter(run.changed.items()), ("", None))
-        before = base.measures.inputs.get(field)
+        before = base.measures.study.inputs().get(field)
         logarithm = fit.estimate(units[run.but_for_bed] - units[base.but_for_bed])
         change = logarithm.mapped(math.expm1)
         exponent = _exponent(logarithm, value, before) if len(run.changed) == 1 else None

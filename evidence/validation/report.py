@@ -87,7 +87,7 @@ def validation_of(runs: RunsByBed, command: str) -> Validation:
     first = runs.packings[0]
     force = force_of_packings(runs.packings)
     return Validation(
-        study=first.case.study,
+        study=first.case.study_name,
         command=command,
         measured=max(run.measures.started for run in runs.all)[:10],
         versions=first.measures.versions,

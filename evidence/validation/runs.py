@@ -12,28 +12,25 @@ from pydantic import JsonValue
 from dragchain.errors import SeriesError, TableError
 from dragchain.quantities.document import MEASURED_FILE, RunQuantities
 from dragchain.statistics.estimate import Estimate, mean_of
+from dragchain.tables.run_folder import Run
 from dragchain.tradeoff.compare import Setting, differing_inputs
-from dragdeck.records.case import CaseOfRun, load_case
+from dragdeck.records.case import load_case
 
 _FEWEST = 2
 """Packings below which nothing is known of the differences between them."""
 
 
 @dataclass(frozen=True)
-class MeasuredRun:
+class MeasuredRun(Run):
     """A process run of a validation.
 
     Attributes
     ----------
-    folder : Path
-    case : CaseOfRun
     measures : RunQuantities
     changed : mapping
         Dotted names and values of the inputs that differ from the reference's.
     """
 
-    folder: Path
-    case: CaseOfRun
     measures: RunQuantities
     changed: Mapping[str, JsonValue]
 
@@ -45,7 +42,7 @@ class MeasuredRun:
     @property
     def seed(self) -> int:
         """Seed of its bed."""
-        return self.measures.seed
+        return self.measures.study.seed
 
     @property
     def but_for_bed(self) -> tuple[object, ...]:

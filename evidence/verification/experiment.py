@@ -95,7 +95,7 @@ class CollideCase(CaseFile):
 
     remedy = "run `./run verify`"
 
-    study: str = "verification"
+    study_name: str = "verification"
     scene: Literal["collide"] = "collide"
     run: str = ""
     versions: Mapping[str, str] = {"dragdeck": __version__}
@@ -197,7 +197,7 @@ def collide_scene(experiment: Experiment) -> Scene[CollideCase]:
     (x, y, z), size = case.gravity_m_s2, math.hypot(*case.gravity_m_s2)
     deck = _CollideDeck(
         title=case.title,
-        study=case.study,
+        study=case.study_name,
         scene=case.scene,
         run=case.run,
         source="bodies.data",

@@ -41,12 +41,6 @@ class SceneRun(RunQuantities):
 
     stability_number: float | None = None
 
-    def number(self, field: str) -> float:
-        """A number of the study."""
-        value = self.inputs[field]
-        assert isinstance(value, int | float)
-        return value
-
 
 Scenes = Sequence[Sequence[SceneRun]]
 """The runs of each scene."""
@@ -293,14 +287,12 @@ def stable_step_record(scenes: Scenes) -> MeasuredStepRecord:
 
 def _step_row(run: SceneRun) -> tuple[float, ...]:
     """Stability number, kappa, restitution, step over Rayleigh time, relative spread of radii."""
-    media = run.inputs["media.material"]
+    media = run.study.media
     kappa = run.numbers["stiffness_number"] * run.fidelity.youngs_modulus_scale ** (2.0 / 3.0)
-    spread = run.number("media.radius_std_m") / run.number("media.radius_mean_m")
-    restitution = run.number(f"pairs.{media}-{media}.restitution")
     return (
         run.stability_number or math.nan,
         kappa,
-        restitution,
+        run.study.pair(media.main_material, media.main_material).restitution,
         run.fidelity.timestep_fraction,
-        spread,
+        media.typical_std_m / media.typical_radius_m,
     )

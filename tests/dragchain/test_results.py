@@ -212,7 +212,7 @@ def test_tables_carry_study_run_units_and_basis(project: Path) -> None:
     study = load("small")
     run = study.run("deep")
     about = run.force.attrs
-    assert (about["study"], about["run"]) == (run.case.study, run.case.run)
+    assert (about["study"], about["run"]) == (run.case.study_name, run.case.run)
     assert (about["units"]["drag_n"], about["units"]["time_s"]) == ("N", "s")
     assert "more and smaller contact forces" in about["basis"]
     assert run.table("network", ["step"]).attrs["units"] == {"step": "1"}

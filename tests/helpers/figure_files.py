@@ -22,12 +22,12 @@ PERIOD = 20
 def case_json(scene: str, **values: Any) -> dict[str, Any]:
     """Content of ``case.json`` of a run of three particles."""
     own = {
-        "timestep_s": STEP_S, "gravity_m_s2": 10.0, "inputs": {"media.count": 3},
+        "timestep_s": STEP_S, "gravity_m_s2": 10.0,
         "media": {"count": 3, "radius_mean_m": R},
         "workpiece": {"radius_m": 0.002, "length_m": 0.05},
         "motion": line(0.1, start_m=[-0.01, 0.0]), "phases": phases(DRAG_START, LAST),
         "restitution": 0.7,
-        "reference": {"source": "a paper", "experiment": {"drag_mean_n": -4.0}},
+        "study": {"reference": {"source": "a paper", "experiment": {"drag_mean_n": -4.0}}},
     }  # fmt: skip
     return made_case(scene, f"made-{scene}", **own | values)
 

@@ -1,6 +1,7 @@
 """A run with four particles on a plate, made by hand: one slides, one rolls, one hits, one
 rests."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -24,15 +25,10 @@ PLATE = stl([(_LEFT, (0.0, 0.01, 0.0), _RIGHT), (_LEFT, _RIGHT, (0.0, -0.01, 0.0
 """A square of 20 mm that looks along +x; its diagonal runs up to the left."""
 
 
-def case_json(**motion: Any) -> dict[str, Any]:
-    """Content of ``case.json``; `motion` changes that along a line."""
-    steel = {"youngs_modulus_pa": 2e11, "poissons_ratio": 0.3}
-    inputs = {
-        "media.material": "ceramic", "workpiece.material": "steel",
-        **{f"materials.{m}.{k}": v for m in ("ceramic", "steel") for k, v in steel.items()},
-    }  # fmt: skip
+def case_json(study: Mapping[str, Any] | None = None, **motion: Any) -> dict[str, Any]:
+    """Content of ``case.json``; `motion` changes that along a line, `study` other fields."""
     return made_case(
-        "process", "made-process", timestep_s=STEP_S, rayleigh_time_s=2e-4, inputs=inputs,
+        "process", "made-process", study, timestep_s=STEP_S, rayleigh_time_s=2e-4,
         contact_moduli=touching(MU, 0.01 * 2e11 / (2 * (1 - 0.3**2))), bowl={"radius_m": 0.1},
         surface_m=SURFACE, motion=line(SPEED) | motion,
         workpiece={"kind": "mesh", "radius_m": 0.01, "length_m": SIZE, "immersion_depth_m": SIZE},

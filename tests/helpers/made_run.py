@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from made_study import plain_study
 from run_files import OF_EVERY_RUN
 
 from dragdeck.decks.outputs import OutputOfRun
-from dragdeck.study.base import flat
 from dragdeck.study.driven import DrivenMotion
 from dragdeck.study.model import Motion
 
@@ -64,18 +64,22 @@ _BLOCKS = {
 }  # fmt: skip
 
 
-def made_case(scene: str, run: str, **values: Any) -> dict[str, Any]:
+def made_case(
+    scene: str, run: str, study: Mapping[str, Any] | None = None, **values: Any
+) -> dict[str, Any]:
     """Content of ``case.json``: a straight process, unless `values` say otherwise.
 
-    Of fidelity, media, bowl and workpiece only the entries that differ need to be given.
+    It has the small study with the changes in `study`, by their dotted names. Of fidelity,
+    media, bowl and workpiece only the entries that differ need to be given.
     """
     blocks = {name: known | values.pop(name, {}) for name, known in _BLOCKS.items()}
     motion = values.pop("motion", line(0.1))
     case = {
-        "schema": 2, "study": "made", "scene": scene, "run": run, "case": "made case",
+        "schema": 2, "study_name": "made", "scene": scene, "run": run, "case": "made case",
         "upstream": {}, "timestep_s": 1e-3, "rayleigh_time_s": 2e-3, "gravity_m_s2": 9.81,
-        "inputs": {}, "surface_m": 0.03, "statistics": {"transient_s": 0.1},
-        "assumptions": [], "reference": None, "versions": {"dragdeck": "0.1.0"},
+        "surface_m": 0.03, "statistics": {"transient_s": 0.1},
+        "assumptions": [], "versions": {"dragdeck": "0.1.0"},
+        "study": plain_study(study or {}), "inputs": {},
         **OF_EVERY_RUN,
     } | blocks | values  # fmt: skip
     return with_motion(case, **motion)
@@ -120,7 +124,7 @@ def with_motion(
         "line": {"length_m": length},
         "circle": {"revolutions": length / math.tau / path.get("radius_m", 1.0)},
     }
-    study = Motion.model_validate(
+    made = Motion.model_validate(
         {
             "path": {**lengths.get(path["kind"], {}), **path},
             "speed_m_s": None if speed_m_s is None else speed_m_s / factor,
@@ -130,11 +134,10 @@ def with_motion(
             **motion,
         }
     )
-    driven = DrivenMotion.of(study, timestep, factor, drag["start_step"])
-    inputs = {name: value for name, value in case["inputs"].items() if "motion." not in name}
+    driven = DrivenMotion.of(made, timestep, factor, drag["start_step"])
     return {
         **case,
-        "inputs": {**inputs, **flat(study.plain(), "motion.")},
+        "study": {**case["study"], "motion": made.plain()},
         "motion": driven.path_entry().model_dump(),
         "superposed": [one.model_dump() for one in driven.superposed_entries()],
     }

@@ -3,7 +3,11 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from paths import SMALL_STUDY
+
 from dragdeck.cases.case import Case
+from dragdeck.study.model import Study
+from dragdeck.study.yaml import read_yaml
 
 Load = Callable[..., list[Case]]
 Made = Callable[..., Case]
@@ -19,3 +23,10 @@ def put(data: dict[str, Any], changes: Mapping[str, Any]) -> None:
         old = block.get(last)
         merged = not above and isinstance(old, dict) and isinstance(value, Mapping)
         block[last] = {**old, **value} if merged else value
+
+
+def plain_study(changes: Mapping[str, Any]) -> dict[str, Any]:
+    """The small study as ``case.json`` has it, with these fields changed."""
+    data: dict[str, Any] = dict(read_yaml(SMALL_STUDY))
+    put(data, {"fidelity": data.pop("fidelities")["quick"], **changes})
+    return Study.model_validate(data).plain()

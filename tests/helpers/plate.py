@@ -141,6 +141,5 @@ def write_plate(
         "timestep_s": drag.timestep_s,
         "phases": [{"name": "drag", "start_step": 0, "end_step": drag.end}],
     }
-    made["inputs"] |= {"bowl.material": "steel", "pairs.ceramic-steel.friction": friction}
     made["contact_moduli"]["workpiece"]["friction"] = friction
     return made

@@ -19,7 +19,7 @@ def recording(heights: list[list[float]], **facts: Any) -> Recording:
     place[:, :, 2] = z
     still = np.zeros_like(place)
     case = {
-        "schema": 2, "study": "verification", "title": "made by hand", "scene": "collide",
+        "schema": 2, "study_name": "verification", "title": "made by hand", "scene": "collide",
         "run": "made", "versions": {}, "fidelity": {"ranks": 1},
         "media": {"count": len(heights[0])}, "test": "elastic_plane", "number": 2,
         "heading": "made by hand", "series": "s on s", "vary": "tangential_m_s",

@@ -3,6 +3,7 @@
 import base64
 import json
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -46,24 +47,25 @@ ASKED = {
 }  # fmt: skip
 
 
-def case_json(scene: str, run: str, **more: Any) -> dict[str, Any]:
+def case_json(
+    scene: str, run: str, study: Mapping[str, Any] | None = None, **more: Any
+) -> dict[str, Any]:
     """Content of ``case.json`` of a study's run."""
     own = {
-        "study": "small", "case": "10 mm <workpiece>", "timestep_s": 2.5e-5,
+        "study_name": "small", "case": "10 mm <workpiece>", "timestep_s": 2.5e-5,
         "rayleigh_time_s": 3.2e-5, "surface_m": 0.07, "restitution": 0.68,
-        "inputs": {"media.count": 1422, "seeds": [1, 2]},
         "fidelity": {"timestep_fraction": 0.77, "skin_m": 0.0003, "ranks": 2},
         "media": {"count": 1422, "radius_mean_m": 0.00327, "density_kg_m3": 2656.0},
         "bowl": {"radius_m": 0.04}, "workpiece": {"length_m": 0.08, "immersion_depth_m": 0.05},
         "motion": {"path": {"kind": "circle", "radius_m": 0.02}, "speed_m_s": 0.01,
-                   "orientation": "follow_path"},
+                   "orientation": "follow_path", "plunge_at_m": [0, 0]},
         "phases": [{"name": "drag", "start_step": 4000, "end_step": 64000}],
         "statistics": {"transient_s": 0.5},
         "assumptions": [{"field": "bowl.radius_m", "value": 0.04, "why": "a plausible fraction"}],
-        "reference": {"source": "a paper",
-                      "experiment": {"drag_mean_n": -2.59, "drag_std_n": 0.66}},
     }  # fmt: skip
-    return made_case(scene, run, **own | more)
+    reference = {"source": "a paper", "experiment": {"drag_mean_n": -2.59, "drag_std_n": 0.66}}
+    changes = {"media.count": 1422, "reference": reference, **(study or {})}
+    return made_case(scene, run, changes, **own | more)
 
 
 def known(value: float) -> Estimate:
@@ -124,7 +126,7 @@ def write_measured(folder: Path, **values: Estimate) -> None:
         "steps": 1, "wall_time_s": 1.0, "cpu_time_s": 1.0, "ranks": 1, "timestep_s": 1e-5,
         "axis_speed_m_s": 0.01, "steps_per_m": 1e7,
     }  # fmt: skip
-    names = ("study", "run", "inputs", "fidelity", "versions")
+    names = ("study_name", "study", "run", "fidelity", "versions")
     whole = {name: case[name] for name in names} | {
         "bed": None, "complete": True, "cost": cost, "started": "", "values_of_run": values,
     }  # fmt: skip

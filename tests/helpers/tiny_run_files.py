@@ -135,17 +135,10 @@ def _engine_columns(name: str) -> list[str] | None:
 
 def case_json(**values: Any) -> dict[str, Any]:
     """Content of ``case.json``."""
-    inputs = {
-        "media.count": 4,
-        "media.material": "stone",
-        **dict.fromkeys(("bowl.material", "workpiece.material"), "steel"),
-        **{f"materials.{m}.youngs_modulus_pa": 1e9 for m in ("stone", "steel")},
-        **{f"materials.{m}.poissons_ratio": 0.3 for m in ("stone", "steel")},
-    }
     tiny = {
-        "study": "tiny", "case": "tiny", "timestep_s": TIMESTEP_S, "surface_m": SURFACE_M,
+        "study_name": "tiny", "case": "tiny", "timestep_s": TIMESTEP_S, "surface_m": SURFACE_M,
         "upstream": {"filling": "filling-00000000", "drop_test": "drop-00000000"},
-        "fidelity": {"ranks": 2}, "media": {"radius_mean_m": RADIUS_M}, "inputs": inputs,
+        "fidelity": {"ranks": 2}, "media": {"radius_mean_m": RADIUS_M},
         "contact_moduli": touching(FRICTION), "bowl": {"radius_m": BOWL_RADIUS_M},
         "workpiece": {"immersion_depth_m": 0.03},
         "motion": line(SPEED_M_S), "phases": phases(DRAG_START, LAST),

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from made_run import particles_kept, run_json, save, write_documents
+from made_study import plain_study
 from report_files import case_json
 
 from dragchain.quantities.registry import MEASURED
@@ -46,14 +47,16 @@ def measures(
     noise: float = 0.03,
     cpu_time_s: float = 100.0,
     failure: Sequence[Mapping[str, object]] = (),
-    inputs: Mapping[str, object] | None = None,
+    study: Mapping[str, object] | None = None,
 ) -> dict[str, Any]:
     """Content of ``quantities.json``; `noise` is the relative scatter of a block."""
     modulus, step, speed = point
     content: dict[str, Any] = {
-        "schema": SCHEMA, "study": "small", "run": f"{modulus:g}-{step:g}-{speed:g}-{seed}",
+        "schema": SCHEMA, "study_name": "small", "run": f"{modulus:g}-{step:g}-{speed:g}-{seed}",
         "bed": f"bed-{seed}", "complete": not failure,
-        "inputs": {"seed": seed, "motion.path.revolutions": blocks / 16, **(inputs or {})},
+        "study": plain_study(
+            {"seed": seed, "motion.path.revolutions": blocks / 16, **(study or {})}
+        ),
         "fidelity": {
             "name": "tradeoff", "youngs_modulus_scale": modulus, "timestep_fraction": step,
             "speed_factor": speed, "skin_m": 3e-4, "ranks": 1,
@@ -107,7 +110,7 @@ def write_drop(folder: Path, fraction: float, ratios: Sequence[float], cpu_time_
     """A drop test with its table of impacts."""
     case = case_json("drop_test", folder.name, restitution=0.9, timestep_s=fraction * 1e-5,
                      rayleigh_time_s=1e-5, phases=[])  # fmt: skip
-    case["inputs"]["drop_test.timestep_fraction"] = fraction
+    case["inputs"] = {"drop_test": {"timestep_fraction": fraction}}
     record = run_json(cpu_time_s=cpu_time_s, wall_time_s=1.0, ranks=1)
     write_documents(folder, case, record=record)
     save(pd.DataFrame({"restitution": ratios}), folder, "impacts")

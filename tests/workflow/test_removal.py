@@ -31,7 +31,8 @@ def worn(folder: Path, timestep_s: float, law: dict[str, Any], **particle: Any) 
         *outputs.first_touch(0, STEPS, several=False),
     ]
     made = write_plate(folder, None, drag, outputs.in_writing_order(written), **particle)
-    made = with_motion(made | {"removal": {"coefficient_m2_n": 1e-12, **law}}, **line(SPEED))
+    made["study"]["removal"] = {"coefficient_m2_n": 1e-12, **law}
+    made = with_motion(made, **line(SPEED))
     (folder / "case.json").write_text(json.dumps(made))
     engine(folder)
     write_tables(folder)

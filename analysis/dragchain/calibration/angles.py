@@ -8,13 +8,11 @@ from numpy.typing import NDArray
 
 from dragchain.arrays import Floats
 from dragchain.errors import TableError
-from dragchain.run.run_parts import iter_frames
 from dragchain.statistics.correlated import estimate_mean
-from dragdeck.decks.outputs import load_outputs
+from dragchain.tables.run_folder import Run
 from dragdeck.dumps.frame import Frame
-from dragdeck.records.case import CaseOfRun
 from dragdeck.records.run import read_accepted
-from dragdeck.scenes.angles import AngleRun
+from dragdeck.scenes.angles import AngleCase, AngleRun
 
 _SECTORS = 8
 """Sectors of a heap; the scatter of its angle is that without one of them."""
@@ -123,9 +121,10 @@ def read_angle(folder: Path) -> Mapping[str, str | float]:
         The run is not complete, or has no surface.
     """
     read_accepted(folder)
-    run, frame = AngleRun.model_validate(CaseOfRun.read(folder / "case.json").inputs), None
+    case = AngleCase.read(folder / "case.json")
+    run, frame = case.angle, None
     angles: list[float] = []
-    for frame in iter_frames(folder, load_outputs(folder)["particles"]):
+    for frame in Run(folder, case).frames("particles"):
         if run.drum_radius_m and frame.step >= run.counted_from:
             angles.append(drum_angle(*_free(frame, run), run.drum_radius_m))
     assert frame is not None  # an accepted run has all its frames

@@ -15,10 +15,8 @@ from scipy.optimize import brentq
 from dragchain.arrays import Floats
 from dragchain.calibration.drops import IMPACTS, DropSet, DropTest, Purpose, SimulatedDrop
 from dragchain.errors import TableError
-from dragchain.run.run_parts import iter_prints
 from dragchain.tables.impacts import speed_at_plate
-from dragdeck.decks.outputs import load_outputs
-from dragdeck.records.case import load_case
+from dragchain.tables.run_folder import Run
 
 _SAMPLES = ("step", "time_s", "z_m", "vz_m_s", "force_n")
 """Columns of a drop's output around its impacts."""
@@ -122,13 +120,14 @@ def read_drops(known: DropSet, folder: Path) -> Drops:
 
 
 def _read_drop(folder: Path, drop: SimulatedDrop) -> DropRun:
-    case = load_case(folder)
-    blocks = iter_prints(folder, load_outputs(folder)["impacts"])
-    rows = pd.concat([pd.DataFrame({name: block[name] for name in _SAMPLES}) for block in blocks])
+    run = Run.open(folder)
+    rows = pd.concat(
+        [pd.DataFrame({name: block[name] for name in _SAMPLES}) for block in run.prints("impacts")]
+    )
     windows = [window for _, window in rows.groupby((rows["step"].diff() != 1).cumsum())]
     if len(windows) < IMPACTS:
         raise TableError(f"{folder}: {len(windows)} impacts; a calibration requires {IMPACTS}")
-    radius, gravity = case.media.radius_mean_m, case.gravity_m_s2
+    radius, gravity = run.case.media.radius_mean_m, run.case.gravity_m_s2
     pieces = [
         waveform({name: window[name].to_numpy(np.float64) for name in _SAMPLES}, radius, gravity)
         for window in windows

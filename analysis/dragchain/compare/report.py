@@ -50,12 +50,17 @@ class ComparedCase:
     case: ReportedCase
 
     @cached_property
-    def by_seed(self) -> Mapping[JsonValue, StudyRuns]:
+    def by_seed(self) -> Mapping[int, StudyRuns]:
         """Its process runs by the seed of their packing."""
-        return {study.process.case.inputs.get("seed"): study for study in self.case.studies}
+        return {runs.process.study.seed: runs for runs in self.case.studies}
 
     @cached_property
-    def load_maps(self) -> Mapping[JsonValue, Floats]:
+    def inputs(self) -> Mapping[str, JsonValue]:
+        """Values of its study by dotted name."""
+        return self.case.first.process.study.inputs()
+
+    @cached_property
+    def load_maps(self) -> Mapping[int, Floats]:
         """Mean normal load of each packing by depth and azimuth, N."""
         return {seed: _load_map(study) for seed, study in self.by_seed.items()}
 
@@ -129,7 +134,7 @@ def _difference(quantity: Quantity, first: ComparedCase, other: ComparedCase) ->
     return CaseDifference(other.name, quantity, before, after, change, basis, paired)
 
 
-def _standings(case: ComparedCase, quantity: Quantity) -> dict[JsonValue, Standing]:
+def _standings(case: ComparedCase, quantity: Quantity) -> dict[int, Standing]:
     standings = {seed: study.values.of(quantity.name) for seed, study in case.by_seed.items()}
     return {seed: standing for seed, standing in standings.items() if standing}
 
@@ -174,16 +179,19 @@ class FactorEffect:
         return [f"{name} ({both})" for name, both in zip(self.factors, self.levels, strict=True)]
 
 
+def _changed(cases: Sequence[ComparedCase]) -> dict[str, list[JsonValue]]:
+    """Inputs but the seed that differ between cases, with the value of each case."""
+    first, *others = (case.inputs for case in cases)
+    names = {name for inputs in others for name in changed_inputs(inputs, first)} - {"seed"}
+    return {name: [case.inputs.get(name) for case in cases] for name in sorted(names)}
+
+
 def factors_of(cases: Sequence[ComparedCase]) -> dict[str, list[JsonValue]]:
     """Inputs that are set independently of each other, with the level of each case.
 
     Empty unless there are at least two, and every combination of their levels is a case.
     """
-    inputs = [case.case.first.process.case.inputs for case in cases]
-    names = {name for other in inputs[1:] for name in changed_inputs(other, inputs[0])} - {"seed"}
-    levels_by_name = {
-        name: [inputs_of_case.get(name) for inputs_of_case in inputs] for name in sorted(names)
-    }
+    levels_by_name = _changed(cases)
     levels = [{repr(level) for level in column} for column in levels_by_name.values()]
     combined = {tuple(map(repr, row)) for row in zip(*levels_by_name.values(), strict=True)}
     crossed = len(combined) == math.prod(map(len, levels)) == len(cases)
@@ -393,7 +401,7 @@ def read_compared(folders: Sequence[Path]) -> list[ComparedCase]:
     for folder in folders:
         for run_dir in _process_runs(folder):
             study_runs = read_study_runs(run_dir)
-            studies.setdefault(study_runs.process.case.study, []).append(study_runs)
+            studies.setdefault(study_runs.process.case.study_name, []).append(study_runs)
     grouped = {study: cases_of(runs) for study, runs in studies.items()}
     cases = [
         ComparedCase(_name(study, case, len(grouped), len(of_study)), case)
@@ -447,14 +455,6 @@ def write_comparison(out_dir: Path, folders: Sequence[Path]) -> None:
         else []
     )
     linked = _write_networks(out_dir, cases)
-    inputs = [case.case.first.process.case.inputs for case in cases]
-    changed = sorted(
-        {
-            name
-            for inputs_of_case in inputs[1:]
-            for name in changed_inputs(inputs_of_case, inputs[0])
-        }
-    )
 
     def draw() -> dict[str, Figure]:
         figures = {"maps": draw_maps(cases)}
@@ -480,9 +480,7 @@ def write_comparison(out_dir: Path, folders: Sequence[Path]) -> None:
         notes=notes,
         effects=effects,
         linked=linked,
-        changed=[
-            (name, [inputs_of_case.get(name) for inputs_of_case in inputs]) for name in changed
-        ],
+        changed=_changed(cases),
     )
 
 

@@ -200,7 +200,7 @@ class FrameSeries:
                 "particles in"
                 " its outputs"
             )
-        steps, times_s = _frame_times(run.table("particles.parquet"))
+        steps, times_s = _frame_times(run.file("particles.parquet"))
         wanted = _inside(times_s, selection, run.case)
         if not wanted.any():
             raise ExportError(_nothing(run, times_s, selection))
@@ -220,7 +220,7 @@ class FrameSeries:
     def has_chains(self) -> bool:
         """Whether chains were looked for."""
         tables = ("network.parquet", "chains.parquet")
-        return self.has_contacts and all(self.run.table(name).is_file() for name in tables)
+        return self.has_contacts and all(self.run.file(name).is_file() for name in tables)
 
     def __iter__(self) -> Iterator[FrameData]:
         """Yield the frames in the order of their steps.
@@ -232,13 +232,13 @@ class FrameSeries:
         """
         run, steps = self.run, self.steps
         moving = _PARTICLES + (ORIENTATION if run.case.bodies else ())
-        particles = RisingSteps(run.table("particles.parquet"), moving, steps)
+        particles = RisingSteps(run.file("particles.parquet"), moving, steps)
         contacts = chains = None
         if self.has_contacts:
-            contacts = RisingSteps(run.table("contacts.parquet"), CONTACTS, steps)
+            contacts = RisingSteps(run.file("contacts.parquet"), CONTACTS, steps)
         if self.has_chains:
-            chains = RisingSteps(run.table("chains.parquet"), _CHAINS, steps)
-        searched = _steps(run.table("network.parquet")) if chains is not None else frozenset()
+            chains = RisingSteps(run.file("chains.parquet"), _CHAINS, steps)
+        searched = _steps(run.file("network.parquet")) if chains is not None else frozenset()
         place = workpiece_places(run.folder, run.case) if run.case.workpiece is not None else None
         for step, time_s in zip(steps.tolist(), self.times_s.tolist(), strict=True):
             of_particles = particles.at(step).sort_values("particle_id", ignore_index=True)
@@ -265,7 +265,7 @@ def _inside(times_s: Floats, selection: Selection, case: CaseOfRun) -> np.ndarra
 
 def _nothing(run: Run, times_s: Floats, selection: Selection) -> str:
     if not times_s.size:
-        return f"{run.table('particles.parquet')} contains no frames, so there is nothing to export"
+        return f"{run.file('particles.parquet')} contains no frames, so there is nothing to export"
     wanted = [
         f"{word} {value:g} s"
         for word, value in (("from", selection.first_s), ("to", selection.last_s))

@@ -82,7 +82,7 @@ def _loaded_workpiece(run: Run) -> Any:
     The facets of ``facets.parquet`` are in the order of the mesh unless VTK left one out.
     """
     mesh = read_workpiece_mesh(run.folder, run.case)
-    file = run.table("facets.parquet")
+    file = run.file("facets.parquet")
     if file.is_file():
         facets = pd.read_parquet(file, columns=list(_LOADING))
         if len(facets) == mesh.n_cells:

@@ -222,7 +222,7 @@ def _list(folder: Path, to: str, series: FrameSeries, size: int) -> ExportFile:
     case = series.run.case
     return ExportFile(
         format=to,
-        study=case.study,
+        study=case.study_name,
         scene=case.scene,
         run=case.run,
         frames=len(series),

@@ -19,6 +19,7 @@ from dragchain.loading.document import Loading, Quantiles
 from dragchain.loading.edges import EdgeBands, edge_bands
 from dragchain.loading.samples import TOUCHED, Sampled, patches, sample, standard_errors
 from dragchain.loading.summary import event_quantiles
+from dragchain.run.case import study_of
 from dragchain.run.kinematics import needed
 from dragchain.run.workpiece import Surface
 from dragchain.statistics.correlated import estimates
@@ -117,7 +118,8 @@ def compute_wear(
         If ``touches.parquet`` is missing or has no contact, or the law reads impacts and the run
         has not written first touches.
     """
-    if case.removal is None and TOUCHES[1] not in load_outputs(run_dir):
+    removal = study_of(case).removal
+    if removal is None and TOUCHES[1] not in load_outputs(run_dir):
         return None, None
     factor, size = case.fidelity.speed_factor, case.media.radius_mean_m
     immersion = needed(case.workpiece, "workpiece").immersion_depth_m
@@ -133,7 +135,7 @@ def compute_wear(
             per_s=per_s,
             quantities={name: event_quantiles(events[name]) for name in TOUCH_QUANTITIES},
         )
-    impact = case.removal is not None and case.removal.laws[-1].impact
+    impact = removal is not None and removal.laws[-1].impact
     each = [_action(law, surface, group, factor * law.interval_s) for law in of_laws]
     total, density, error = zip(*each, strict=True)
     share = loading.types["impact"].fraction_of["force_slide_n_m"]
@@ -165,7 +167,8 @@ def acting(
     TableError
         As `compute_wear`.
     """
-    law = case.removal.laws[-1] if case.removal else LAWS["archard"]
+    laws = removal.laws if (removal := study_of(case).removal) else (LAWS["archard"],)
+    law = laws[-1]
     names = ["frame", "facet_id", *POINT]
     sliding = replace(
         sampled, rows=sampled.rows[names].assign(action=sampled.rows["force_slide_n_m"])
@@ -181,8 +184,7 @@ def acting(
     if not law.impact:
         return [sliding], part, events
     impacts = replace(part, rows=events[names].assign(action=impact_action(law, events, case)))
-    count = len(needed(case.removal, "removal").laws)
-    return [sliding, impacts][-count:], part, events
+    return [sliding, impacts][-len(laws) :], part, events
 
 
 def _action(
@@ -265,7 +267,7 @@ def impact_action(law: Law, events: pd.DataFrame, case: CaseOfRun) -> Floats:
         normal_m_s=events["touch_normal_m_s"].to_numpy(),
         tangential_m_s=events["touch_tangential_m_s"].to_numpy(),
     )
-    removal = needed(case.removal, "removal")
+    removal = needed(study_of(case).removal, "removal")
     return (removal.impact_ratio or 1.0) * law.action(wearing, removal)
 
 

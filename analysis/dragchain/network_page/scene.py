@@ -151,7 +151,7 @@ def shown_frames(run: Run, peak_time_s: Floats) -> FrameSeries:
             f"{run.folder}: this {run.case.scene} run wrote no contact network, which the"
             " page requires\n  remedy: use the outputs contacts and particles"
         )
-    network = read_table(run.table("network.parquet"), ["step", "time_s"])
+    network = run.table("network", ["step", "time_s"])
     steps, times = network["step"].to_numpy(np.int64), network["time_s"].to_numpy(np.float64)
     even = np.linspace(0, len(steps) - 1, min(FRAMES, len(steps))).round().astype(np.int64)
     nearest = np.abs(times[:, None] - peak_time_s).argmin(axis=0)
@@ -339,7 +339,7 @@ def _displacement(shown: Shown) -> float:
 def _dominant_paths(run: Run, steps: Ints) -> list[dict[str, JsonValue] | None]:
     """The dominant path of each frame: bottleneck in N, particles in order, where it ends."""
     names = ["step", "particle_ids", "bottleneck_n", "mean_force_n", "end_kind", "dominant"]
-    table = read_table(run.table("chains.parquet"), names)
+    table = run.table("chains", names)
     rows = {int(row["step"]): row for row in table[table["dominant"]].to_dict("records")}
     return [_path(rows.get(step)) for step in steps.tolist()]
 
@@ -375,7 +375,7 @@ def _workpiece(columns: PackedColumns, run: Run, shown: Shown, steps: Ints) -> d
 
 def _loads(columns: PackedColumns, run: Run) -> list[JsonValue]:
     """Add the columns of ``facets.parquet`` that are shown, if the table was made."""
-    file = run.table("facets.parquet")
+    file = run.file("facets.parquet")
     if not file.is_file():
         return []
     table = read_table(file, [*_LOADS, "area_m2"])
@@ -396,7 +396,7 @@ def _headings(run: Run, steps: Ints) -> Floats:
 
 
 def _force(run: Run, names: list[str]) -> pd.DataFrame:
-    return read_table(run.table("workpiece_force.parquet"), names)
+    return run.table("workpiece_force", names)
 
 
 def _curve(columns: PackedColumns, run: Run) -> dict[str, float]:

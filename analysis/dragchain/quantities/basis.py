@@ -11,6 +11,7 @@ from enum import StrEnum
 from typing import NamedTuple
 
 from dragchain.quantities.registry import Quantity
+from dragchain.run.case import study_of
 from dragchain.statistics.estimate import Estimate
 from dragdeck.records.case import CaseOfRun, FidelityOfRun
 from dragdeck.records.run import changed_in_words
@@ -175,9 +176,9 @@ def _of_modulus_and_speed(case: CaseOfRun) -> Iterator[str]:
 def _of_step(case: CaseOfRun) -> str:
     percent = f"{100 * case.fidelity.timestep_fraction:.3g} %"
     text = f"The time step is {percent} of the Rayleigh time"
-    if case.unsafe_timestep:
+    if reason := study_of(case).accepted.unsafe_timestep:
         return (
-            f"{text}, which may be unstable and is accepted on purpose ({case.unsafe_timestep}): "
+            f"{text}, which may be unstable and is accepted on purpose ({reason}): "
             "forces may be too small by a quarter without any other sign."
         )
     return f"{text}; below the largest stable step no effect of it was measured."

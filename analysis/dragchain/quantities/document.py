@@ -9,13 +9,11 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from pydantic import JsonValue
-
 from dragchain.quantities.along import PathQuantities
 from dragchain.quantities.registry import MEASURED
 from dragchain.statistics.estimate import Estimate
 from dragdeck.documents import Document, Part
-from dragdeck.records.case import FidelityOfRun
+from dragdeck.records.case import FidelityOfRun, StudyOfRun
 from dragdeck.records.run import AcceptanceCheck
 
 MEASURED_FILE = Path("tables") / "quantities.json"
@@ -75,10 +73,10 @@ class RunQuantities(PathQuantities, Document):
 
     remedy = "make it with: ./run dragchain quantities"
 
-    study: str
+    study_name: str
+    study: StudyOfRun
     run: str
     bed: str | None
-    inputs: Mapping[str, JsonValue]
     fidelity: FidelityOfRun
     numbers: Mapping[str, float] = {}
     complete: bool
@@ -88,13 +86,6 @@ class RunQuantities(PathQuantities, Document):
     failure: tuple[AcceptanceCheck, ...] = ()
     single: Mapping[str, float] = {}
     values_of_run: Mapping[str, Estimate] = {}
-
-    @property
-    def seed(self) -> int:
-        """Seed of its bed."""
-        seed = self.inputs["seed"]
-        assert isinstance(seed, int)
-        return seed
 
     @property
     def why_failed(self) -> str:

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Generic, TypeVar
 
 import numpy as np
-from pydantic import JsonValue
 
 from dragchain.loading.document import FILE as LOADING
 from dragchain.loading.document import Loading
@@ -22,13 +21,16 @@ from dragchain.quantities.document import EXTRAPOLATED, MEASURED_FILE, Extrapola
 from dragchain.report.findings import FILE, DropFindings, FillingFindings, Findings, ProcessFindings
 from dragchain.report.page import TIMES, fixed, number, with_interval
 from dragchain.report.values import Values, values_of, values_over_packings
-from dragchain.run.case import changed_inputs, upstream_folders, with_changes
+from dragchain.run.case import changed_inputs, study_of, upstream_folders, with_changes
 from dragchain.run.kinematics import axis_speed, drag_phase, motion_of, needed, path_passed
 from dragchain.statistics.estimate import mean_of
+from dragchain.tables.run_folder import Run
 from dragdeck.documents import Document
 from dragdeck.errors import DocumentError, RejectedRunError
 from dragdeck.records.case import CaseOfRun, ClassOfRun, load_case
 from dragdeck.records.run import RunRecord, read_accepted
+from dragdeck.study.media import Grains
+from dragdeck.study.workpiece import CylinderShape
 
 # --- what was simulated --------------------------------------------------------------------------
 
@@ -69,16 +71,13 @@ def set_up(
 
 
 def _workpiece(case: CaseOfRun) -> Iterator[str]:
-    own, inputs = needed(case.workpiece, "workpiece"), case.inputs
-    material = _text(inputs.get("workpiece.material"))
-    if inputs.get("workpiece.shape.kind", own.kind) == "cylinder":
-        radius = inputs.get("workpiece.shape.radius_m")
-        if own.kind == "cylinder" or not isinstance(radius, float | int):
-            radius = own.radius_m  # of an inclined one, that is how far it reaches
-        yield f"{material} cylinder, diameter {_mm(2 * radius)}".strip()
+    own, workpiece = needed(case.workpiece, "workpiece"), study_of(case).workpiece
+    material, shape = workpiece.material, workpiece.shape
+    if isinstance(shape, CylinderShape):  # the reach of an inclined one is larger
+        radius = own.radius_m if own.kind == "cylinder" else shape.radius_m
+        yield f"{material} cylinder, diameter {_mm(2 * radius)}"
     else:
-        file = _text(inputs.get("workpiece.shape.file")) or own.mesh
-        yield f"{material} part {file}, up to {_mm(own.radius_m)} from its axis".strip()
+        yield f"{material} part {shape.file}, up to {_mm(own.radius_m)} from its axis"
     if own.count > 1:
         yield f"number {own.number} of {own.count}"
 
@@ -88,7 +87,7 @@ def _path(case: CaseOfRun) -> Iterator[str]:
     end_s = np.array([drag_phase(case).end_step * case.timestep_s])
     yield f"{_mm(float(path_passed(end_s, case)[0]))} long"
     yield f"immersed {_mm(needed(case.workpiece, 'workpiece').immersion_depth_m)}"
-    if tilt := case.inputs.get("motion.tilt_deg"):
+    if tilt := study_of(case).motion.tilt_deg:
         yield f"inclined by {tilt:g}\N{DEGREE SIGN}"
     yield from (f"with {one.kind}" for one in case.superposed)
 
@@ -101,13 +100,13 @@ def _speed(case: CaseOfRun) -> Iterator[str]:
 
 
 def _media(case: CaseOfRun) -> Iterator[str]:
-    media, material = case.media, _text(case.inputs.get("media.material"))
+    media, grains = case.media, study_of(case).media.main
     if case.classes:
         what = "particles" if case.bodies else "spheres"
         yield f"{number(media.count)} {what} in {len(case.classes)} classes"
         return
-    what, diameter = _shape(case, "media")
-    yield " ".join(filter(None, (number(media.count), material, what)))
+    what, diameter = _shape(grains)
+    yield f"{number(media.count)} {grains.material} {what}"
     spread = (
         f" \N{PLUS-MINUS SIGN} {_mm(2 * media.radius_std_m)} (standard deviation)"
         if media.radius_std_m
@@ -116,10 +115,11 @@ def _media(case: CaseOfRun) -> Iterator[str]:
     yield f"{diameter} {_mm(2 * media.radius_mean_m)}{spread}"
 
 
-def _shape(case: CaseOfRun, media: str) -> tuple[str, str]:
-    """What the particles of a block of the study are, and what their diameter is."""
-    kind = _text(case.inputs.get(f"{media}.shape.kind")).replace("_", " ")
-    return (f"particles ({kind})", "diameter of equal volume") if kind else ("spheres", "diameter")
+def _shape(grains: Grains) -> tuple[str, str]:
+    """What particles are, and what their diameter is."""
+    if grains.shape is None:
+        return "spheres", "diameter"
+    return f"particles ({grains.shape.kind.replace('_', ' ')})", "diameter of equal volume"
 
 
 def _class(one: ClassOfRun, case: CaseOfRun, findings: Sequence[ProcessFindings]) -> Iterator[str]:
@@ -129,16 +129,14 @@ def _class(one: ClassOfRun, case: CaseOfRun, findings: Sequence[ProcessFindings]
         "volume": {each.name: each.volume_m3 for each in case.classes},
         "mass": {each.name: each.density_kg_m3 * each.volume_m3 for each in case.classes},
     }
-    of = str(case.inputs.get("media.fractions_of", "mass"))
-    asked = case.inputs.get(f"media.classes.{one.name}.fraction")
-    what, diameter = _shape(case, f"media.classes.{one.name}")
+    media = study_of(case).media
+    of, requested = media.fractions_of, media.classes[one.name]
+    what, diameter = _shape(requested)
     yield f"{number(one.count)} {one.material} {what}"
     mean, spread = _mm(2 * one.radius_mean_m), _mm(2 * one.radius_std_m)
     yield f"{diameter} {mean} \N{PLUS-MINUS SIGN} {spread} (standard deviation)"
     got = amounts[of][one.name] / sum(amounts[of].values())
-    yield f"{number(100 * got)} % of the {of}" + (
-        f" (asked: {number(100 * asked)} %)" if isinstance(asked, int | float) else ""
-    )
+    yield f"{number(100 * got)} % of the {of} (asked: {number(100 * requested.fraction)} %)"
     found = np.array([each.segregation[one.name] for each in findings if each.segregation])
     if len(found):
         start, end = (fixed(value, 3, sign=True) for value in found.mean(axis=0))
@@ -159,14 +157,14 @@ def _class(one: ClassOfRun, case: CaseOfRun, findings: Sequence[ProcessFindings]
 
 
 def _bowl(case: CaseOfRun, filling: FillingFindings | None) -> Iterator[str]:
-    bowl, material = case.bowl, _text(case.inputs.get("bowl.material"))
-    yield f"{material} cylinder, radius {_mm(bowl.radius_m)}".strip()
+    study = study_of(case)
+    yield f"{study.bowl.material} cylinder, radius {_mm(study.bowl.radius_m)}"
     if filling is not None and "bed_height_m" in filling.bed:
         fraction = filling.bed.get("solid_fraction")
         solid = f", solid fraction {number(fraction)}" if fraction is not None else ""
         yield f"filled to {_mm(float(filling.bed['bed_height_m']))}{solid}"
-    if (density := case.inputs.get("compound.density_kg_m3")) is not None:
-        yield f"compound of {density} kg/m³ (buoyancy only)"
+    if study.compound:
+        yield f"compound of {study.compound.density_kg_m3} kg/m³ (buoyancy only)"
 
 
 def _settings(case: CaseOfRun, packings: int) -> Iterator[str]:
@@ -183,10 +181,6 @@ def _mm(length_m: float) -> str:
     return f"{number(1e3 * length_m)} mm"
 
 
-def _text(value: JsonValue) -> str:
-    return value if isinstance(value, str) else ""
-
-
 # --- runs ----------------------------------------------------------------------------------------
 
 
@@ -195,11 +189,9 @@ F = TypeVar("F", bound=Findings, covariant=True)
 
 
 @dataclass(frozen=True)
-class ReportedRun(Generic[F]):
-    """A run that counts: its folder, case, findings and ``run.json``."""
+class ReportedRun(Run, Generic[F]):
+    """A run that counts, with its findings and ``run.json``."""
 
-    folder: Path
-    case: CaseOfRun
     findings: F
     record: RunRecord
 
@@ -329,9 +321,9 @@ def cases_of(studies: Iterable[StudyRuns]) -> list[ReportedCase]:
     known: set[tuple[str, str]] = set()
     for study in studies:
         case = study.process.case
-        if (case.study, case.run) in known:
+        if (case.study_name, case.run) in known:
             continue
-        known.add((case.study, case.run))
+        known.add((case.study_name, case.run))
         for group in found:
             if _same_but_seed(group[0], study):
                 group.append(study)
@@ -344,5 +336,5 @@ def cases_of(studies: Iterable[StudyRuns]) -> list[ReportedCase]:
 def _same_but_seed(one: StudyRuns, other: StudyRuns) -> bool:
     a, b = one.process.case, other.process.case
     numbers = [case.workpiece.number if case.workpiece else 0 for case in (a, b)]
-    changed = set(changed_inputs(a.inputs, b.inputs)) | set(changed_inputs(b.inputs, a.inputs))
-    return changed == {_SEED} and a.fidelity == b.fidelity and numbers[0] == numbers[1]
+    changed = changed_inputs(one.process.study.inputs(), other.process.study.inputs())
+    return changed.keys() == {_SEED} and a.fidelity == b.fidelity and numbers[0] == numbers[1]

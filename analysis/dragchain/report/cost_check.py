@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dragchain.report.cases import ReportedCase
-from dragchain.run.case import changed_inputs
+from dragchain.run.case import changed_inputs, study_of
 from dragchain.statistics.estimate import Estimate
 from dragdeck.records.advice import AdviceFile, OptionEntry
 from dragdeck.records.advised import AdvisedSettings
@@ -92,7 +92,7 @@ def prediction_for(case: CaseOfRun, options: Sequence[OptionEntry]) -> OptionEnt
 def _is_of(case: CaseOfRun, option: OptionEntry) -> bool:
     own, other = case.fidelity, option.settings
     same = all(math.isclose(getattr(other, name), getattr(own, name)) for name in _SETTINGS)
-    return same and not changed_inputs(case.inputs, option.inputs)
+    return same and not changed_inputs(study_of(case).inputs(), option.inputs)
 
 
 def cost_rows(option: OptionEntry, records: Mapping[str, RunRecord]) -> Iterator[CostRow]:

@@ -116,11 +116,11 @@ class _Crate:
         self._files: dict[Path, Any] = {}
         self._left_out: list[Path] = []
         root = self._crate.root_dataset
-        root["name"] = f"{case.study}: {case.title}" if case.title else case.study
+        root["name"] = f"{case.study_name}: {case.title}" if case.title else case.study_name
         root["description"] = (
-            f"Inputs, input scripts, results and report of the study {case.study}: drag finishing,"
-            " simulated with the discrete element method (LIGGGHTS) through dragdeck. Paths are"
-            f" those of the project; {LEFT_OUT} lists the files that were left out."
+            f"Inputs, input scripts, results and report of the study {case.study_name}: drag"
+            " finishing, simulated with the discrete element method (LIGGGHTS) through dragdeck."
+            f" Paths are those of the project; {LEFT_OUT} lists the files that were left out."
         )
         if licence:
             address = f"{_LICENCES}{licence}" if _SPDX_NAME.fullmatch(licence) else licence

@@ -16,7 +16,6 @@ from dragchain.report.findings import FILE, ProcessFindings
 from dragchain.report.run_data import RunData
 from dragchain.report.run_figures import DRAW_PROCESS
 from dragdeck.files import write_bytes
-from dragdeck.records.case import load_case
 
 COLUMN_MM, PAGE_MM = 85, 180
 _ONE_COLUMN = ("force_around_workpiece",)
@@ -60,8 +59,7 @@ def write_journal_figures(run_dir: Path, paper_colours: bool = False) -> list[Pa
     DragdeckError
         If it is no process run, a table is missing, or pictures cannot be rendered here.
     """
-    case = load_case(run_dir)
-    run = RunData(run_dir, case)
+    run = RunData.open(run_dir)
     findings = ProcessFindings.read(run_dir / FILE)
     written = []
     with drawing():

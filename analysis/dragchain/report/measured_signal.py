@@ -28,7 +28,6 @@ from dragchain.figures.panels import key, legend_below, new_figure, row, row_nam
 from dragchain.figures.style import COLOURS, GREEN, GREY, RED, drawing, png
 from dragchain.report.cases import ReportedCase, ReportedRun
 from dragchain.report.findings import ProcessFindings
-from dragchain.report.run_data import RunData
 from dragchain.report.values import mean_over_packings
 from dragchain.run.kinematics import needed, process_time
 from dragchain.statistics.correlated import MIN_SAMPLES, autocovariance, estimate_mean, estimates
@@ -335,7 +334,8 @@ def compare_signal(case: ReportedCase, file: Path | None) -> SignalComparison | 
     its fluctuations take as much longer as the path does.
     """
     first = case.first.process.case
-    signal = first.reference.signal if first.reference else None
+    reference = case.first.process.study.reference
+    signal = reference.signal if reference else None
     if signal is None:
         return None
     if file is None:
@@ -360,7 +360,7 @@ def compare_signal(case: ReportedCase, file: Path | None) -> SignalComparison | 
 
 def _simulated(run: ReportedRun[ProcessFindings], signal: Signal) -> Floats:
     column = f"{signal.component}_n"
-    table = RunData(run.folder, run.case).table("workpiece_force", ["time_s", "phase", column])
+    table = run.table("workpiece_force", ["time_s", "phase", column])
     table = table[table["phase"] == "drag"]
     time_s, force = (table[name].to_numpy(np.float64) for name in ("time_s", column))
     return low_passed(process_time(time_s, run.case), force, signal.low_pass_hz)[1]

@@ -205,7 +205,8 @@ def removal_of(case: ReportedCase) -> RemovalOfCase | None:
         If a run of it lacks ``wear.json``, or nothing that the law reads has happened.
     """
     first, load = case.first.process.case, case.values.of("force_slide")
-    removal, wears = first.removal, [study.wear for study in case.studies if study.wear]
+    study = case.first.process.study
+    removal, wears = study.removal, [study.wear for study in case.studies if study.wear]
     if removal is None or load is None:
         return None
     folder, factor = case.first.process.folder, 1.0
@@ -218,8 +219,7 @@ def removal_of(case: ReportedCase) -> RemovalOfCase | None:
     if not action.value:
         raise TableError(f"{folder}: the law {removal.law} finds no action: use a longer path or a "
                          "larger outputs.first_touch_fraction")  # fmt: skip
-    density = first.inputs[f"materials.{first.inputs['workpiece.material']}.density_kg_m3"]
-    assert isinstance(density, float | int)
+    density = study.materials[study.workpiece.material].density_kg_m3
     between = len(wears) > 1 and not load.corrected
     degrees = len(wears) - 1 if between else math.inf
     coefficient, rate = predict(removal, action, density, degrees)

@@ -1,9 +1,7 @@
 """A run with its tables, each read once and only if it is needed, and its findings from them."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -46,9 +44,9 @@ from dragchain.run.kinematics import drag_start_s, needed, path_passed, process_
 from dragchain.statistics.correlated import estimate_mean, estimates, frame_sums
 from dragchain.statistics.estimate import CONFIDENCE, Estimate, EstimateColumns
 from dragchain.tables.bed import segregation
-from dragchain.tables.by_step import read_groups, read_table
+from dragchain.tables.by_step import read_groups
 from dragchain.tables.impacts import effective_restitution
-from dragdeck.decks.outputs import load_outputs
+from dragchain.tables.run_folder import Run
 from dragdeck.records.case import CaseOfRun
 from dragdeck.records.packing import Packing
 
@@ -71,22 +69,8 @@ class DragTrace(NamedTuple):
     counted: NDArray[np.bool_]
 
 
-@dataclass(frozen=True)
-class RunData:
-    """A run with its tables made.
-
-    Attributes
-    ----------
-    folder : Path
-    case : CaseOfRun
-    """
-
-    folder: Path
-    case: CaseOfRun
-
-    def table(self, name: str, columns: list[str] | None = None) -> pd.DataFrame:
-        """A table of the run, or some of its columns."""
-        return read_table(self.folder / "tables" / f"{name}.parquet", columns)
+class RunData(Run):
+    """A run with its tables made."""
 
     @cached_property
     def network(self) -> pd.DataFrame:
@@ -239,10 +223,9 @@ def of_classes(
 
 
 def _segregation(run: RunData) -> dict[str, tuple[float, float]]:
-    file = run.folder / "tables" / "particles.parquet"
-    steps = read_table(file, ["step"])["step"].iloc[[0, -1]].to_numpy()
+    steps = run.table("particles", ["step"])["step"].iloc[[0, -1]].to_numpy()
     columns = ["step", "z_m", "radius_m", "class"]
-    rows = pd.concat(read_groups(file, columns, steps))
+    rows = pd.concat(read_groups(run.file("particles.parquet"), columns, steps))
     first, last = (segregation(rows[rows["step"] == step]) for step in steps)
     return {name: (first[name], last[name]) for name in first}
 
@@ -304,7 +287,7 @@ def _workpiece_contacts(
     columns += ["class"] if run.case.classes else []
     contacts = run.table(table, columns)
     contacts = contacts[contacts["in_statistics"]]
-    output = load_outputs(run.folder)["workpiece_contacts"]
+    output = run.outputs["workpiece_contacts"]
     counted = samples["step"].to_numpy(np.int64)
     written = np.arange(output.first_step, counted[-1] + 1, output.period_steps)
     written = written[written >= counted[0]]
@@ -316,7 +299,7 @@ def _workpiece_contacts(
 
 
 def _filling(run: RunData) -> FillingFindings:
-    bed = Packing.read(run.folder / "tables" / "packing.json")
+    bed = Packing.read(run.file("packing.json"))
     settled = run.case.settled
     return FillingFindings(
         run=run.case.run,

@@ -30,10 +30,8 @@ from dragchain.report.findings import DropFindings, DropImpacts, FillingFindings
 from dragchain.report.run_data import RunData, write_findings
 from dragchain.run.kinematics import process_time
 from dragchain.run.reference import ReferenceDrag, reference_drags
-from dragchain.run.run_parts import iter_prints
 from dragchain.statistics.estimate import Estimate
-from dragdeck.decks.outputs import load_outputs
-from dragdeck.records.case import CaseOfRun, load_case
+from dragdeck.records.case import CaseOfRun
 from dragdeck.records.run import figures_of
 
 # --- panels --------------------------------------------------------------------------------------
@@ -57,7 +55,7 @@ def forces_panel(axes: Axes, run: RunData, found: ProcessFindings) -> None:
     interval = f"{mean.ci95_low:.2f} to {mean.ci95_high:.2f}"
     label = f"mean drag {mean.value:.2f} N (95 % CI {interval} N)"
     axes.plot(span, [mean.value] * 2, color="black", label=label)
-    for published in reference_drags(run.case.reference):
+    for published in reference_drags(run.study.reference):
         published_mean(axes, published)
     axes.set(xlabel="process time (s)", ylabel="force on the workpiece (N)", xlim=(0, time_s[-1]))
 
@@ -256,7 +254,7 @@ def filling(run: RunData, found: FillingFindings) -> Figure | None:
 
 def drop_test(run: RunData, found: DropFindings) -> Figure:
     """Force and speed over time of each impact."""
-    blocks = list(iter_prints(run.folder, load_outputs(run.folder)["impacts"]))
+    blocks = list(run.prints("impacts"))
     time_s, speed_m_s, force_n = (
         np.concatenate([np.asarray(block[name], dtype=np.float64) for block in blocks])
         for name in ("time_s", "vz_m_s", "force_n")
@@ -329,7 +327,7 @@ def write_figures(run_dir: Path) -> list[Path]:
     DragdeckError
         If a table is missing, a series is too short, or pictures cannot be rendered here.
     """
-    run = RunData(run_dir, load_case(run_dir))
+    run = RunData.open(run_dir)
     findings = write_findings(run)
     written = []
     with drawing():

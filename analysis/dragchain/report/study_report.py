@@ -331,8 +331,8 @@ def _render(
     first, runs = studies[0].process.case, _engine_runs(studies)
     return render_page(
         "report/report.html.j2",
-        title=", ".join(dict.fromkeys(study.process.case.study for study in studies)),
-        heading=first.title or first.study,
+        title=", ".join(dict.fromkeys(study.process.case.study_name for study in studies)),
+        heading=first.title or first.study_name,
         preview=preview,
         sections=sections,
         cases=cases,
@@ -388,7 +388,7 @@ def _engine_runs(studies: Sequence[StudyRuns]) -> list[ReportedRun[Findings]]:
 
 def _signals(cases: Sequence[ReportedCase], file: Path | None) -> list["SignalComparison"]:
     """The comparisons with a measured signal; no other part of the page needs its filters."""
-    references = [one.first.process.case.reference for one in cases]
+    references = [one.first.process.study.reference for one in cases]
     if not any(one and one.signal for one in references):
         return []
     from dragchain.report.measured_signal import compare_signal

@@ -35,13 +35,15 @@ def _summary_row(study: StudyRuns, headline: str) -> Row:
     values = study.values
     case, found, record = study.process.case, study.process.findings, study.process.record
     return {
-        "study": case.study,
+        "study": case.study_name,
         "case": case.case,
         "run": case.run,
         "headline": headline,
         "settings": " ".join(values.notes),
         "changed_scripts": "; ".join(case.changed_scripts),
-        **{input_column(name): _cell(value) for name, value in case.inputs.items()},
+        **{
+            input_column(name): _cell(value) for name, value in study.process.study.inputs().items()
+        },
         **{f"fidelity_{name}": value for name, value in vars(case.fidelity).items()},
         "timestep_s": case.timestep_s,
         "ranks": record.ranks,

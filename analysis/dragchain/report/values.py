@@ -9,6 +9,7 @@ from typing import NamedTuple
 from dragchain.quantities.basis import Basis, Correction, Standing, judge, notes
 from dragchain.quantities.document import Extrapolated
 from dragchain.quantities.registry import REPORTED
+from dragchain.run.case import study_of
 from dragchain.run.reference import ReferenceDrag, reference_drags
 from dragchain.statistics.estimate import Estimate, mean_of
 from dragdeck.records.case import CaseOfRun
@@ -75,7 +76,7 @@ class Values:
         """The mean drag beside the published ones."""
         return [
             Against(one, one.difference(self.drag.shown))
-            for one in reference_drags(self.case.reference)
+            for one in reference_drags(study_of(self.case).reference)
         ]
 
     def headline(self) -> str:

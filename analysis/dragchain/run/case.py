@@ -1,4 +1,4 @@
-"""What ``case.json`` says of a run: its inputs by dotted name, and the friction of its contacts."""
+"""What ``case.json`` says of a run: its study, what differs from others, and its friction."""
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -12,6 +12,20 @@ from dragchain.errors import TableError
 from dragdeck.errors import DragdeckError
 from dragdeck.records.case import CaseOfRun, ClassOfRun, load_case
 from dragdeck.study.contact_law import FrictionLimit
+from dragdeck.study.model import Study
+
+
+def study_of(case: CaseOfRun) -> Study:
+    """The study of a process run.
+
+    Raises
+    ------
+    TableError
+        The run is of another scene.
+    """
+    if case.study is None:
+        raise TableError(f"{case.run}: a {case.scene} has no study in case.json, only a process")
+    return case.study
 
 
 def changed_inputs(

@@ -6,15 +6,14 @@ from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ValidationError
 
 from dragchain.arrays import Floats, Ints
 from dragchain.errors import TableError
+from dragchain.run.case import study_of
 from dragdeck.records.case import CaseOfRun
 from dragdeck.records.run import Phase
 from dragdeck.study.drive import Orientations, about_vertical, rotated, wrap_angle
 from dragdeck.study.driven import DrivenMotion
-from dragdeck.study.model import Motion
 
 
 def drag_start_s(case: CaseOfRun) -> float:
@@ -118,39 +117,23 @@ def needed(value: T | None, name: str) -> T:
 
 
 def motion_of(case: CaseOfRun) -> DrivenMotion:
-    """The motion of the workpiece in the drag, from the study's own fields.
+    """The motion of the workpiece in the drag, from the study.
 
     Raises
     ------
     TableError
-        ``case.json`` has no motion, or it is not what this version makes of its inputs.
+        ``case.json`` has no motion, or it is not what this version makes of the study.
     """
     entry = needed(case.motion, "motion")
-    fields: dict[str, Any] = {}
-    for name, value in case.inputs.items():
-        *blocks, last = name.split(".")
-        if blocks[:1] == ["motion"]:
-            block = fields
-            for key in blocks[1:]:
-                block = block.setdefault(key, {})
-            block[last] = value
-    try:
-        motion = Motion.model_validate(fields)
-    except ValidationError as error:
-        raise _other_version(case, str(error.errors()[0]["msg"])) from None
     start, factor = drag_phase(case).start_step, case.fidelity.speed_factor
-    driven = DrivenMotion.of(motion, case.timestep_s, factor, start)
+    driven = DrivenMotion.of(study_of(case).motion, case.timestep_s, factor, start)
     made = [driven.path_entry(), *driven.superposed_entries()], [entry, *case.superposed]
     if not _alike(*([one.model_dump() for one in entries] for entries in made)):
-        raise _other_version(case, "motion and superposed do not follow from its inputs")
+        raise TableError(
+            f"{case.run}: case.json is of another version of dragdeck (motion and superposed do "
+            "not follow from the study): render and run it again"
+        )
     return driven
-
-
-def _other_version(case: CaseOfRun, problem: str) -> TableError:
-    return TableError(
-        f"{case.run}: case.json is of another version of dragdeck ({problem}): "
-        "render and run it again"
-    )
 
 
 def _alike(one: Any, other: Any) -> bool:

@@ -18,7 +18,7 @@ from dragchain.figures.panels import legend_below, log_ticks, new_panels
 from dragchain.figures.style import BLUE, INK, ORANGE, WIDTH_IN, drawing, png
 from dragchain.quantities.document import MEASURED_FILE, RunQuantities
 from dragchain.report.page import page_environment
-from dragchain.run.case import changed_inputs
+from dragchain.run.case import changed_inputs, study_of
 from dragchain.run.kinematics import motion_of, needed
 from dragchain.scaling.document import (
     BandPoint,
@@ -97,7 +97,8 @@ def read_scaled_runs(run_dirs: Sequence[Path], field: str) -> list[RunOfScaling]
 
 def _read_run(folder: Path, field: str) -> RunOfScaling:
     case = load_case(folder)
-    level = case.inputs.get(field)
+    study = study_of(case)
+    level = study.inputs().get(field)
     if isinstance(level, bool) or not isinstance(level, int | float) or level <= 0:
         raise TableError(f"{folder}: field {field} is {level!r}, a power law needs numbers above 0")
     drag = RunQuantities.read(folder / MEASURED_FILE).values_of_run["drag_mean"]
@@ -107,7 +108,7 @@ def _read_run(folder: Path, field: str) -> RunOfScaling:
     weight = case.media.weight_kg_m3 * case.gravity_m_s2 * 2.0 * workpiece.radius_m
     row = ScaledRun(
         run=case.run,
-        seed=case.inputs.get("seed"),
+        seed=study.seed,
         level=float(level),
         drag_n=-drag.value,
         standard_error_n=drag.half_width / NORMAL_QUANTILE,
@@ -119,7 +120,9 @@ def _read_run(folder: Path, field: str) -> RunOfScaling:
 
 
 def _check_alike(cases: Sequence[CaseOfRun], field: str) -> None:
-    first, *others = ({**case.inputs, "fidelity": case.fidelity.model_dump()} for case in cases)
+    first, *others = (
+        {**study_of(case).inputs(), "fidelity": case.fidelity.model_dump()} for case in cases
+    )
     for case, case_inputs in zip(cases[1:], others, strict=True):
         changed = changed_inputs(case_inputs, first)
         name = next((name for name in changed if name not in (field, *_UNLIKE)), None)
@@ -211,7 +214,7 @@ def find(
     records = [RunRecord.read(file) for file in files if file.is_file()]
     levels = dict.fromkeys(run.row.level for run in runs)
     return ScalingFile(
-        study=first.study,
+        study=first.study_name,
         field=field,
         expected=expected,
         verdict=(

@@ -2,15 +2,17 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import zip_longest
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 import pandas as pd
 
 from dragchain.arrays import Floats
 from dragchain.errors import TableError
-from dragchain.run.case import friction_with
+from dragchain.run.case import friction_with, study_of
 from dragchain.run.kinematics import needed, workpiece_rotation
 from dragchain.run.run_parts import iter_frames, iter_prints
 from dragchain.tables.by_step import read_table
@@ -20,6 +22,7 @@ from dragdeck.dumps.frame import Columns, Frame
 from dragdeck.records.case import CaseOfRun, load_case
 from dragdeck.study.contact_law import FrictionLimit
 from dragdeck.study.drive import Orientations
+from dragdeck.study.model import Study
 
 ON_WORKPIECE = ("workpiece_particles", "workpiece_contacts")
 """The outputs that are joined, unless others of their columns are asked for."""
@@ -55,7 +58,7 @@ def _joined(pairs: Sequence[WorkpiecePair], *, merge: bool = True) -> WorkpieceF
 
 @dataclass(frozen=True)
 class Run:
-    """A run folder with what its two JSON files say.
+    """A run folder, whose outputs and tables are read when they are needed.
 
     Attributes
     ----------
@@ -63,26 +66,37 @@ class Run:
         The run folder.
     case : CaseOfRun
         What the run models.
-    outputs : mapping of str to OutputOfRun
-        The raw outputs that it wrote.
     """
 
     folder: Path
     case: CaseOfRun
-    outputs: Mapping[str, OutputOfRun]
 
     @classmethod
-    def open(cls, run_dir: Path | str) -> "Run":
-        """Read ``case.json`` and ``columns.json`` of a run folder."""
-        return cls(Path(run_dir), load_case(run_dir), load_outputs(run_dir))
+    def open(cls, run_dir: Path | str) -> Self:
+        """Open a run folder; `DocumentError` if it contains no ``case.json``."""
+        return cls(Path(run_dir), load_case(run_dir))
+
+    @cached_property
+    def outputs(self) -> Mapping[str, OutputOfRun]:
+        """The raw outputs that it wrote."""
+        return load_outputs(self.folder)
+
+    @property
+    def study(self) -> Study:
+        """The study of a process run."""
+        return study_of(self.case)
 
     def wrote(self, *names: str) -> bool:
         """Whether the run wrote all these outputs."""
         return all(name in self.outputs for name in names)
 
-    def table(self, name: str) -> Path:
-        """Path of a table."""
+    def file(self, name: str) -> Path:
+        """Path of a table, or of a document beside the tables."""
         return self.folder / "tables" / name
+
+    def table(self, name: str, columns: list[str] | None = None) -> pd.DataFrame:
+        """A table of the run, or some of its columns."""
+        return read_table(self.file(f"{name}.parquet"), columns)
 
     @property
     def raw(self) -> Path:

@@ -104,8 +104,8 @@ def write_tables(run_dir: Path | str) -> list[Path]:
     run = Run.open(run_dir)
     tables = [table for table in _TABLES[run.case.scene] if run.wrote(*table.needs)]
     for table in tables:
-        table.write(run, run.table(table.name))
-    return [run.table(table.name) for table in tables]
+        table.write(run, run.file(table.name))
+    return [run.file(table.name) for table in tables]
 
 
 def _write_thermo(run: Run, file: Path) -> None:
@@ -199,7 +199,7 @@ def _write_workpiece_contacts(run: Run, file: Path) -> None:
     closure = Closure(limit=SHARED_LIMIT if shared else LIMIT)
     samples = WorkpieceSamples(run.prints("workpiece_force"))
     with ExitStack() as stack:
-        files = (file, *([run.table("sphere_contacts.parquet")] if bodies else ()))
+        files = (file, *([run.file("sphere_contacts.parquet")] if bodies else ()))
         names = _contact_names(run.case)
         tables = [stack.enter_context(table_writer(path, names)) for path in files]
         for frames in run.workpiece_frames():
@@ -208,7 +208,7 @@ def _write_workpiece_contacts(run: Run, file: Path) -> None:
             for table, (contacts, at) in zip(tables, _contacts(bodies, frames), strict=False):
                 rows = workpiece_contact_rows(frames.step[at], contacts, place[at], run.case)
                 table.write({**rows, "in_statistics": rows["in_statistics"] & used[at]})
-        closure.record().write(run.table("closure.json"))
+        closure.record().write(run.file("closure.json"))
         if (problem := closure.problem()) is not None:
             raise RejectedRunError(
                 f"{run.folder}: the check of force closure failed: {problem};"
@@ -323,7 +323,7 @@ def _write_contacts(run: Run, file: Path) -> None:
             rows = bodies.network(rows) if bodies else rows
             table.write(_contact_columns(frame.step, rows, run.case))
     of_main = run.case.contact_moduli["particle"].friction
-    Corrections.of(of_main, corrected).write(run.table("corrections.json"))
+    Corrections.of(of_main, corrected).write(run.file("corrections.json"))
 
 
 class _Stepped(Protocol):

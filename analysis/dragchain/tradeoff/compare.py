@@ -145,7 +145,7 @@ def read_plan_runs(
 def _inputs(measures: RunQuantities) -> dict[str, JsonValue]:
     fidelity = {f"fidelity.{name}": value for name, value in measures.fidelity}
     silent = {*SILENT, "fidelity.name", *(f"fidelity.{name}" for name in _PARAMETERS)}
-    inputs = {**measures.inputs, **fidelity}
+    inputs = {**measures.study.inputs(), **fidelity}
     return {name: value for name, value in inputs.items() if name not in silent}
 
 

@@ -12,11 +12,12 @@ from dragchain.arrays import Floats
 from dragchain.errors import SeriesError, TableError
 from dragchain.quantities.registry import MEASURED
 from dragchain.run.case import changed_inputs
-from dragchain.tables.by_step import read_table
+from dragchain.tables.run_folder import Run
 from dragchain.tradeoff.compare import PlanRun, QuantityComparison, Setting, compare_quantity
-from dragdeck.records.case import load_case
+from dragdeck.records.case import DropTestCase
 from dragdeck.records.run import RunRecord
 from dragdeck.records.tradeoff import CostsFile
+from dragdeck.study.base import flat, without_fields
 
 BROKEN = 0.1
 """A step is broken if it changes the mean drag by more than this, beyond doubt."""
@@ -289,14 +290,14 @@ def compare_drops(folders: Sequence[Path]) -> list[ComparedDrop]:
 
 def _read_drop(folder: Path) -> tuple[float, Mapping[str, JsonValue], Floats, float]:
     """Step over the Rayleigh time, inputs, ratios of the impacts and cost of a drop test."""
-    case = load_case(folder)
-    if case.scene != "drop_test":
+    run = Run.open(folder)
+    case = run.case
+    if not isinstance(case, DropTestCase):
         raise TableError(f"{folder}: the scene is {case.scene}, not drop_test")
-    ratios = read_table(folder / "tables" / "impacts.parquet", ["restitution"])["restitution"]
+    ratios = run.table("impacts", ["restitution"])["restitution"]
     record = RunRecord.read(folder / "run.json")
     if not record.complete:
         raise TableError(f"{folder}: its state is {record.state!r}, not 'complete'")
-    own_step = ("seed", "drop_test.timestep_fraction")
-    inputs = {name: value for name, value in case.inputs.items() if name not in own_step}
+    inputs = flat(without_fields(case.inputs, "drop_test.timestep_fraction"))
     fraction = float(f"{case.timestep_s / case.rayleigh_time_s:.4g}")
     return fraction, inputs, ratios.to_numpy(), record.processor_time_s

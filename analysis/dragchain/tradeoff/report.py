@@ -138,7 +138,7 @@ def tradeoff_record(
         measured=max(one.started for one in measures)[:10],
         commands=tuple(commands),
         plan=plan,
-        study=_joined(one.study for one in measures),
+        study=_joined(one.study_name for one in measures),
         versions={
             **{
                 name: _joined(one.versions[name] for one in measures)
@@ -187,7 +187,7 @@ def _setting_entry(tradeoff: Tradeoff, setting: Setting) -> SettingEntry:
     complete = sum(run.complete for run in runs)
     return SettingEntry(
         **setting.parameters(),
-        seeds=len({run.measures.seed for run in runs}),
+        seeds=len({run.measures.study.seed for run in runs}),
         runs=len(runs),
         failed=len(runs) - complete,
         arc_m=tradeoff.arc_m * complete,

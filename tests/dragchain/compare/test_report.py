@@ -28,6 +28,7 @@ from dragchain.quantities.document import EXTRAPOLATED, Extrapolated, LoadMap
 from dragchain.quantities.registry import REPORTED
 from dragchain.statistics.estimate import Estimate
 
+DEEP, FAST = "bowl.height_m", "media.radius_mean_m"
 DEPTH, SPEED, TOGETHER = 0.8, 0.3, 0.1
 PACKING = {11: 0.5, 12: -0.2, 13: 0.05}
 """What a packing adds to the drag of every case, N."""
@@ -44,9 +45,9 @@ def study(results: Path, seeds: tuple[int, ...] = tuple(PACKING)) -> list[Path]:
     """A sweep over two fields with their packings."""
     folders = []
     for deep, fast, seed in product((0, 1), (0, 1), seeds):
-        inputs = {"depth": (0.02, 0.04)[deep], "speed": (0.1, 0.3)[fast], "seed": seed}
+        changes = {DEEP: (0.2, 0.4)[deep], FAST: (0.1, 0.3)[fast], "seed": seed}
         name = f"deep-{deep}_fast-{fast}_seed-{seed}"
-        case = case_json("process", name, case=name, inputs=inputs)
+        case = case_json("process", name, changes, case=name)
         folder = make_run(results, case, process_findings(), PICTURES, drag(deep, fast, seed))
         write_quantities(folder)
         patches = np.full(48, 0.1 + 0.1 * deep) + 0.01 * np.sin(seed * np.arange(48))
@@ -95,7 +96,7 @@ def test_planted_effects_are_found(tmp_path: Path) -> None:
     write_comparison(tmp_path / "out", study(tmp_path))
     table = pd.read_csv(tmp_path / "out/effects.csv")
     found = table[table["quantity"] == "drag_mean"].set_index("factors")
-    for factors, planted in (("depth", DEPTH), ("speed", SPEED), ("depth x speed", TOGETHER)):
+    for factors, planted in ((DEEP, DEPTH), (FAST, SPEED), (f"{DEEP} x {FAST}", TOGETHER)):
         row = found.loc[factors]
         assert row["effect_ci95_low"] < planted < row["effect_ci95_high"]
         assert row["effect_ci95_high"] - row["effect_ci95_low"] < 0.04
@@ -104,7 +105,7 @@ def test_planted_effects_are_found(tmp_path: Path) -> None:
 def test_a_packing_of_each_case_leaves_no_interaction(tmp_path: Path) -> None:
     write_comparison(tmp_path / "out", study(tmp_path, seeds=(11,)))
     table = pd.read_csv(tmp_path / "out/effects.csv")
-    assert set(table["factors"]) == {"depth", "speed"}
+    assert set(table["factors"]) == {DEEP, FAST}
 
 
 CENTRES = {"flat": 0.0, "angled": 10.0, "rounded": 0.0}

@@ -39,7 +39,7 @@ def worn(
 ) -> Wear:
     """The wear of a run with these contacts, and with these rows of ``touches``."""
     write_run(folder, contacts)
-    case = case_json() | {"removal": law}
+    case = case_json({"removal": law})
     (folder / "case.json").write_text(json.dumps(case))
     if touches is not None:
         columns = json.loads((folder / "columns.json").read_text())

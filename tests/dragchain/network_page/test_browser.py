@@ -33,7 +33,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A workpiece from an STL file; the study has a hostile name."""
     folder = tmp_path_factory.mktemp("made") / "run"
     motion = line(0.1, start_m=[-0.01, 0.0], direction_deg=math.degrees(2.5))
-    write_network_run(folder, "mesh", motion=motion, study=HOSTILE)
+    write_network_run(folder, "mesh", motion=motion, study_name=HOSTILE)
     accept(folder)
     write_page(folder)
     return folder

@@ -261,7 +261,7 @@ HOSTILE = '</script><script>alert("1")</script><!-- & \u2028'
 
 
 def test_no_name_of_a_study_becomes_code(tmp_path: Path) -> None:
-    run = write_network_run(tmp_path / "run", study=HOSTILE, case=HOSTILE)
+    run = write_network_run(tmp_path / "run", study_name=HOSTILE, case=HOSTILE)
     accept(run, passed=False, name=HOSTILE)
     write_page(run)
     text = (run / "network.html").read_text(encoding="utf-8")

@@ -19,6 +19,7 @@ from report_files import (
 from dragchain.report.cases import cases_of, read_study_runs
 from dragchain.report.cost_check import answers, prediction_for, read_advice
 from dragchain.report.study_report import write_study_report
+from dragchain.run.case import study_of
 from dragchain.statistics.estimate import Estimate
 from dragdeck.errors import DocumentError
 from dragdeck.records.advice import OptionEntry
@@ -32,7 +33,7 @@ def option(**more: Any) -> dict[str, Any]:
     }  # fmt: skip
     return {
         "role": "advised", "settings": settings | more,
-        "inputs": case_json("process", "workpiece-1")["inputs"],
+        "inputs": study_of(CaseOfRun.model_validate(case_json("process", "workpiece-1"))).inputs(),
         "steps": {"filling": 80_000, "process": 150_000},
         "steps_per_s": {"filling": 4000.0, "process": 3000.0},
         "wall_time_s": {"filling": 20.0, "process": 50.0},
@@ -101,8 +102,8 @@ def test_a_case_of_several_packings_is_judged_by_its_mean(tmp_path: Path) -> Non
     """Its interval is that of single runs over the root of their number."""
     studies = []
     for seed in range(4):
-        case = case_json("process", f"run-{seed}", asked={**ASKED, "tolerance": 0.06})
-        case["inputs"] |= {"seed": seed}
+        asked = {**ASKED, "tolerance": 0.06}
+        case = case_json("process", f"run-{seed}", {"seed": seed}, asked=asked)
         folder = make_run(tmp_path, case, process_findings(), PICTURES)
         write_quantities(folder, corrected=0.8)
         studies.append(read_study_runs(folder))

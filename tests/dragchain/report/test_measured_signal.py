@@ -129,7 +129,7 @@ def process(tmp_path: Path) -> Path:
     own = {"file": "force.csv", "column": "fx_kn", "sign": -1, "starts_at_s": 2.0,
            "low_pass_hz": 20.0}  # fmt: skip
     reference = {"source": "SYNTHETIC", "signal": own}
-    case = case_json("process", "workpiece-1", reference=reference, timestep_s=step / 4,
+    case = case_json("process", "workpiece-1", {"reference": reference}, timestep_s=step / 4,
                      phases=[{"name": "drag", "start_step": 4000, "end_step": 124000}])  # fmt: skip
     run = make_run(tmp_path / "results", case, process_findings(), PICTURES)
     table = pd.DataFrame({"time_s": 1.0 + step + time, "phase": "drag", "drag_n": -drags[0]})

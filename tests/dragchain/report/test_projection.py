@@ -45,10 +45,9 @@ def packing(folder: Path, seed: int, law: bool = True) -> Path:
         row["normal_force_n"] *= seed
         row["tangential_force_n"] *= seed
     run = write_run(folder / f"results/small/process/run-{seed}", rows)
-    inputs = {"workpiece.material": "steel", "materials.steel.density_kg_m3": 7800.0, "seed": seed}
-    case = case_json()
-    case |= {"inputs": case["inputs"] | inputs, "run": run.name}
-    (run / "case.json").write_text(json.dumps(case | ({"removal": GIVEN} if law else {})))
+    study = {"materials.steel.density_kg_m3": 7800.0, "seed": seed}
+    case = case_json(study | ({"removal": GIVEN} if law else {})) | {"run": run.name}
+    (run / "case.json").write_text(json.dumps(case))
     (run / "run.json").write_text(json.dumps(run_json()))
     write_loading(run)
     process_findings().write(run / FILE)
@@ -156,7 +155,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_runs_of_several_cases_are_refused(made: Path, tmp_path: Path) -> None:
     other = packing(tmp_path, 3, law=False)
     changed = json.loads((other / "case.json").read_text())
-    changed["inputs"]["motion.speed_m_s"] = 0.2
+    changed["study"]["gravity_m_s2"] = 9.8
     (other / "case.json").write_text(json.dumps(changed))
     with pytest.raises(TableError, match="2 cases"):
         write_projection([made, other], tmp_path, grid(tmp_path / "fine.vtu"), "m", LENGTH_M)

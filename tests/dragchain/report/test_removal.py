@@ -216,11 +216,10 @@ def report(
             row["normal_force_n"] *= 1 + 0.5 * seed
             row["tangential_force_n"] *= 1 + 0.5 * seed
         made = write_run(tmp_path / f"made-{seed}", rows)
-        (made / "case.json").write_text(json.dumps(contact_case() | {"removal": removal}))
+        (made / "case.json").write_text(json.dumps(contact_case({"removal": removal})))
         write_loading(made)
-        inputs = {"workpiece.material": "steel", "materials.steel.density_kg_m3": 7800.0,
-                  "workpiece.shape.kind": "mesh", "seed": seed}  # fmt: skip
-        case = case_json("process", f"run-{seed}", removal=removal, inputs=inputs)
+        study = {"materials.steel.density_kg_m3": 7800.0, "seed": seed, "removal": removal}
+        case = case_json("process", f"run-{seed}", study)
         run = make_run(tmp_path / "results", case, process_findings(), PICTURES)
         for file in ("tables/loading.json", *(["tables/wear.json"] if wear else [])):
             (run / file).write_bytes((made / file).read_bytes())

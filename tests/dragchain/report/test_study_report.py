@@ -53,7 +53,8 @@ def test_summary_has_the_numbers_of_run_filling_and_drop(process: Path, tmp_path
     write_study_report(tmp_path, [process])
     (row,) = pd.read_parquet(tmp_path / "summary.parquet").to_dict("records")
     expected = {
-        "case": "10 mm <workpiece>", "input_media_count": 1422, "input_seeds": "[1, 2]",
+        "case": "10 mm <workpiece>", "input_media_count": 1422,
+        "input_motion_plunge_at_m": "[0.0, 0.0]",
         "fidelity_youngs_modulus_scale": 0.01, "drag_mean_n": -2.5, "drag_mean_ci95_low_n": -2.6,
         "drag_against_experiment_percent": pytest.approx(100 * (2.5 / 2.59 - 1)),
         "peak_max_n": -3.9, "bed_height_m": 0.0703, "restitution_effective": 0.71,
@@ -255,8 +256,7 @@ def test_the_torque_of_a_workpiece_that_spins_stands_with_the_forces(
 
 def test_an_inclined_rod_has_the_diameter_of_its_study(process: Path, tmp_path: Path) -> None:
     reach = {"kind": "mesh", "radius_m": 0.0137, "length_m": 0.08, "immersion_depth_m": 0.05}
-    inputs = {"workpiece.shape.kind": "cylinder", "workpiece.shape.radius_m": 0.005}
-    case = case_json("process", "run-1", workpiece=reach, inputs=inputs)
+    case = case_json("process", "run-1", {"workpiece.shape.radius_m": 0.005}, workpiece=reach)
     case = with_motion(case, {"kind": "circle", "radius_m": 0.02}, 0.01, tilt_deg=10)
     run = make_run(process.parents[2], case, process_findings(), PICTURES)
     write_study_report(tmp_path, [run])
@@ -273,10 +273,9 @@ def packings(process: Path) -> list[Path]:
     """Three runs that differ in their seeds alone, and one of another case."""
     found = []
     for seed, drag in enumerate((-2.4, -2.5, -2.9), 1):
-        inputs = {"media.count": 1422, "seed": seed}
-        case = case_json("process", f"run-{seed}", case=f"draft_seed-{seed}", inputs=inputs)
+        case = case_json("process", f"run-{seed}", {"seed": seed}, case=f"draft_seed-{seed}")
         found.append(make_run(process.parents[2], case, process_findings(), PICTURES, drag))
-    other = case_json("process", "run-9", case="other", inputs={"media.count": 900, "seed": 1})
+    other = case_json("process", "run-9", {"media.count": 900}, case="other")
     return [*found, make_run(process.parents[2], other, process_findings(), PICTURES, -1.0)]
 
 

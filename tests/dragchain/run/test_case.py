@@ -5,7 +5,7 @@ import pytest
 from made_run import with_motion
 
 from dragchain import DocumentError, TableError, load_case, load_outputs
-from dragchain.run.case import changed_inputs
+from dragchain.run.case import changed_inputs, study_of
 from dragchain.run.kinematics import motion_of
 from dragdeck.records.case import StatisticsOfRun
 
@@ -53,6 +53,10 @@ def test_a_motion_that_this_version_makes_otherwise_is_refused(tiny_run: Path, e
             lambda c: c["bowl"].pop("radius_m"),
             r"case\.json: bowl\.radius_m: a required key is missing",
         ),
+        (
+            lambda c: c.update(study=c.pop("study_name"), inputs={"seed": 1}),
+            r"study_name: a required key is missing\n  remedy: .*dragdeck step render",
+        ),
         (lambda c: c["phases"][1].update(start_step=30), "drag does not start where plunge ends"),
         (lambda c: c.update(gravity_m_s2=float("nan")), "is not a JSON object|finite number"),
     ],
@@ -61,6 +65,12 @@ def test_says_what_is_wrong_with_a_case(tiny_run: Path, edit_json, change, messa
     edit_json(tiny_run / "case.json", change)
     with pytest.raises(DocumentError, match=message):
         load_case(tiny_run)
+
+
+def test_the_study_is_read_without_the_files_that_it_names(tiny_run: Path, edit_json) -> None:
+    shape = {"kind": "mesh", "file": "not_here.stl", "unit": "mm"}
+    edit_json(tiny_run / "case.json", lambda case: case["study"]["workpiece"].update(shape=shape))
+    assert study_of(load_case(tiny_run)).workpiece.shape.plain() == shape
 
 
 def test_a_missing_case_and_a_broken_one_are_told_apart(tiny_run: Path) -> None:

@@ -198,8 +198,8 @@ def test_a_run_twice_as_long_counts_as_two_of_its_bed(tmp_path: Path) -> None:
 
 def test_what_is_written_is_no_setting(tmp_path: Path) -> None:
     rng = np.random.default_rng(11)
-    found = [measures(REFERENCE, 1, rng, inputs={"outputs.network_hz": 20.0})]
-    found += [measures(REFERENCE, 2, rng, inputs={"outputs.network_hz": 100.0})]
+    found = [measures(REFERENCE, 1, rng, study={"outputs.network_hz": 20.0})]
+    found += [measures(REFERENCE, 2, rng, study={"outputs.network_hz": 100.0})]
     files = write(tmp_path, found)
     runs, reference, _ = read_plan_runs(files, files[0].parents[1])
     assert {run.setting for run in runs} == {reference}

@@ -38,7 +38,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
         *contents(),
         measures((0.01, 0.8, 1.0), 1, rng, cpu_time_s=3.0, failure=FAILURE),
         measures((1.0, 0.2, 5.0), 1, rng, cpu_time_s=20.0),
-        measures(BOTH, 1, rng, inputs={"bowl.facet_size_m": 0.005}),
+        measures(BOTH, 1, rng, study={"bowl.facet_size_m": 0.005}),
     ]
     files = write(folder / "runs", found)
     costs = folder / "costs.json"

@@ -299,7 +299,7 @@ def test_the_kept_advice_names_the_run_of_a_study_that_asks(
     commands.advise("small", None, None, None, tradeoff=tradeoff)
     kept = json.loads((project.root / "results/small/advice.json").read_text())
     assert kept["cases"][0]["run"] == PROCESS.run_id(asking)
-    assert kept["cases"][0]["options"][0]["inputs"] == process_scene(asking).case.inputs
+    assert kept["cases"][0]["options"][0]["inputs"] == process_scene(asking).case.study.inputs()
 
 
 def test_an_advice_that_cannot_be_kept_is_still_shown(

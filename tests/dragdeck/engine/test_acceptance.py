@@ -62,7 +62,7 @@ def test_the_last_frame_counts_only_if_whole(
 
 
 INPUTS = CaseFile(
-    study="any",
+    study_name="any",
     title="",
     scene="process",
     run="a",

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from made_run import Raw
 from made_scenes import rendered
-from made_study import Made
+from made_study import Made, plain_study
 
 from dragdeck.cases.case import Case
 from dragdeck.decks.outputs import particles
@@ -42,9 +42,9 @@ def checked(
     folder.mkdir(exist_ok=True)
     law = {"modulus_pa": 4e7, "shear_pa": 1e7, "restitution": 0.9, "friction": 0.3}
     case = {
-        "schema": 2, "study": "a", "title": "A", "scene": "process", "run": "a",
+        "schema": 2, "study_name": "a", "title": "A", "scene": "process", "run": "a",
         "versions": {}, "files": {},
-        "timestep_s": 2e-4, "rayleigh_time_s": 1e-4, "gravity_m_s2": 9.81, "inputs": {},
+        "timestep_s": 2e-4, "rayleigh_time_s": 1e-4, "gravity_m_s2": 9.81,
         "fidelity": {
             "name": "a", "youngs_modulus_scale": 1.0, "timestep_fraction": 2.0, "ranks": ranks,
             "filling_timestep_fraction": 0.2, "speed_factor": 1.0, "skin_m": 1e-3,
@@ -52,7 +52,7 @@ def checked(
         "media": {
             "count": 2, "radius_mean_m": RADIUS, "radius_std_m": 0.0, "density_kg_m3": 2500.0
         },
-        "bowl": {"radius_m": 0.05, "walls": "primitive"}, "assumptions": [], "reference": None,
+        "bowl": {"radius_m": 0.05, "walls": "primitive"}, "assumptions": [],
         "contact_moduli": {"particle": law, "bowl": law}, **changes,
     }  # fmt: skip
     (folder / "case.json").write_text(json.dumps(case))
@@ -76,6 +76,7 @@ def number(check: AcceptanceCheck) -> float:
 
 
 LIGHT, HEAVY = 1e-8, 1e-4
+ACCEPTED = plain_study({"accepted.unsafe_timestep": "to see it break"})
 
 
 @pytest.mark.parametrize("ranks", [1, 2])
@@ -96,11 +97,11 @@ def test_what_it_says_is_stable_is(tmp_path: Path) -> None:
 
 
 def test_an_accepted_step_passes_and_says_so(tmp_path: Path) -> None:
-    check = checked(tmp_path, [HEAVY] * 4, unsafe_timestep="to see it break")
+    check = checked(tmp_path, [HEAVY] * 4, study=ACCEPTED)
     assert check.passed
     assert number(check) > 1
     assert check.limit == "1; exceeded on purpose: to see it break"
-    fine = checked(tmp_path, [LIGHT] * 4, unsafe_timestep="to see it break")
+    fine = checked(tmp_path, [LIGHT] * 4, study=ACCEPTED)
     assert (fine.passed, fine.limit) == (True, "1")
 
 

@@ -294,7 +294,7 @@ def test_a_run_with_a_thrown_particle_is_refused(
     raw = output.as_part()
     limit = thrown_speed(9.81, 0.2, 0.1)
     inputs = CaseFile(
-        study="any", title="", scene="process", run="a", timestep_s=4e-5, rayleigh_time_s=1e-4,
+        study_name="any", title="", scene="process", run="a", timestep_s=4e-5, rayleigh_time_s=1e-4,
         versions={}, fidelity=RanksOfRun(ranks=1), media=CountOfRun(count=1), thrown_m_s=limit,
     )  # fmt: skip
     part = RunPart(part=1, checkpoint=None, from_step=0)

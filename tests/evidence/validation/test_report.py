@@ -13,6 +13,7 @@ from scipy import stats
 from tradeoff_files import measures
 
 from dragchain.quantities.document import RunQuantities
+from dragchain.run.case import study_of
 from dragchain.statistics.estimate import Estimate
 from dragdeck.records.case import load_case
 from dragdeck.study.reference import Drag, Reference
@@ -22,6 +23,11 @@ from evidence.validation.runs import MeasuredRun, RunsByBed, packing_mean
 
 RATE_HZ = 1000.0
 DIAMETER_M = 2 * 8.76e-3
+PUBLISHED = Reference(
+    source="a paper",
+    experiment=Drag(drag_mean_n=-2.5, drag_std_n=0.5),
+    simulation=Drag(drag_mean_n=-2.0),
+)
 
 
 def made_run(
@@ -39,17 +45,10 @@ def made_run(
     table["lateral_n"], table["vertical_n"] = 0.1 * drag, -0.2 * drag
     table["in_statistics"] = True
     table.to_parquet(folder / "tables" / "workpiece_force.parquet")
-    case = changed(
-        load_case(tiny_run),
-        run=folder.name,
-        reference=Reference(
-            source="a paper",
-            experiment=Drag(drag_mean_n=-2.5, drag_std_n=0.5),
-            simulation=Drag(drag_mean_n=-2.0),
-        ),
-    )
-    inputs = {"bowl.radius_m": 0.04, **(varied or {})}
-    content = measures((*parameters, 1.0), seed, np.random.default_rng(1), inputs=inputs)
+    case = load_case(tiny_run)
+    case = changed(case, run=folder.name, study=changed(study_of(case), reference=PUBLISHED))
+    study = {"bowl.radius_m": 0.04, **(varied or {})}
+    content = measures((*parameters, 1.0), seed, np.random.default_rng(1), study=study)
     content |= {"run": folder.name, "arc_m": 20 * DIAMETER_M}
     return MeasuredRun(folder, case, RunQuantities.model_validate(content), varied or {})
 

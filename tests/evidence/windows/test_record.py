@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_study import plain_study
 from paths import ROOT, SNAKEFILES
 
 from dragchain.errors import SeriesError
@@ -17,6 +18,7 @@ from dragchain.windows.estimate import joined
 from dragdeck.physics.contact_mechanics import damping_ratio
 from dragdeck.records.case import FidelityOfRun
 from dragdeck.records.stability import StableStepRecord
+from dragdeck.study.model import Study
 from evidence.__main__ import COMMANDS, main
 from evidence.windows.record import SceneRun, read_scenes, windows_record
 
@@ -38,10 +40,11 @@ def made_run(
     u = fraction * (kappa * scale ** (2 / 3)) ** -0.25
     squared = LAW["stiffness"] * u**2 + LAW["damping"] * damping_ratio(restitution) * u
     return SceneRun(
-        study="made", run=f"{scene}-{scale}-{seed}", bed=None, complete=True, cost=COST,
+        study_name="made", run=f"{scene}-{scale}-{seed}", bed=None, complete=True, cost=COST,
         versions={"engine": "3.8.0"}, started=f"2026-01-{10 + scene}T00:00:00+00:00",
-        inputs={"seed": seed, "media.material": "a", "pairs.a-a.restitution": restitution,
-                "media.radius_mean_m": 1.0, "media.radius_std_m": spread},
+        study=Study.model_validate(plain_study({
+            "seed": seed, "pairs.ceramic-ceramic.restitution": restitution,
+            "media.radius_mean_m": 1.0, "media.radius_std_m": spread})),
         fidelity=FidelityOfRun(name="made", youngs_modulus_scale=scale, timestep_fraction=fraction,
                                speed_factor=speed, skin_m=1e-4, ranks=1),
         numbers={"stiffness_number": kappa, "particles": 300.0 + seed},

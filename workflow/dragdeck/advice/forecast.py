@@ -95,7 +95,7 @@ def _forecast(case: Case, role: str, option: Option, results: Path) -> OptionEnt
         drop_timestep_fraction=option.drop_timestep_fraction,
         error=option.error,
         relative_cost=option.relative_cost,
-        inputs=process_scene(chosen).case.inputs,
+        inputs=process_scene(chosen).case.study.inputs(),
         steps=steps,
         wall_time_s=wall_times_s,
         steps_per_s={scene: round(n / wall_times_s[scene], 1) for scene, n in steps.items()},

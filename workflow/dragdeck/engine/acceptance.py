@@ -229,7 +229,8 @@ def _stable_timestep(
     wanted = [particles.columns.index(name) for name in names]
     frames = some_frames(folder, particles, parts, _FRAMES)
     numbers = [_stability_number(case, rows[:, wanted]) for rows in frames]
-    number, reason, limit = float(np.median(numbers or [0.0])), case.unsafe_timestep, "1"
+    reason = case.study.accepted.unsafe_timestep if case.study else None
+    number, limit = float(np.median(numbers or [0.0])), "1"
     if number > 1:
         stable = f"{number**-2:.2g} times the time step is stable"
         limit = f"1; exceeded on purpose: {reason}" if reason else f"1; {stable}"

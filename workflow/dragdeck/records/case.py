@@ -2,10 +2,10 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import JsonValue, PositiveFloat, PositiveInt
+from pydantic import JsonValue, PlainSerializer, PositiveFloat, PositiveInt
 
 from dragdeck.arrays import Floats, Ints, class_numbers
 from dragdeck.documents import Part, omitted
@@ -14,9 +14,12 @@ from dragdeck.physics.contact_mechanics import ContactConstants
 from dragdeck.physics.run_limits import RunLimits
 from dragdeck.records.advised import AdvisedSettings
 from dragdeck.records.run import CaseFile, CountOfRun, RanksOfRun, SettlingCriterion
+from dragdeck.study.base import Json
 from dragdeck.study.drive import PathEntry, SuperposedEntry
-from dragdeck.study.reference import Reference
-from dragdeck.study.removal import Removal
+from dragdeck.study.model import Study
+
+StudyOfRun = Annotated[Study, PlainSerializer(Study.plain)]
+"""The study of a case, with its settings in place of a fidelity's name; its files are not read."""
 
 
 class FidelityOfRun(RanksOfRun):
@@ -229,8 +232,6 @@ class CaseOfRun(CaseFile):
 
     Attributes
     ----------
-    inputs : mapping
-        The values that the run depends on, by dotted name; of a process all of the study.
     contact_moduli : mapping
         Contact constants of a particle with a ``particle``, the ``bowl`` and the ``workpiece``,
         softened as the run is.
@@ -241,14 +242,12 @@ class CaseOfRun(CaseFile):
         Classes of the media, if there are several.
     bodies : tuple of BodiesOfRun
         Particles by class and size, if they are clumps of spheres.
-    unsafe_timestep : str or None
-        Why a step of the process beyond the stable one is accepted.
     fidelity : FidelityOfRun
         Settings for speed and accuracy.
     assumptions : tuple of AssumptionOfRun
         Values that the source of the study does not report.
-    reference : Reference or None
-        Published values to compare with.
+    study : Study or None
+        The study of the case of a process.
     case : str or None
         Readable name of the case of a process.
     upstream : mapping
@@ -271,13 +270,10 @@ class CaseOfRun(CaseFile):
         Tolerance from which the settings were derived.
     restitution : float or None
         Coefficient of restitution in the input script of a drop test.
-    removal : Removal or None
-        Law and coefficient of removal of a process.
     """
 
     gravity_m_s2: float
     fidelity: FidelityOfRun
-    inputs: Mapping[str, JsonValue]
     media: MediaOfRun
     bowl: BowlOfRun
     contact_moduli: Mapping[str, ContactConstants]
@@ -285,8 +281,7 @@ class CaseOfRun(CaseFile):
     classes: tuple[ClassOfRun, ...] = omitted(())
     bodies: tuple[BodiesOfRun, ...] = omitted(())
     assumptions: tuple[AssumptionOfRun, ...]
-    reference: Reference | None
-    unsafe_timestep: str | None = None
+    study: StudyOfRun | None = omitted(None)
     case: str | None = omitted(None)
     upstream: Mapping[str, str] = omitted({})
     output_of: str | None = omitted(None)
@@ -299,7 +294,6 @@ class CaseOfRun(CaseFile):
     statistics: StatisticsOfRun | None = omitted(None)
     asked: AdvisedSettings | None = omitted(None)
     restitution: float | None = omitted(None)
-    removal: Removal | None = omitted(None)
 
     def class_of(self, particle_id: Ints) -> Ints:
         """Number of the class of (N,) particles in `classes`; 0 if there are none."""
@@ -320,16 +314,18 @@ class CaseOfRun(CaseFile):
 
 
 class DropTestCase(CaseOfRun):
-    """The ``case.json`` of a drop test."""
+    """The ``case.json`` of a drop test; `inputs`: what it depends on."""
 
     scene: Literal["drop_test"] = "drop_test"
+    inputs: Json
     restitution: float
 
 
 class FillingCase(CaseOfRun):
-    """The ``case.json`` of a filling."""
+    """The ``case.json`` of a filling; `inputs`: what it depends on."""
 
     scene: Literal["filling"] = "filling"
+    inputs: Json
     settled: SettlingCriterion
     limits: RunLimits
 
@@ -338,6 +334,7 @@ class ProcessCase(CaseOfRun):
     """The ``case.json`` of a process: the workpiece is dragged through the settled packing."""
 
     scene: Literal["process"] = "process"
+    study: StudyOfRun
     case: str
     upstream: Mapping[str, str]
     numbers: Mapping[str, float]

@@ -78,6 +78,8 @@ class CaseFile(Document):
 
     Attributes
     ----------
+    study_name : str
+        Name of the study.
     run : str
         The run id, and the name of the run's folder.
     files : mapping
@@ -110,7 +112,7 @@ class CaseFile(Document):
 
     remedy = "write it with: ./run dragdeck step render"
 
-    study: str
+    study_name: str
     title: str
     scene: str
     run: str

@@ -6,7 +6,7 @@ Plate and drum have a glued layer of particles, so that the media's own coeffici
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -54,7 +54,7 @@ _FLATTEST = math.tan(math.radians(13))
 
 
 class AngleRun(Part):
-    """What a heap or drum is simulated with: ``inputs`` of its ``case.json``.
+    """What a heap or drum is simulated with.
 
     Attributes
     ----------
@@ -77,6 +77,13 @@ class AngleRun(Part):
     glued: int = 0
     drum_radius_m: float = 0.0
     counted_from: int = 0
+
+
+class AngleCase(CaseOfRun):
+    """The ``case.json`` of a heap or drum."""
+
+    scene: Literal["angles"] = "angles"
+    angle: AngleRun
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,7 +123,7 @@ class _Placed(NamedTuple):
     times_s: tuple[float, float, float]
 
 
-def angle_scene(case: Case, run: AngleRun, stiffness: float = STIFFNESS) -> Scene[CaseOfRun]:
+def angle_scene(case: Case, run: AngleRun, stiffness: float = STIFFNESS) -> Scene[AngleCase]:
     """A heap or drum of the study's calibration with other coefficients.
 
     Raises
@@ -164,9 +171,8 @@ def angle_scene(case: Case, run: AngleRun, stiffness: float = STIFFNESS) -> Scen
     bodies = [Body(1, radius, density, (x, y, z)) for x, y, z, radius in rows]
     side = -placed.edge_m - size, placed.edge_m + size
     box = side, side, (placed.bottom_m - size, placed.top_m + size)
-    inputs = {**run.model_dump(), **read_with, "counted_from": stop}
-    inputs["geometry"] = rig.model_dump(exclude={"angle_deg", "angle_std_deg"})
-    content = case_of_study(CaseOfRun, of, run.rig, inputs, dt, rayleigh, scene="angles")
+    angle = run.model_copy(update={**read_with, "counted_from": stop})
+    content = case_of_study(AngleCase, of, run.rig, dt, rayleigh, angle=angle)
     media = content.media.model_copy(update={"count": len(bodies)})
     files = {
         "particles.data": lambda: data_file(deck.title, len(names), box, bodies),

@@ -150,9 +150,9 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
             FillingCase,
             case,
             FILLING.run_id(case),
-            _content(case),
             dt,
             rayleigh,
+            inputs=_content(case),
             media=media_of_run(study, buoyancy_density(study)),
             settled=SettlingCriterion(
                 energy_ratio=study.filling.energy_ratio, highest_m=study.bowl.height_m

@@ -55,6 +55,7 @@ from dragdeck.scenes.scene import (
     liquid_models,
     material_table,
     media_of_run,
+    said_study,
 )
 from dragdeck.scenes.workpiece import (
     PARTICLE_STEPS_PER_S,
@@ -76,7 +77,7 @@ from dragdeck.scenes.workpiece import (
 from dragdeck.study.base import Json, without_fields
 from dragdeck.study.contact_law import coefficient_words
 from dragdeck.study.drive import Drive
-from dragdeck.study.model import OF_NO_RUN, Study
+from dragdeck.study.model import Study
 from dragdeck.study.workpiece import CylinderShape, MeshShape, Shape
 
 _ENERGY_DRIFT = 0.1
@@ -272,7 +273,6 @@ def _process_case(
         ProcessCase,
         case,
         PROCESS.run_id(case),
-        without_fields(study.plain(), *OF_NO_RUN, "fidelities", "fidelity"),
         drag.timestep_s,
         bed_rayleigh_time(study),
         settings=study.chosen_fidelity().model_dump(include={"timestep_fraction", "speed_factor"}),
@@ -280,8 +280,7 @@ def _process_case(
         bowl=bowl_of_run(study, facets=study.bowl_facet_size_m is not None),
         assumptions=[*assumed(study), *_of_liquid(case, surface_m)],
         asked=case.advised,
-        removal=study.removal,
-        unsafe_timestep=study.accepted.unsafe_timestep,
+        study=said_study(study),
         case=case.name,
         upstream={scene.name: scene.run_id(case) for scene in (FILLING, DROP_TEST)},
         lead=case.lead and PROCESS.run_id(case.lead),

@@ -60,7 +60,7 @@ def read_bed(file: Path) -> Bed:
 _NOT_SAID = ("calibration", "fidelities", "licence", "scaling", "search", "sweep")
 _OF_PROCESS = (
     *("accepted", "assumptions", "compound", "drop_test", "fidelity", "filling", "motion"),
-    *("outputs", "removal", "seed", "workpiece.shape", "workpieces"),
+    *("outputs", "reference", "removal", "seed", "workpiece.shape", "workpieces"),
 )
 """Fields that no file of a run says, and those that only files of a process do."""
 
@@ -146,7 +146,6 @@ def case_of_study(
     kind: type[C],
     of: Case,
     run: str,
-    inputs: Json,
     timestep_s: float,
     rayleigh_time_s: float,
     *,
@@ -162,8 +161,6 @@ def case_of_study(
     of : Case
     run : str
         The run id.
-    inputs : mapping
-        What the run depends on.
     timestep_s, rayleigh_time_s : float
     settings : mapping, optional
         What is not the case's modulus, skin and ranks, the given step, and no faster workpiece.
@@ -182,14 +179,13 @@ def case_of_study(
     fidelity = FidelityOfRun(**{**usual, **(settings or {})})
     main = study.media.main_material
     entries = {
-        "study": of.study_name,
+        "study_name": of.study_name,
         "title": study.title,
         "run": run,
         "timestep_s": timestep_s,
         "rayleigh_time_s": rayleigh_time_s,
         "gravity_m_s2": study.gravity_m_s2,
         "fidelity": fidelity,
-        "inputs": flat(inputs),
         "media": media_of_run(study),
         "bowl": bowl_of_run(study),
         "contact_moduli": _contact_moduli(study, main, fidelity.youngs_modulus_scale),
@@ -197,10 +193,15 @@ def case_of_study(
         "classes": _classes(study, fidelity.youngs_modulus_scale),
         "bodies": body_sizes(study),
         "assumptions": [],
-        "reference": study.reference,
         "versions": {"dragdeck": __version__},
     }
     return kind(**{**entries, **parts})
+
+
+def said_study(study: Study) -> Json:
+    """What ``case.json`` of a process has of a study: all that is about its runs."""
+    settings = {"fidelity": study.chosen_fidelity().plain()}
+    return without_fields(study.plain(), *_NOT_SAID) | settings
 
 
 def media_of_run(study: Study, buoyancy_kg_m3: float = 0.0) -> MediaOfRun:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from dragdeck.study.base import (
+    Json,
     Line,
     MaterialName,
     Model,
@@ -19,6 +20,7 @@ from dragdeck.study.base import (
     Number,
     Positive,
     Whole,
+    flat,
     without_fields,
 )
 from dragdeck.study.calibration import Calibration
@@ -634,6 +636,10 @@ class Study(Model):
             },
             "fidelity": self.chosen_fidelity().plain(),
         }
+
+    def inputs(self) -> Json:
+        """Values of all fields that results depend on, by dotted name, without the fidelity."""
+        return flat(without_fields(self.plain(), *OF_NO_RUN, "fidelities", "fidelity"))
 
     def type_names(self) -> list[str]:
         """Materials in the order of the engine's types: particles, bowl, workpiece, each once."""
