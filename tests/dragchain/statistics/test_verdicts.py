@@ -37,5 +37,5 @@ def test_whatever_judges_a_claim_uses_the_same_three_words() -> None:
     }
     judged = {name: found - {"no expectation"} for name, found in words.items() if found != CHECKS}
     assert set(get_args(Verdict)) == WORDS
-    assert {"ScalingFile", "Claim"} <= set(judged)
+    assert "ScalingFile" in judged
     assert all(found == WORDS for found in judged.values()), judged
