@@ -17,7 +17,8 @@ from dragdeck.physics.contact_mechanics import (
 )
 from dragdeck.physics.rounding import timestep
 from dragdeck.physics.run_limits import RunLimits, run_limits
-from dragdeck.records.case import BowlOfRun, CaseOfRun, MediaOfRun
+from dragdeck.records.bed import BowlOfRun, MediaOfRun
+from dragdeck.records.case import CaseOfRun
 from dragdeck.records.run import Phase
 from dragdeck.scenes.filling import box_top
 from dragdeck.scenes.scene import case_of_study, material_table

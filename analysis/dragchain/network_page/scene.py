@@ -27,7 +27,8 @@ from dragchain.run.workpiece import read_surface
 from dragchain.tables.by_step import read_table
 from dragchain.tables.columns import CENTRE, ORIENTATION, POINT, VELOCITY
 from dragchain.tables.run_folder import Run
-from dragdeck.records.case import BodiesOfRun, CaseOfRun
+from dragdeck.records.bed import BodiesOfRun
+from dragdeck.records.case import CaseOfRun
 
 # --- columns as bytes ----------------------------------------------------------------------------
 

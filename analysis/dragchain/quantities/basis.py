@@ -11,7 +11,6 @@ from enum import StrEnum
 from typing import NamedTuple
 
 from dragchain.quantities.registry import Quantity
-from dragchain.run.case import study_of
 from dragchain.statistics.estimate import Estimate
 from dragdeck.records.case import CaseOfRun, FidelityOfRun
 from dragdeck.records.run import changed_in_words
@@ -176,7 +175,7 @@ def _of_modulus_and_speed(case: CaseOfRun) -> Iterator[str]:
 def _of_step(case: CaseOfRun) -> str:
     percent = f"{100 * case.fidelity.timestep_fraction:.3g} %"
     text = f"The time step is {percent} of the Rayleigh time"
-    if reason := study_of(case).accepted.unsafe_timestep:
+    if reason := case.unsafe_timestep:
         return (
             f"{text}, which may be unstable and is accepted on purpose ({reason}): "
             "forces may be too small by a quarter without any other sign."

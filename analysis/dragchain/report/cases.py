@@ -27,7 +27,8 @@ from dragchain.statistics.estimate import mean_of
 from dragchain.tables.run_folder import Run
 from dragdeck.documents import Document
 from dragdeck.errors import DocumentError, RejectedRunError
-from dragdeck.records.case import CaseOfRun, ClassOfRun, load_case
+from dragdeck.records.bed import ClassOfRun
+from dragdeck.records.case import CaseOfRun, load_case
 from dragdeck.records.run import RunRecord, read_accepted
 from dragdeck.study.media import Grains
 from dragdeck.study.workpiece import CylinderShape

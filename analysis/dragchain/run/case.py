@@ -10,7 +10,8 @@ from pydantic import JsonValue
 from dragchain.arrays import Floats
 from dragchain.errors import TableError
 from dragdeck.errors import DragdeckError
-from dragdeck.records.case import CaseOfRun, ClassOfRun, load_case
+from dragdeck.records.bed import ClassOfRun
+from dragdeck.records.case import CaseOfRun, load_case
 from dragdeck.study.contact_law import FrictionLimit
 from dragdeck.study.model import Study
 

@@ -15,7 +15,8 @@ from dragchain.tables.network_contacts import ContactRows
 from dragchain.tables.workpiece_contacts import WallContacts, sums
 from dragdeck.dumps.frame import Columns, Frame
 from dragdeck.physics.rigid import pose
-from dragdeck.records.case import BodiesOfRun, CaseOfRun
+from dragdeck.records.bed import BodiesOfRun
+from dragdeck.records.case import CaseOfRun
 
 
 @dataclass(frozen=True)

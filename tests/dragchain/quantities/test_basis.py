@@ -89,6 +89,6 @@ def test_an_interval_that_is_not_known_stays_unknown() -> None:
 
 
 def test_a_step_that_was_accepted_though_unstable_is_said_to_be() -> None:
-    text = " ".join(notes(case(study={"accepted.unsafe_timestep": "to see it break"})))
+    text = " ".join(notes(case(unsafe_timestep="to see it break")))
     assert "may be unstable" in text and "to see it break" in text
     assert "no effect" not in text

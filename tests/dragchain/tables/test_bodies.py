@@ -13,7 +13,8 @@ from dragchain.tables.columns import CENTRE, ORIENTATION, SPIN, VELOCITY
 from dragchain.tables.network_contacts import KINDS, ContactRows
 from dragchain.tables.workpiece_contacts import WallContacts
 from dragdeck.dumps.frame import Frame
-from dragdeck.records.case import BodiesOfRun, CaseOfRun
+from dragdeck.records.bed import BodiesOfRun
+from dragdeck.records.case import CaseOfRun
 
 L_SHAPE = ((0.2, 0.1, 0.0), (-0.3, 0.1, 0.0), (0.2, -0.4, 0.3))
 ROW = ((1.0, 0.0, 0.0), (-1.0, 0.0, 0.0))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from made_run import Raw
 from made_scenes import rendered
-from made_study import Made, plain_study
+from made_study import Made
 
 from dragdeck.cases.case import Case
 from dragdeck.decks.outputs import particles
@@ -76,7 +76,6 @@ def number(check: AcceptanceCheck) -> float:
 
 
 LIGHT, HEAVY = 1e-8, 1e-4
-ACCEPTED = plain_study({"accepted.unsafe_timestep": "to see it break"})
 
 
 @pytest.mark.parametrize("ranks", [1, 2])
@@ -97,11 +96,11 @@ def test_what_it_says_is_stable_is(tmp_path: Path) -> None:
 
 
 def test_an_accepted_step_passes_and_says_so(tmp_path: Path) -> None:
-    check = checked(tmp_path, [HEAVY] * 4, study=ACCEPTED)
+    check = checked(tmp_path, [HEAVY] * 4, unsafe_timestep="to see it break")
     assert check.passed
     assert number(check) > 1
     assert check.limit == "1; exceeded on purpose: to see it break"
-    fine = checked(tmp_path, [LIGHT] * 4, study=ACCEPTED)
+    fine = checked(tmp_path, [LIGHT] * 4, unsafe_timestep="to see it break")
     assert (fine.passed, fine.limit) == (True, "1")
 
 

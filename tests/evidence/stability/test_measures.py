@@ -12,7 +12,8 @@ from dragdeck.physics.contact_mechanics import (
     sphere_mass,
     touching,
 )
-from dragdeck.records.case import CaseOfRun, MediaOfRun
+from dragdeck.records.bed import MediaOfRun
+from dragdeck.records.case import CaseOfRun
 from evidence.stability.measures import (
     BOWL,
     PARTICLE,

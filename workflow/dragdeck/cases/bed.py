@@ -18,7 +18,7 @@ from dragdeck.physics.contact_mechanics import (
     stiffness_number,
 )
 from dragdeck.physics.rounding import round_to, rounded, timestep
-from dragdeck.records.case import BodiesOfRun
+from dragdeck.records.bed import BodiesOfRun
 from dragdeck.study.media import LEVELS, Array, Media, few_sizes
 from dragdeck.study.model import Study
 from dragdeck.study.shapes import AnyShape

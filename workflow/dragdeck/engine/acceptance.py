@@ -15,7 +15,7 @@ from dragdeck.engine.completeness import coverage, part_files, some_frames
 from dragdeck.physics.contact_mechanics import stability_number
 from dragdeck.physics.rigid import RigidBodies, pose
 from dragdeck.physics.run_limits import SPEED_FACTOR
-from dragdeck.records.case import CaseOfRun
+from dragdeck.records.bed import CaseOfBed
 from dragdeck.records.run import (
     AcceptanceCheck,
     CaseFile,
@@ -224,13 +224,12 @@ def _stable_timestep(
     folder: Path, particles: OutputOfRun, parts: Sequence[RunPart]
 ) -> AcceptanceCheck:
     """Whether the median `stability_number` of the frames is 1 at most."""
-    case = CaseOfRun.read(folder / CASE_FILE)
+    case = CaseOfBed.read(folder / CASE_FILE)
     names = ("x_m", "y_m", "z_m", "radius_m", "particle_id")
     wanted = [particles.columns.index(name) for name in names]
     frames = some_frames(folder, particles, parts, _FRAMES)
     numbers = [_stability_number(case, rows[:, wanted]) for rows in frames]
-    reason = case.study.accepted.unsafe_timestep if case.study else None
-    number, limit = float(np.median(numbers or [0.0])), "1"
+    number, reason, limit = float(np.median(numbers or [0.0])), case.unsafe_timestep, "1"
     if number > 1:
         stable = f"{number**-2:.2g} times the time step is stable"
         limit = f"1; exceeded on purpose: {reason}" if reason else f"1; {stable}"
@@ -242,7 +241,7 @@ def _stable_timestep(
     )  # fmt: skip
 
 
-def _stability_number(case: CaseOfRun, rows: Floats) -> float:
+def _stability_number(case: CaseOfBed, rows: Floats) -> float:
     """That of centres, radii and ids; infinite for those of no packing."""
     if not (rows.size and np.isfinite(rows).all()):
         return math.inf
@@ -262,7 +261,7 @@ def _stability_number(case: CaseOfRun, rows: Floats) -> float:
     return stability_number(rows[:, :3], rows[:, 3], *of_case, case.class_of(ids), rigid)
 
 
-def _rigid(case: CaseOfRun, places_m: Floats, body_id: Ints) -> RigidBodies:
+def _rigid(case: CaseOfBed, places_m: Floats, body_id: Ints) -> RigidBodies:
     """The bodies of (N,) spheres in the order of their ids."""
     centres, masses, roots = [], [], []
     for body in case.bodies:

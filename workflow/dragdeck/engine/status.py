@@ -14,7 +14,7 @@ from dragdeck.engine.process import is_held
 from dragdeck.engine.reports import printable
 from dragdeck.errors import InputError
 from dragdeck.physics.contact_mechanics import fall_energy
-from dragdeck.records.case import FillingCase
+from dragdeck.records.bed import CaseOfBed
 from dragdeck.records.run import CaseFile, RunRecord
 
 RunState = Literal["waiting", "running", "interrupted", "failed", "complete"]
@@ -131,7 +131,7 @@ def _rest(
 ) -> tuple[float | None, float | None]:
     if inputs.settled is None or sample is None:
         return None, None
-    case = FillingCase.read(folder / CASE_FILE)
+    case = CaseOfBed.read(folder / CASE_FILE)
     media = case.media
     unit = fall_energy(1, media.weight_kg_m3, media.radius_mean_m, case.gravity_m_s2)
     return sample.mean_energy_j / unit, inputs.settled.energy_ratio

@@ -4,16 +4,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Literal
 
-import numpy as np
 from pydantic import JsonValue, PlainSerializer, PositiveFloat, PositiveInt
 
-from dragdeck.arrays import Floats, Ints, class_numbers
 from dragdeck.documents import Part, omitted
 from dragdeck.errors import DocumentError, choices
-from dragdeck.physics.contact_mechanics import ContactConstants
 from dragdeck.physics.run_limits import RunLimits
 from dragdeck.records.advised import AdvisedSettings
-from dragdeck.records.run import CaseFile, CountOfRun, RanksOfRun, SettlingCriterion
+from dragdeck.records.bed import CaseOfBed
+from dragdeck.records.run import CaseFile, RanksOfRun, SettlingCriterion
 from dragdeck.study.base import Json
 from dragdeck.study.drive import PathEntry, SuperposedEntry
 from dragdeck.study.model import Study
@@ -46,121 +44,6 @@ class FidelityOfRun(RanksOfRun):
     timestep_fraction: PositiveFloat
     speed_factor: PositiveFloat
     skin_m: PositiveFloat
-
-
-class MediaOfRun(CountOfRun):
-    """The media: number of particles, and their radii and density as specified in the study.
-
-    Attributes
-    ----------
-    count : int
-        Number of particles.
-    radius_mean_m, radius_std_m : float
-        Mean and standard deviation of the radii, m.
-    density_kg_m3 : float
-        Density, kg/m3.
-    buoyancy_kg_m3 : float
-        Mass of liquid that the particles of a bed displace per volume, kg/m3; absent if dry.
-    """
-
-    radius_mean_m: PositiveFloat
-    radius_std_m: float
-    density_kg_m3: PositiveFloat
-    buoyancy_kg_m3: float = omitted(0.0)
-
-    @property
-    def weight_kg_m3(self) -> float:
-        """Density that belongs to the weight minus buoyancy, kg/m3."""
-        return self.density_kg_m3 - self.buoyancy_kg_m3
-
-
-class ClassOfRun(Part):
-    """A class of the media.
-
-    Attributes
-    ----------
-    name, material : str
-    first_id, count : int
-        Its particles have the ids from `first_id` on.
-    volume_m3 : float
-        Of all of them.
-    radius_mean_m, radius_std_m : float
-        Of the particles as placed, m.
-    density_kg_m3 : float
-    contact_moduli, attractive : mapping
-        As in `CaseOfRun`, of a particle of this class; those with other classes by their names.
-    """
-
-    name: str
-    material: str
-    first_id: int
-    count: int
-    volume_m3: PositiveFloat
-    radius_mean_m: PositiveFloat
-    radius_std_m: float
-    density_kg_m3: PositiveFloat
-    contact_moduli: Mapping[str, ContactConstants]
-    attractive: Mapping[str, Mapping[str, float]] = omitted({})
-
-
-class BodiesOfRun(Part):
-    """Particles of one class and size that are clumps of spheres.
-
-    Attributes
-    ----------
-    first_id, count : int
-        They have the ids from `first_id` on.
-    first_sphere : int
-        Id in LIGGGHTS of the first sphere of the first one; spheres are counted particle by
-        particle.
-    radius_m, mass_kg : float
-        Radius of the sphere of equal volume, and mass.
-    inertia_kg_m2 : tuple of float
-        Principal moments of inertia.
-    offsets_m, radii_m : tuple
-        Places of the spheres of a particle in its principal frame about the centre of mass, and
-        their radii, m.
-    """
-
-    first_id: int
-    count: int
-    first_sphere: int
-    radius_m: PositiveFloat
-    mass_kg: PositiveFloat
-    inertia_kg_m2: tuple[PositiveFloat, PositiveFloat, PositiveFloat]
-    offsets_m: tuple[tuple[float, float, float], ...]
-    radii_m: tuple[PositiveFloat, ...]
-
-    @property
-    def spheres_m(self) -> list[list[float]]:
-        """Place and radius of each sphere of a particle, m."""
-        pairs = zip(self.offsets_m, self.radii_m, strict=True)
-        return [[*place, radius] for place, radius in pairs]
-
-    @property
-    def rows(self) -> slice:
-        """The spheres of all these particles, in rows of all spheres in the order of their ids."""
-        first = self.first_sphere - 1
-        return slice(first, first + self.count * len(self.radii_m))
-
-    def by_particle(self, values: Floats) -> Floats:
-        """Values of all spheres, (N, C), in the order of their ids, as (particle, sphere, C)."""
-        return values[self.rows].reshape(self.count, len(self.radii_m), -1)
-
-
-class BowlOfRun(Part):
-    """The bowl: a cylinder about the z axis with its floor at z = 0.
-
-    Attributes
-    ----------
-    radius_m : float
-        Inner radius, m.
-    walls : str
-        ``primitive`` (analytical plane and cylinder) or ``mesh``.
-    """
-
-    radius_m: PositiveFloat
-    walls: Literal["primitive", "mesh"]
 
 
 class WorkpieceOfRun(Part):
@@ -225,23 +108,13 @@ class StatisticsOfRun(Part):
     transient_s: float
 
 
-class CaseOfRun(CaseFile):
+class CaseOfRun(CaseOfBed):
     """The content of ``case.json`` of a run of a study.
 
     The attributes are the keys of the document. Those that a scene does not have are absent.
 
     Attributes
     ----------
-    contact_moduli : mapping
-        Contact constants of a particle with a ``particle``, the ``bowl`` and the ``workpiece``,
-        softened as the run is.
-    attractive : mapping
-        By the same names, coefficients that add an attractive force, as simulated; absent if the
-        contact law has none.
-    classes : tuple of ClassOfRun
-        Classes of the media, if there are several.
-    bodies : tuple of BodiesOfRun
-        Particles by class and size, if they are clumps of spheres.
     fidelity : FidelityOfRun
         Settings for speed and accuracy.
     assumptions : tuple of AssumptionOfRun
@@ -272,14 +145,7 @@ class CaseOfRun(CaseFile):
         Coefficient of restitution in the input script of a drop test.
     """
 
-    gravity_m_s2: float
     fidelity: FidelityOfRun
-    media: MediaOfRun
-    bowl: BowlOfRun
-    contact_moduli: Mapping[str, ContactConstants]
-    attractive: Mapping[str, Mapping[str, float]] = omitted({})
-    classes: tuple[ClassOfRun, ...] = omitted(())
-    bodies: tuple[BodiesOfRun, ...] = omitted(())
     assumptions: tuple[AssumptionOfRun, ...]
     study: StudyOfRun | None = omitted(None)
     case: str | None = omitted(None)
@@ -294,23 +160,6 @@ class CaseOfRun(CaseFile):
     statistics: StatisticsOfRun | None = omitted(None)
     asked: AdvisedSettings | None = omitted(None)
     restitution: float | None = omitted(None)
-
-    def class_of(self, particle_id: Ints) -> Ints:
-        """Number of the class of (N,) particles in `classes`; 0 if there are none."""
-        return class_numbers(particle_id, [class_.first_id for class_ in self.classes])
-
-    def body_of(self, sphere_id: Ints) -> Ints:
-        """Ids of the bodies of (N,) spheres of clumps; ids below 1, of walls, stay."""
-        first = np.array([body.first_sphere for body in self.bodies])
-        size = np.maximum(np.searchsorted(first, sphere_id, side="right") - 1, 0)
-        many = np.array([len(body.radii_m) for body in self.bodies])[size]
-        first_id = np.array([body.first_id for body in self.bodies])[size]
-        return np.where(sphere_id > 0, first_id + (sphere_id - first[size]) // many, sphere_id)
-
-    def density_of(self, particle_id: Ints) -> Floats:
-        """Density of (N,) particles, kg/m3."""
-        densities = [class_.density_kg_m3 for class_ in self.classes] or [self.media.density_kg_m3]
-        return np.array(densities)[self.class_of(particle_id)]
 
 
 class DropTestCase(CaseOfRun):

@@ -281,6 +281,7 @@ def _process_case(
         assumptions=[*assumed(study), *_of_liquid(case, surface_m)],
         asked=case.advised,
         study=said_study(study),
+        unsafe_timestep=study.accepted.unsafe_timestep,
         case=case.name,
         upstream={scene.name: scene.run_id(case) for scene in (FILLING, DROP_TEST)},
         lead=case.lead and PROCESS.run_id(case.lead),

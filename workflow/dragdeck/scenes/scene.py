@@ -20,14 +20,8 @@ from dragdeck.physics.contact_mechanics import (
 )
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import round_to
-from dragdeck.records.case import (
-    AssumptionOfRun,
-    BowlOfRun,
-    CaseOfRun,
-    ClassOfRun,
-    FidelityOfRun,
-    MediaOfRun,
-)
+from dragdeck.records.bed import BowlOfRun, ClassOfRun, MediaOfRun
+from dragdeck.records.case import AssumptionOfRun, CaseOfRun, FidelityOfRun
 from dragdeck.records.packing import Packing
 from dragdeck.study.base import Json, flat, without_fields
 from dragdeck.study.contact_law import Pair
