@@ -176,7 +176,9 @@ def experiment(
         pairs=[MeetingPair(types=met, **pair.model_dump()) for met, pair in pairs.items()],
         bodies=bodies,
     )
-    content = case.model_dump(mode="json", by_alias=True, exclude={"title", "heading", "versions"})
+    silent = {"title", "heading", "versions", "study_name"}
+    content = case.model_dump(mode="json", by_alias=True, exclude=silent)
+    content["study"] = case.study_name
     run = "-".join([test, *slug, digest({**content, "steps": steps})])
     return Experiment(case.model_copy(update={"run": run}), steps, period)
 

@@ -5,7 +5,7 @@ quantity has one value a block, and `dragchain.quantities.blocks` makes the run'
 """
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,73 +15,13 @@ import pandas as pd
 from dragchain.arrays import Floats, Ints
 from dragchain.drag import FORCES, drag_peaks, parts, read_counted, within_angle
 from dragchain.loading.samples import Sampled, sample
-from dragchain.quantities.blocks import Blocks, estimate_of
-from dragchain.quantities.known import UNKNOWN, Known
-from dragchain.quantities.registry import MEASURED
+from dragchain.quantities.blocks import Blocks
+from dragchain.quantities.document import PathQuantities
 from dragchain.run.kinematics import drag_phase, motion_of, needed, spins, workpiece_rotation
-from dragchain.statistics.estimate import Estimate, finite
+from dragchain.statistics.estimate import finite
 from dragchain.tables.by_step import read_groups, read_table
 from dragchain.tables.columns import vector
-from dragdeck.documents import Part
 from dragdeck.records.case import CaseOfRun
-
-
-class PathQuantities(Part):
-    """The quantities of a complete run along its counted path.
-
-    Attributes
-    ----------
-    arc_m : float
-        Counted path, m.
-    block_m : float
-        Length of a block, m.
-    blocks : mapping
-        Quantity to a sequence of B values, None where a block has none.
-    weights : mapping
-        Quantity to what each block counts, for example its samples, contacts or chains. All
-        blocks of a quantity that is not named count the same.
-    load_map : sequence of float
-        Mean normal load by depth and azimuth, N, a depth after the other.
-    """
-
-    arc_m: float = 0.0
-    block_m: float = 0.0
-    blocks: Mapping[str, tuple[float | None, ...]] = {}
-    weights: Mapping[str, tuple[float, ...]] = {}
-    load_map: tuple[float, ...] = ()
-
-    def of_blocks(self, name: str) -> Blocks:
-        """The blocks of a quantity; none if the run does not have it."""
-        values = np.array(self.blocks.get(name, ()), dtype=np.float64)
-        return Blocks(values, np.array(self.weights.get(name, np.ones(len(values)))))
-
-    def values(self, start: int = 0, stop: int | None = None) -> dict[str, float]:
-        """The quantities over some blocks, all if not given; without those that have no value."""
-        values = {
-            quantity.name: quantity.of_mean(
-                self.of_blocks(quantity.name).part(slice(start, stop)).mean
-            )
-            for quantity in MEASURED
-        }
-        return {name: value for name, value in values.items() if math.isfinite(value)}
-
-    def estimates(self, known: Mapping[str, Known]) -> dict[str, Estimate]:
-        """The quantities of the run with their intervals, without those that have no value.
-
-        Parameters
-        ----------
-        known : mapping
-            Quantity to what runs of other scenes say of it, for those of which they do.
-        """
-        there = self.values()
-        return {
-            quantity.name: estimate_of(
-                quantity, self.of_blocks(quantity.name), known.get(quantity.name, UNKNOWN)
-            )
-            for quantity in MEASURED
-            if quantity.name in there
-        }
-
 
 MAP_DEPTHS, MAP_AZIMUTHS = 4, 12
 """Bins of a load map: equal parts of the immersion depth, and of the circumference."""

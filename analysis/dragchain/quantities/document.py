@@ -9,7 +9,10 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from dragchain.quantities.along import PathQuantities
+import numpy as np
+
+from dragchain.quantities.blocks import Blocks, estimate_of
+from dragchain.quantities.known import UNKNOWN, Known
 from dragchain.quantities.registry import MEASURED
 from dragchain.statistics.estimate import Estimate
 from dragdeck.documents import Document, Part
@@ -56,6 +59,63 @@ class RunCost(Part):
     def cpu_per_m(self) -> float:
         """Processor time for a metre of path, s/m; NaN for a run that failed at once."""
         return self.cpu_time_s / self.steps * self.steps_per_m if self.steps else math.nan
+
+
+class PathQuantities(Part):
+    """The quantities of a complete run along its counted path.
+
+    Attributes
+    ----------
+    arc_m : float
+        Counted path, m.
+    block_m : float
+        Length of a block, m.
+    blocks : mapping
+        Quantity to a sequence of B values, None where a block has none.
+    weights : mapping
+        Quantity to what each block counts, for example its samples, contacts or chains. All
+        blocks of a quantity that is not named count the same.
+    load_map : sequence of float
+        Mean normal load by depth and azimuth, N, a depth after the other.
+    """
+
+    arc_m: float = 0.0
+    block_m: float = 0.0
+    blocks: Mapping[str, tuple[float | None, ...]] = {}
+    weights: Mapping[str, tuple[float, ...]] = {}
+    load_map: tuple[float, ...] = ()
+
+    def of_blocks(self, name: str) -> Blocks:
+        """The blocks of a quantity; none if the run does not have it."""
+        values = np.array(self.blocks.get(name, ()), dtype=np.float64)
+        return Blocks(values, np.array(self.weights.get(name, np.ones(len(values)))))
+
+    def values(self, start: int = 0, stop: int | None = None) -> dict[str, float]:
+        """The quantities over some blocks, all if not given; without those that have no value."""
+        values = {
+            quantity.name: quantity.of_mean(
+                self.of_blocks(quantity.name).part(slice(start, stop)).mean
+            )
+            for quantity in MEASURED
+        }
+        return {name: value for name, value in values.items() if math.isfinite(value)}
+
+    def estimates(self, known: Mapping[str, Known]) -> dict[str, Estimate]:
+        """The quantities of the run with their intervals, without those that have no value.
+
+        Parameters
+        ----------
+        known : mapping
+            Quantity to what runs of other scenes say of it, for those of which they do.
+        """
+        there = self.values()
+        return {
+            quantity.name: estimate_of(
+                quantity, self.of_blocks(quantity.name), known.get(quantity.name, UNKNOWN)
+            )
+            for quantity in MEASURED
+            if quantity.name in there
+        }
 
 
 class RunQuantities(PathQuantities, Document):

@@ -4,8 +4,8 @@ from pathlib import Path
 
 from dragchain.errors import TableError
 from dragchain.network.write import write_chains
-from dragchain.quantities.along import PathQuantities, quantities_along
-from dragchain.quantities.document import MEASURED_FILE, RunCost, RunQuantities
+from dragchain.quantities.along import quantities_along
+from dragchain.quantities.document import MEASURED_FILE, PathQuantities, RunCost, RunQuantities
 from dragchain.quantities.known import WindowsRecord
 from dragchain.run.case import upstream_folders
 from dragchain.statistics.estimate import Estimate

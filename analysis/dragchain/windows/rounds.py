@@ -7,8 +7,14 @@ from pathlib import Path
 import numpy as np
 
 from dragchain.arrays import Floats
-from dragchain.quantities.along import PathQuantities
-from dragchain.quantities.document import MEASURED_FILE, LoadMap, Need, Reached, RunQuantities
+from dragchain.quantities.document import (
+    MEASURED_FILE,
+    LoadMap,
+    Need,
+    PathQuantities,
+    Reached,
+    RunQuantities,
+)
 from dragchain.quantities.known import UNKNOWN, WindowsRecord
 from dragchain.quantities.registry import MEASURED, Quantity
 from dragchain.statistics.estimate import Estimate

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from dragchain.arrays import Floats
-from dragchain.quantities.along import PathQuantities
 from dragchain.quantities.blocks import Blocks, estimate_of
+from dragchain.quantities.document import PathQuantities
 from dragchain.quantities.known import UNKNOWN, Known
 from dragchain.quantities.registry import MEASURED, Quantity
 from dragchain.statistics.correlated import estimate_mean

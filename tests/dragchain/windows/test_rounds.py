@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dragchain.quantities.along import PathQuantities
+from dragchain.quantities.document import PathQuantities
 from dragchain.quantities.known import WindowsRecord
 from dragchain.windows.estimate import Round, WindowOfRun
 from dragchain.windows.rounds import judged, unsettled

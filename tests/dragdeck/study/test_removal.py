@@ -116,7 +116,7 @@ def test_no_run_depends_on_removal_but_its_case_says_it(load: Load) -> None:
     assert PROCESS.run_id(plain) == PROCESS.run_id(asked)
     assert PROCESS.digest(plain) != PROCESS.digest(asked)
     whole = json.loads(PROCESS.build(asked, None).case.as_text())
-    assert whole["removal"]["calibrate"] == [TRIAL]
+    assert whole["study"]["removal"]["calibrate"] == [TRIAL]
     assert "removal" not in json.loads(PROCESS.build(plain, None).case.as_text())
 
 
