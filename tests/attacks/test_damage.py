@@ -304,17 +304,20 @@ def _doubled(file: Path, chance: random.Random) -> None:
 _RAW: dict[str, Damage] = {**_ANY, "written twice": _doubled, "an absurd count": _absurd_count}
 
 _OF_RUN = ("state.json", "case.json", "columns.json", "run.json")
+_ANALYSES = ("tables", "chains", "loading", "quantities", "figures")
 _READERS: dict[str, tuple[str, ...]] = {
     "state.json": ("run",),
-    "case.json": ("run", "tables", "chains", "loading", "figures", "report"),
+    "case.json": ("run", *_ANALYSES, "report"),
     "columns.json": ("run", "tables"),
-    "run.json": ("run", "tables", "chains", "loading", "figures", "report"),
-    "tables/workpiece_force.parquet": ("figures", "report"),
-    "tables/workpiece_contacts.parquet": ("chains", "loading", "figures"),
+    "run.json": ("run", *_ANALYSES, "report"),
+    "tables/workpiece_force.parquet": ("quantities", "figures", "report"),
+    "tables/workpiece_contacts.parquet": ("chains", "loading", "quantities", "figures"),
     "tables/particles.parquet": ("chains", "figures"),
-    "tables/contacts.parquet": ("chains", "figures"),
-    "tables/network.parquet": ("figures", "report"),
-    "tables/chains.parquet": ("figures", "report"),
+    "tables/contacts.parquet": ("chains", "quantities", "figures"),
+    "tables/network.parquet": ("quantities", "figures", "report"),
+    "tables/chains.parquet": ("quantities", "figures", "report"),
+    "tables/contact_events.parquet": ("quantities",),
+    "tables/quantities.json": ("figures", "report"),
     "tables/clusters.parquet": ("figures", "report"),
     "tables/closure.json": ("figures", "report"),
     "tables/loading.json": ("report",),

@@ -305,16 +305,16 @@ def _of_events(file: Path, sampled: Sampled, path: CountedPath) -> dict[str, Blo
 
 def _of_network(run_dir: Path, path: CountedPath) -> dict[str, Blocks]:
     tables = run_dir / "tables"
-    network = read_table(tables / "network.parquet")
-    steps = network["step"].to_numpy(np.int64)
-    overlap = np.zeros(path.blocks)
-    for number, values in path.parts(_overlaps(tables / "contacts.parquet", path)):
-        overlap[number] = np.percentile(values, 99)
     columns = {
         "coordination_number": "coordination_number",
         "mechanical_coordination_number": "mechanical_coordination_number",
         "network_force_mean": "normal_force_mean_n",
     }
+    network = read_table(tables / "network.parquet", ["step", *columns.values()])
+    steps = network["step"].to_numpy(np.int64)
+    overlap = np.zeros(path.blocks)
+    for number, values in path.parts(_overlaps(tables / "contacts.parquet", path)):
+        overlap[number] = np.percentile(values, 99)
     frames = np.bincount(path.block(steps), minlength=path.blocks)
     return {
         **{name: path.mean(steps, network[col].to_numpy()) for name, col in columns.items()},

@@ -204,7 +204,7 @@ def _make(root: Path) -> Iterator[Phase]:
         yield _made(root, Phase(name, words, runs[place], engine=True))
         analyses = ["tables", "figures"]
         if place == "process":
-            analyses = ["tables", "chains", "loading", "figures"]
+            analyses = ["tables", "chains", "loading", "quantities", "figures"]
         for step in analyses:
             if place == "process":
                 words = command("dragchain", step, runs[place])

@@ -8,7 +8,7 @@ from attack.calls import LARGEST_FILE, Call, Said, engines, gone_within, kill, m
 from attack.ground import Phase, Undisturbed, differences, resumed_at
 
 ENGINE_PHASES = ("drop test", "filling", "process")
-PHASES = (*ENGINE_PHASES, "tables", "chains", "loading", "figures", "report")
+PHASES = (*ENGINE_PHASES, "tables", "chains", "loading", "quantities", "figures", "report")
 
 ENDS_WITHIN_S = 5.0
 """An engine whose runner was killed is gone after this time, s."""
