@@ -37,7 +37,7 @@ COMMANDS = (
             "loading.write:write_loading", (RUN_DIR,)),
     Command("quantities", "measure the quantities of a run",
             "Measure the quantities of a process run, each with its interval. It reads the tables "
-            "and force chains of the run, and contact events if there are any, and writes "
+            "and force chains of the run and writes "
             "quantities.json to RUN_DIR/tables. A run of a plan, and a window, gets its tables "
             "and chains first.",
             "quantities.measure:write_quantities", (RUN_DIR,)),

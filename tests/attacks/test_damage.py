@@ -316,7 +316,6 @@ _READERS: dict[str, tuple[str, ...]] = {
     "tables/contacts.parquet": ("chains", "quantities", "figures"),
     "tables/network.parquet": ("quantities", "figures", "report"),
     "tables/chains.parquet": ("quantities", "figures", "report"),
-    "tables/contact_events.parquet": ("quantities",),
     "tables/quantities.json": ("figures", "report"),
     "tables/clusters.parquet": ("figures", "report"),
     "tables/closure.json": ("figures", "report"),

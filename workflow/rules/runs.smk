@@ -159,7 +159,7 @@ for PLACE in ("process", POINTS, WINDOWS):
             (
                 []
                 if PLACE in OUTCOMES
-                else tables_of(PLACE, [*SCENES["process"].network, *SCENES["process"].loading])
+                else tables_of(PLACE, [*SCENES["process"].tables, *SCENES["process"].network])
             ),
             run=of_run(PLACE, RECORD[PLACE]),
             bed=WORK.of_its_bed(PLACE, "tables/packing.json"),

@@ -147,8 +147,6 @@ class CountedPath:
 def quantities_along(run_dir: Path, case: CaseOfRun) -> PathQuantities:
     """The quantities of a complete run with tables and chains.
 
-    Contact events are counted if `dragchain.loading` has found them.
-
     Raises
     ------
     TableError
@@ -163,7 +161,7 @@ def quantities_along(run_dir: Path, case: CaseOfRun) -> PathQuantities:
         **_of_force(force, path, case),
         **_of_workpiece_contacts(run_dir, path),
         **_of_loading(sampled, path),
-        **_of_events(run_dir / "tables" / "contact_events.parquet", sampled, path),
+        "events": path.per_metre(_begins(sampled) * path.blocks // sampled.frames),
         **_of_network(run_dir, path),
     }
     load_map = _load_map(sampled, needed(case.workpiece, "workpiece").immersion_depth_m)
@@ -294,13 +292,12 @@ def _mean(values: Floats) -> float:
     return float(np.bincount(np.zeros(len(values), dtype=np.int64), values)[0] / len(values))
 
 
-def _of_events(file: Path, sampled: Sampled, path: CountedPath) -> dict[str, Blocks]:
-    """Contact events by the sample in which they begin."""
-    if not file.is_file():
-        return {}
-    frame_of = sampled.rows.drop_duplicates("time_s").set_index("time_s")["frame"]
-    begins = frame_of.reindex(read_table(file, ["start_s"])["start_s"]).to_numpy(np.int64)
-    return {"events": path.per_metre(begins * path.blocks // sampled.frames)}
+def _begins(sampled: Sampled) -> Ints:
+    """Samples in which contact events begin: a particle had no contact in the one before."""
+    stays = sampled.rows[["particle_id", "frame"]].drop_duplicates()
+    stays = stays.sort_values(["particle_id", "frame"])
+    other = stays["particle_id"].diff() != 0
+    return stays.loc[other | (stays["frame"].diff() > 1), "frame"].to_numpy(np.int64)
 
 
 def _of_network(run_dir: Path, path: CountedPath) -> dict[str, Blocks]:

@@ -9,11 +9,14 @@ import numpy as np
 import pandas as pd
 import pytest
 from finished_runs import TRANSIENT_S, write_finished_run
+from loading_files import made_contacts, write_run
 from made_run import particles_kept, run_json, with_motion, write_documents
 from tiny_run_files import SPEED_M_S, case_json
 
 from dragchain.errors import TableError
-from dragchain.quantities.along import CountedPath, band_pass, quantities_along
+from dragchain.loading.contact_events import find_events
+from dragchain.loading.samples import sample
+from dragchain.quantities.along import CountedPath, _begins, band_pass
 from dragchain.quantities.document import MEASURED_FILE, RunQuantities
 from dragchain.quantities.measure import estimates_along, write_quantities
 from dragchain.quantities.registry import MEASURED
@@ -111,7 +114,7 @@ def test_a_run_by_hand(tiny_run: Path) -> None:
     blocks = {name: values[0] for name, values in found.blocks.items()}
     names = {quantity.name for quantity in MEASURED}
     assert names - set(blocks) - set(found.single) == {
-        *("torque_mean", "events", "drag_std_long", "peaks")  # no spin, no events, a short path
+        *("torque_mean", "drag_std_long", "peaks")  # no spin, a short path
     }
     assert found.arc_m == pytest.approx(6.2e-6) and found.block_m == found.arc_m
     assert blocks["drag_mean"] == pytest.approx(-1.5)
@@ -145,12 +148,14 @@ def test_a_run_without_a_record_is_refused(tiny_run: Path) -> None:
         write_quantities(tiny_run)
 
 
-def test_contact_events_are_counted_where_they_begin(tmp_path: Path) -> None:
-    """One particle that stays from the first counted sample to the last: one event."""
-    run = write_finished_run(tmp_path / "process" / "run-1")
-    assert len(pd.read_parquet(run / "tables/contact_events.parquet")) == 1
-    along = quantities_along(run, load_case(run))
-    assert along.values()["events"] == pytest.approx(1.0 / along.arc_m)
+def test_contact_events_begin_where_those_of_the_loading_do(tmp_path: Path) -> None:
+    """Particles that stay, leave and come back, and change their facet: five events."""
+    run = write_run(tmp_path / "run", made_contacts())
+    case = load_case(run)
+    sampled = sample(run, case)
+    events, _ = find_events(sampled.rows, sampled.frames, sampled.interval_s)
+    assert len(events) == 5
+    assert sorted(_begins(sampled)) == sorted(events["frame"])
 
 
 def test_the_torque_is_about_the_axis_of_a_workpiece_that_spins(tmp_path: Path) -> None:
