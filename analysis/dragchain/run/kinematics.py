@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from dragchain.arrays import Floats, Ints
 from dragchain.errors import TableError
-from dragchain.run.case import study_of
 from dragdeck.records.case import CaseOfRun
 from dragdeck.records.run import Phase
 from dragdeck.study.drive import Orientations, about_vertical, rotated, wrap_angle
@@ -126,7 +125,7 @@ def motion_of(case: CaseOfRun) -> DrivenMotion:
     """
     entry = needed(case.motion, "motion")
     start, factor = drag_phase(case).start_step, case.fidelity.speed_factor
-    driven = DrivenMotion.of(study_of(case).motion, case.timestep_s, factor, start)
+    driven = DrivenMotion.of(needed(case.study, "study").motion, case.timestep_s, factor, start)
     made = [driven.path_entry(), *driven.superposed_entries()], [entry, *case.superposed]
     if not _alike(*([one.model_dump() for one in entries] for entries in made)):
         raise TableError(
