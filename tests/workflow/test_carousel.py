@@ -93,7 +93,7 @@ def test_the_contacts_of_each_are_its_own(workpieces: list[Path]) -> None:
 def test_all_feel_the_same_drag(workpieces: list[Path], project: Path) -> None:
     table = pd.read_parquet(project / "results/small/report/summary.parquet")
     assert table["case"].tolist() == [f"quick_workpiece-{number}" for number in (1, 2, 3)]
-    half = 0.5 * (table["drag_ci95_high_n"] - table["drag_ci95_low_n"])
+    half = 0.5 * (table["drag_mean_ci95_high_n"] - table["drag_mean_ci95_low_n"])
     assert (table["drag_mean_n"] < -half).all()
     for first, second in ((0, 1), (0, 2), (1, 2)):
         apart = abs(table["drag_mean_n"][first] - table["drag_mean_n"][second])

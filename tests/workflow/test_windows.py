@@ -12,7 +12,7 @@ import yaml
 from paths import SMALL_STUDY
 from snakemake_calls import copy_of_project, jobs, succeed
 
-from dragchain.quantities.document import Extrapolated
+from dragchain.quantities.document import Extrapolated, RunQuantities
 from dragchain.run.kinematics import axis_speed, drag_phase
 from dragchain.windows.estimate import Round
 from dragdeck.records.case import load_case
@@ -71,24 +71,21 @@ def test_windows_are_run_until_the_tolerance_or_the_end(finished: Path) -> None:
     assert [Round.read(file).last for file in rounds] == [False] * (len(rounds) - 1) + [True]
     assert len(last.windows) == len(list((finished / "windows").iterdir())) == 3
     assert not last.tolerance.reached and last.tolerance.needed.packings > 1
-    for one in last.quantities:
-        if one.name in ASKED:
-            assert one.value.ci95_low < one.value.value < one.value.ci95_high
-    contacts = next(one for one in last.quantities if one.name == "workpiece_contacts")
-    own = [one.values["workpiece_contacts"] for one in last.windows if not one.refused]
-    assert contacts.value.value == pytest.approx(np.mean(own))
+    for name in ASKED:
+        value = last.values[name]
+        assert value.ci95_low < value.value < value.ci95_high
+    of_windows = [of.values["workpiece_contacts"] for of in last.windows if not of.refused]
+    assert last.values["workpiece_contacts"].value == pytest.approx(np.mean(of_windows))
 
 
 def test_the_report_takes_its_values_from_the_windows(finished: Path) -> None:
     (run,) = (finished / "process").iterdir()
     found = Extrapolated.read(run / "tables/extrapolated.json")
-    drag, summary = found.of("drag_mean"), pd.read_parquet(finished / "report/summary.parquet")
-    assert drag is not None and drag.value is not None
+    summary = pd.read_parquet(finished / "report/summary.parquet")
     assert found.tolerance is not None and not found.tolerance.reached
-    factor = drag.value.value / drag.measured.value
-    assert summary["extrapolated_drag_mean_n"][0] == pytest.approx(
-        factor * summary["drag_mean_n"][0]
-    )
+    assert summary["extrapolated_drag_mean_n"][0] == pytest.approx(found.values["drag_mean"].value)
+    measured = RunQuantities.read(run / "tables/quantities.json").values_of_run
+    assert summary["drag_mean_n"][0] == pytest.approx(measured["drag_mean"].value)
     page = html.unescape((finished / "report/report.html").read_text())
     assert found.said in page.replace("\N{NO-BREAK SPACE}", " ")
 
@@ -98,15 +95,15 @@ def test_removal_is_that_of_the_windows(finished: Path) -> None:
     (run,) = (finished / "process").iterdir()
     assert len(pd.read_parquet(run / "tables/touch_events.parquet"))
     assert not list(finished.glob("windows/*/touch*"))
-    load = Extrapolated.read(run / "tables/extrapolated.json").of("force_slide")
-    assert load is not None and load.value is not None
-    assert load.value.value != pytest.approx(load.measured.value, rel=1e-6)
+    load = Extrapolated.read(run / "tables/extrapolated.json").values["force_slide"]
+    measured = RunQuantities.read(run / "tables/quantities.json").values_of_run
+    assert load.value != pytest.approx(measured["force_slide"].value, rel=1e-6)
     (file,) = (finished / "report").glob("*-removal.csv")
     facets = pd.read_csv(file)
     assert facets["corrected"].all()
     assert (facets["youngs_modulus_scale"] == 0.1).all()
     volume = facets["depth_m_s"] @ facets["area_m2"]
-    expected = COEFFICIENT_M2_N * load.value.value * axis_speed(load_case(run))
+    expected = COEFFICIENT_M2_N * load.value * axis_speed(load_case(run))
     assert volume == pytest.approx(expected, rel=0.02)  # blocks leave out an end of the path
 
 
