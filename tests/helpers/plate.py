@@ -82,7 +82,9 @@ run {{ steps }}
 
 def engine(folder: Path, *words: str, ranks: int = 1) -> None:
     """Run the input script of a folder as it stands."""
-    whole = [*command(find_engine(), "in.liggghts", ranks, 1, None), *words]
+    whole = [find_engine().path, "-in", "in.liggghts", "-log", "none", *words]
+    if ranks > 1:
+        whole = command(find_engine(), "in.liggghts", ranks, 1, None)
     allowed = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
     done = subprocess.run(
         whole,

@@ -214,7 +214,7 @@ def _of_force(force: pd.DataFrame, path: CountedPath, case: CaseOfRun) -> dict[s
         "peaks": path.per_metre(path.block(steps[drag_peaks(force, case).index])),
     }
     if path.length_m < 2.0 * LONG_WAVE * path.diameter_m:  # a window is no longer than its waves
-        del blocks["drag_std_long"], blocks["peaks"]  # what is a peak depends on them
+        del blocks["drag_std_long"]
     return blocks
 
 

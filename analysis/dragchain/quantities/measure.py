@@ -14,13 +14,15 @@ from dragdeck.records.case import CaseOfRun, load_case
 from dragdeck.records.packing import Packing
 from dragdeck.records.run import RunRecord
 
+OUTCOME = "outcome.json"
+"""The record of a run whose failure is a finding."""
+
 
 def write_quantities(run_dir: Path) -> RunQuantities:
     """Measure a process run and write ``tables/quantities.json``.
 
-    A run whose failure is a finding (of a plan, or a window) has an ``outcome.json`` instead of a
-    ``run.json``. If it is complete it gets its tables and chains first; of a failed one only the
-    failure is written.
+    A run whose failure is a finding (of a plan, or a window) has an ``outcome.json``. If it is
+    complete it gets its tables and chains first; of a failed one only the failure is written.
 
     Parameters
     ----------
@@ -35,7 +37,7 @@ def write_quantities(run_dir: Path) -> RunQuantities:
     case, outcome = load_case(run_dir), _outcome(run_dir)
     measured: dict[str, object] = {"failure": outcome.failed_checks}
     if outcome.complete:
-        if not (run_dir / "run.json").is_file():
+        if (run_dir / OUTCOME).is_file():
             write_tables(run_dir)
             write_chains(run_dir)
         bed = Packing.read(upstream_folders(run_dir, case)["filling"] / "tables" / "packing.json")
@@ -75,7 +77,7 @@ def _estimates(along: PathQuantities) -> dict[str, Estimate]:
 
 def _outcome(run_dir: Path) -> RunRecord:
     """How the run ended: ``run.json``, or of a run whose failure is a finding ``outcome.json``."""
-    for name in ("run.json", "outcome.json"):
+    for name in (OUTCOME, "run.json"):
         if (run_dir / name).is_file():
             return RunRecord.read(run_dir / name)
     raise TableError(

@@ -133,6 +133,8 @@ def _joined(
     """Each quantity at physical stiffness that the soft run and all windows have."""
     known_of_all = [soft.values(), *(window.values for window in windows)]
     for quantity in MEASURED if len(windows) >= _FEWEST else ():
+        if quantity.name == "peaks":  # they stand out of the drag's long waves, which windows lack
+            continue
         if all(quantity.name in values for values in known_of_all):
             join = joined_squares if quantity.squared else joined
             known = record.quantities.get(quantity.name, UNKNOWN)

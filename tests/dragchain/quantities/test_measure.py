@@ -114,7 +114,7 @@ def test_a_run_by_hand(tiny_run: Path) -> None:
     blocks = {name: values[0] for name, values in found.blocks.items()}
     names = {quantity.name for quantity in MEASURED}
     assert names - set(blocks) - set(found.single) == {
-        *("torque_mean", "drag_std_long", "peaks")  # no spin, a short path
+        *("torque_mean", "drag_std_long")  # no spin, a short path
     }
     assert found.arc_m == pytest.approx(6.2e-6) and found.block_m == found.arc_m
     assert blocks["drag_mean"] == pytest.approx(-1.5)

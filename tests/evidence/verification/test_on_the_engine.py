@@ -34,7 +34,7 @@ def folders(case: Case, project: Project) -> list[Path]:
     made = []
     for name, experiment in suite_of(case.study).items():
         if name.startswith(CHOSEN):
-            folder = project.results(experiment.case.study) / "collide" / name
+            folder = project.results(experiment.case.study_name) / "collide" / name
             write_run(collide_scene(experiment), folder, environment(project.templates))
             run(folder, lambda line: None)
             made.append(folder)

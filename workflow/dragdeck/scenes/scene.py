@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 import numpy as np
+from pydantic import ValidationError
 
 from dragdeck import __version__
 from dragdeck.cases.bed import bed_classes, bed_density, body_sizes, skin
@@ -192,10 +193,14 @@ def case_of_study(
     return kind(**{**entries, **parts})
 
 
-def said_study(study: Study) -> Json:
+def said_study(study: Study) -> Study:
     """What ``case.json`` of a process has of a study: all that is about its runs."""
-    settings = {"fidelity": study.chosen_fidelity().plain()}
-    return without_fields(study.plain(), *_NOT_SAID) | settings
+    settings = study.chosen_fidelity()
+    said = without_fields(study.plain(), *_NOT_SAID) | {"fidelity": settings.plain()}
+    try:
+        return Study.model_validate(said)
+    except ValidationError:  # a stability map goes past the limits of a study on purpose
+        return study.model_copy(update={"fidelity": settings})
 
 
 def media_of_run(study: Study, buoyancy_kg_m3: float = 0.0) -> MediaOfRun:
