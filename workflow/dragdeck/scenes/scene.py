@@ -26,7 +26,7 @@ from dragdeck.records.case import AssumptionOfRun, CaseOfRun, FidelityOfRun
 from dragdeck.records.packing import Packing
 from dragdeck.study.base import Json, flat, without_fields
 from dragdeck.study.contact_law import Pair
-from dragdeck.study.model import Study
+from dragdeck.study.model import LARGEST_TIMESTEP_FRACTION, Study
 
 C = TypeVar("C", bound=CaseOfRun)
 
@@ -199,8 +199,13 @@ def said_study(study: Study) -> Study:
     said = without_fields(study.plain(), *_NOT_SAID) | {"fidelity": settings.plain()}
     try:
         return Study.model_validate(said)
-    except ValidationError:  # a stability map goes past the limits of a study on purpose
-        return study.model_copy(update={"fidelity": settings})
+    except ValidationError:
+        # A stability map goes past the limits of a study on purpose; `fidelity` of the case has
+        # what holds.
+        step = min(settings.timestep_fraction, LARGEST_TIMESTEP_FRACTION)
+        steps = {"timestep_fraction": step, "filling_timestep_fraction": min(step, 1.0)}
+        within = settings.model_copy(update=steps)
+        return Study.model_validate(said | {"fidelity": within.plain()})
 
 
 def media_of_run(study: Study, buoyancy_kg_m3: float = 0.0) -> MediaOfRun:
