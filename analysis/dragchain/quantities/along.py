@@ -15,7 +15,7 @@ import pandas as pd
 from dragchain.arrays import Floats, Ints
 from dragchain.drag import FORCES, drag_peaks, parts, read_counted, within_angle
 from dragchain.loading.samples import Sampled, sample
-from dragchain.quantities.blocks import Blocks
+from dragchain.quantities.blocks import FEWEST, Blocks
 from dragchain.quantities.document import PathQuantities
 from dragchain.run.kinematics import drag_phase, motion_of, needed, spins, workpiece_rotation
 from dragchain.statistics.estimate import finite
@@ -102,7 +102,7 @@ class CountedPath:
         start, per_step = drag_phase(case).start_step, case.timestep_s * motion.axis_speed_m_s
         before = max(first - int(np.median(np.diff(counted_steps))), start)
         length = (last - before) * per_step
-        return cls(before, last, length, diameter, max(1, round(length / diameter)))
+        return cls(before, last, length, diameter, max(FEWEST, round(length / diameter)))
 
     def block(self, steps: Ints) -> Ints:
         """Number of the block of each step, (N,); steps outside get the nearest."""
