@@ -80,14 +80,11 @@ run {{ steps }}
 """
 
 
-def engine(folder: Path, *words: str, ranks: int = 1) -> None:
-    """Run the input script of a folder as it stands."""
-    whole = [find_engine().path, "-in", "in.liggghts", "-log", "none", *words]
-    if ranks > 1:
-        whole = command(find_engine(), "in.liggghts", ranks, 1, None)
+def engine(folder: Path, *, ranks: int = 1, part: int = 1, source: Path | None = None) -> None:
+    """Run the input script of a folder as it stands, or go on from a checkpoint."""
     allowed = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
     done = subprocess.run(
-        whole,
+        command(find_engine(), "in.liggghts", ranks, part, source),
         cwd=folder,
         env={**os.environ, **allowed},
         capture_output=True,

@@ -247,7 +247,7 @@ def test_a_resumed_run_continues_the_motion(runs: Runs, name: str) -> None:
     step = min(step for step in written if step > begun + 100)
     for file in folder.glob("corners.*"):
         file.unlink()
-    engine(folder, *f"-var part 2 -var resume 1 -var from checkpoint.{step}.restart".split())
+    engine(folder, part=2, source=folder / f"checkpoint.{step}.restart")
     steps, place = reference(folder, part=2)
     assert drag.end_step == steps[-1]
     np.testing.assert_allclose(place, whole[1][np.isin(whole[0], steps)], atol=1e-11)
@@ -265,7 +265,7 @@ def test_a_resumed_run_sees_the_same_first_touches(runs: Runs) -> None:
     whole = pd.read_parquet(folder / "tables/touches.parquet")
     written = [int(file.name.split(".")[1]) for file in folder.glob("checkpoint.*.restart")]
     step = min(step for step in written if step > whole["step"].min() + 100)
-    engine(folder, *f"-var part 2 -var resume 1 -var from checkpoint.{step}.restart".split())
+    engine(folder, part=2, source=folder / f"checkpoint.{step}.restart")
     write_tables(folder)
     found = pd.read_parquet(folder / "tables/touches.parquet")
     before = found["step"] <= step
