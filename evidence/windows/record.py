@@ -20,6 +20,7 @@ from scipy.special import polygamma
 
 from dragchain.arrays import Floats
 from dragchain.errors import SeriesError
+from dragchain.quantities.blocks import neighbour_correlation
 from dragchain.quantities.document import RunQuantities
 from dragchain.quantities.known import Known, WindowsRecord
 from dragchain.quantities.registry import MEASURED, Quantity
@@ -173,11 +174,10 @@ def _runs_with(quantity: Quantity, runs: Sequence[SceneRun]) -> list[QuantityOfR
 
 
 def _correlation(scenes: Sequence[Sequence[QuantityOfRun]]) -> float:
-    """Mean correlation of neighbouring blocks, corrected for its bias (Kendall 1954)."""
-    series = [run.blocks - run.blocks.mean() for runs in scenes for run in runs if run.variance]
-    counts = np.array([len(away) for away in series])
-    seen = np.array([away[1:] @ away[:-1] / (away @ away) for away in series])
-    return float(np.average((seen + 1 / counts) / (1 - 3 / counts), weights=counts))
+    """Mean correlation of neighbouring blocks."""
+    series = [run.blocks for runs in scenes for run in runs if run.variance]
+    of_runs = [neighbour_correlation(blocks) for blocks in series]
+    return float(np.average(of_runs, weights=[len(blocks) for blocks in series]))
 
 
 def _is_soft(run: SceneRun) -> bool:

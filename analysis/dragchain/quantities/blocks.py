@@ -59,7 +59,8 @@ class Blocks:
 
 
 FEWEST = 4
-"""Blocks below which an interval is not reliable."""
+"""Blocks of the shortest paths. They are shorter than a diameter, so that their neighbours are more
+alike than those of other scenes; an interval of so few is not reliable."""
 
 _LARGEST = 0.8
 """Correlation of neighbours at which a path is too short for an interval."""
@@ -68,13 +69,26 @@ _PRIOR_BLOCKS = 20
 """Blocks' worth of evidence that runs of other scenes are on the correlation of neighbours."""
 
 
+def neighbour_correlation(series: Floats) -> float:
+    """Correlation of neighbours in a series, corrected for its bias (Kendall 1954).
+
+    Parameters
+    ----------
+    series : (N,) ndarray
+        At least four values, not all the same.
+    """
+    count, away = len(series), series - series.mean()
+    seen = float(away[1:] @ away[:-1]) / float(away @ away)
+    return (seen + 1.0 / count) / (1.0 - 3.0 / count)
+
+
 def half_width_of_mean(series: Floats, known: float) -> tuple[float, bool]:
     """Half-width of the interval of the mean of a series, and whether it is reliable.
 
     The variance of independent values is multiplied by ``(1 + r) / (1 - r)`` (Zwiers and von
-    Storch 1995, J. Climate 8, 336), with r the correlation of neighbours: that of the series,
-    corrected for its bias (Kendall 1954, Biometrika 41, 403), joined with the known one in
-    proportion to the number of blocks behind each, and not below 0.
+    Storch 1995, J. Climate 8, 336), with r the correlation of neighbours: that of the series
+    (`neighbour_correlation`), joined with the known one in proportion to the number of blocks
+    behind each, and not below 0.
 
     Parameters
     ----------
@@ -83,16 +97,13 @@ def half_width_of_mean(series: Floats, known: float) -> tuple[float, bool]:
     known : float
         Correlation of neighbours in runs of other scenes.
     """
-    count, away = len(series), series - series.mean()
-    squares = float(away @ away)
-    if count < FEWEST or squares == 0.0:
-        neighbours = known
-    else:
-        seen = (float(away[1:] @ away[:-1]) / squares + 1.0 / count) / (1.0 - 3.0 / count)
+    count, variance, neighbours = len(series), float(series.var(ddof=1)), known
+    if count >= FEWEST and variance:
+        seen = neighbour_correlation(series)
         joined = (count * seen + _PRIOR_BLOCKS * known) / (count + _PRIOR_BLOCKS)
         neighbours = min(max(joined, 0.0), _LARGEST)
-    variance = squares / (count - 1) / count * (1.0 + neighbours) / (1.0 - neighbours)
-    reliable = count >= FEWEST and squares > 0.0 and neighbours < _LARGEST
+    variance *= (1.0 + neighbours) / (1.0 - neighbours) / count
+    reliable = count > FEWEST and variance > 0.0 and neighbours < _LARGEST
     return student_quantile(count - 1) * math.sqrt(variance), reliable
 
 
@@ -100,7 +111,7 @@ def estimate_of(quantity: Quantity, blocks: Blocks, known: Known = UNKNOWN) -> E
     """A run's value with its interval; see `half_width_of_mean`.
 
     The interval is not known for a single block, or if the quantity is zero all along; it is not
-    reliable if the path is short (fewer than 4 blocks), or if the interval reaches so far that the
+    reliable if the path is short (4 blocks at most), or if the interval reaches so far that the
     value comes from a few events.
 
     Parameters
