@@ -25,9 +25,6 @@ from dragdeck.records.case import CaseOfRun
 FORCES = ("drag_n", "lateral_n", "vertical_n")
 """The force on the workpiece in the workpiece frame."""
 
-TORQUE = "torque_n_m"
-"""The torque on a workpiece that spins, about its own axis."""
-
 
 def read_counted(run_dir: Path | str, columns: Sequence[str] | None = None) -> pd.DataFrame:
     """Read the samples of the force on the workpiece that statistics use.

@@ -50,14 +50,7 @@ def map_stability(out_dir: Path, points: Path, cores: int) -> None:
     cores : int
         Runs at the same time.
 
-    Raises
-    ------
-    InputError
-        The map or its study cannot be used.
-    EngineError
-        No LIGGGHTS, or it was interrupted.
-    RejectedRunError
-        A bed did not come to rest.
+    Errors are those of `run_map`.
     """
     write_stability(out_dir, run_map(points, out_dir, cores))
 

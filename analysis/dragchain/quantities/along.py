@@ -29,7 +29,7 @@ MAP_DEPTHS, MAP_AZIMUTHS = 4, 12
 
 def _of_loading(sampled: Sampled, path: "CountedPath") -> dict[str, Blocks]:
     """What the contacts on the workpiece do to it, in equal parts of their samples."""
-    block = np.arange(sampled.frames) * path.blocks // sampled.frames
+    block = np.arange(sampled.frames) * path.blocks // sampled.frames  # of each sample
     frames = np.bincount(block, minlength=path.blocks)
     ahead = within_angle(sampled.rows["azimuth_rad"].to_numpy(np.float64), np.pi / 2)
 
@@ -46,6 +46,7 @@ def _of_loading(sampled: Sampled, path: "CountedPath") -> dict[str, Blocks]:
             for name, column in _PER_METRE.items()
         },
         "ahead_behind": Blocks.ratio(sums(sampled.rows["normal_impulse_n_s"] * ahead), load),
+        "events": path.per_metre(block[_begins(sampled)]),
     }
 
 
@@ -153,7 +154,7 @@ def quantities_along(run_dir: Path, case: CaseOfRun) -> PathQuantities:
         If a table is missing, the slip of the contacts is not known, or no particle touches the
         workpiece.
     """
-    turning = (HEADING, *TORQUES) if spins(case) else ()
+    turning = (_HEADING, *_TORQUES) if spins(case) else ()
     force = read_counted(run_dir, ("step", "time_s", *FORCES, *turning))
     path = CountedPath.of(case, force["step"].to_numpy(np.int64))
     sampled = sample(run_dir, case)
@@ -161,7 +162,6 @@ def quantities_along(run_dir: Path, case: CaseOfRun) -> PathQuantities:
         **_of_force(force, path, case),
         **_of_workpiece_contacts(run_dir, path),
         **_of_loading(sampled, path),
-        "events": path.per_metre(_begins(sampled) * path.blocks // sampled.frames),
         **_of_network(run_dir, path),
     }
     load_map = _load_map(sampled, needed(case.workpiece, "workpiece").immersion_depth_m)
@@ -180,15 +180,15 @@ def quantities_along(run_dir: Path, case: CaseOfRun) -> PathQuantities:
     )
 
 
-HEADING, TORQUES = "direction_rad", vector("torque", "n_m")
+_HEADING, _TORQUES = "direction_rad", vector("torque", "n_m")
 
 
 def _of_force(force: pd.DataFrame, path: CountedPath, case: CaseOfRun) -> dict[str, Blocks]:
     steps = force["step"].to_numpy(np.int64)
-    drag = force["drag_n"].to_numpy(np.float64)
-    unbiased = math.sqrt(len(drag) / (len(drag) - 1))
-    deviation = (drag - drag.mean()) * unbiased
-    spacing = path.length_m / len(drag)
+    series = {name.removesuffix("_n"): force[name].to_numpy(np.float64) for name in FORCES}
+    unbiased = math.sqrt(len(steps) / (len(steps) - 1))
+    away = {name: (forces - forces.mean()) * unbiased for name, forces in series.items()}
+    spacing = path.length_m / len(steps)
     bands = {
         "long": (LONG_WAVE, math.inf),
         "middle": (SHORT_WAVE, LONG_WAVE),
@@ -196,20 +196,16 @@ def _of_force(force: pd.DataFrame, path: CountedPath, case: CaseOfRun) -> dict[s
     }
     squares = {
         f"drag_std_{name}": path.mean(
-            steps, band_pass(deviation, spacing, low * path.diameter_m, high * path.diameter_m) ** 2
+            steps,
+            band_pass(away["drag"], spacing, low * path.diameter_m, high * path.diameter_m) ** 2,
         )
         for name, (low, high) in bands.items()
     }
-    means = {f"{name.removesuffix('_n')}_mean": force[name].to_numpy(np.float64) for name in FORCES}
     if spins(case):
-        means["torque_mean"] = _own_torque(force, case)
-    away = {
-        f"{name.removesuffix('_n')}_std": (force[name] - force[name].mean()) * unbiased
-        for name in FORCES
-    }
+        series["torque"] = _own_torque(force, case)
     blocks = {
-        **{name: path.mean(steps, series) for name, series in means.items()},
-        **{name: path.mean(steps, series.to_numpy() ** 2) for name, series in away.items()},
+        **{f"{name}_mean": path.mean(steps, of_samples) for name, of_samples in series.items()},
+        **{f"{name}_std": path.mean(steps, of_samples**2) for name, of_samples in away.items()},
         **squares,
         "peaks": path.per_metre(path.block(steps[drag_peaks(force, case).index])),
     }
@@ -223,8 +219,8 @@ def _own_torque(samples: pd.DataFrame, case: CaseOfRun) -> Floats:
 
     Unless the workpiece turns in the frame of its path, its work is negligible beside the drag's.
     """
-    step, heading = samples["step"].to_numpy(np.int64), samples[HEADING].to_numpy(np.float64)
-    torque = samples[[*TORQUES]].to_numpy(np.float64)
+    step, heading = samples["step"].to_numpy(np.int64), samples[_HEADING].to_numpy(np.float64)
+    torque = samples[[*_TORQUES]].to_numpy(np.float64)
     axis = motion_of(case).drive.own_axis
     return np.asarray(workpiece_rotation(step, heading, case).into(torque) @ axis)
 
@@ -272,7 +268,8 @@ def _pushing_contacts(run_dir: Path) -> Iterator[Rows]:
 
 def _of_workpiece_contacts(run_dir: Path, path: CountedPath) -> dict[str, Blocks]:
     names = (*(f"contact_force_{name}" for name in ("mean", "p50", "p90", "p99")), _OVERLAP)
-    values, contacts = {name: np.zeros(path.blocks) for name in names}, np.zeros(path.blocks)
+    values = {name: np.full(path.blocks, math.nan) for name in names}
+    contacts = np.zeros(path.blocks)
     for number, (normal, depth) in (
         (number, values.T) for number, values in path.parts(_pushing_contacts(run_dir))
     ):
@@ -281,7 +278,7 @@ def _of_workpiece_contacts(run_dir: Path, path: CountedPath) -> dict[str, Blocks
         for name, value in zip(names, of_block, strict=True):
             values[name][number] = value
     values[_OVERLAP] /= path.diameter_m
-    return {name: Blocks.ratio(of * contacts, contacts) for name, of in values.items()}
+    return {name: Blocks(of_blocks, contacts) for name, of_blocks in values.items()}
 
 
 _OVERLAP = "workpiece_overlap"
@@ -309,13 +306,13 @@ def _of_network(run_dir: Path, path: CountedPath) -> dict[str, Blocks]:
     }
     network = read_table(tables / "network.parquet", ["step", *columns.values()])
     steps = network["step"].to_numpy(np.int64)
-    overlap = np.zeros(path.blocks)
+    overlap = np.full(path.blocks, math.nan)
     for number, values in path.parts(_overlaps(tables / "contacts.parquet", path)):
         overlap[number] = np.percentile(values, 99)
     frames = np.bincount(path.block(steps), minlength=path.blocks)
     return {
         **{name: path.mean(steps, network[col].to_numpy()) for name, col in columns.items()},
-        "overlap_p99": Blocks.ratio(overlap * frames, frames),
+        "overlap_p99": Blocks(overlap, np.where(np.isnan(overlap), 0.0, frames)),
         **_of_chains(read_table(tables / "chains.parquet", _CHAIN_COLUMNS), frames, path),
     }
 

@@ -5,7 +5,7 @@ Young's modulus.
 """
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,11 +21,6 @@ from dragdeck.records.run import AcceptanceCheck
 
 MEASURED_FILE = Path("tables") / "quantities.json"
 EXTRAPOLATED = Path("tables") / "extrapolated.json"
-
-
-def checks_in_words(checks: Iterable[AcceptanceCheck]) -> str:
-    """Acceptance checks and what was seen."""
-    return "; ".join(f"{check.name}: {check.seen}" for check in checks)
 
 
 class RunCost(Part):
@@ -150,7 +145,7 @@ class RunQuantities(PathQuantities, Document):
     @property
     def why_failed(self) -> str:
         """The checks that did not pass, and what was seen."""
-        return checks_in_words(self.failure)
+        return "; ".join(f"{check.name}: {check.seen}" for check in self.failure)
 
 
 class Need(NamedTuple):

@@ -5,7 +5,7 @@ from pathlib import Path
 from dragchain.errors import TableError
 from dragchain.network.write import write_chains
 from dragchain.quantities.along import quantities_along
-from dragchain.quantities.document import MEASURED_FILE, PathQuantities, RunCost, RunQuantities
+from dragchain.quantities.document import MEASURED_FILE, RunCost, RunQuantities
 from dragchain.quantities.known import WindowsRecord
 from dragchain.run.case import upstream_folders
 from dragchain.statistics.estimate import Estimate
@@ -45,7 +45,7 @@ def write_quantities(run_dir: Path) -> RunQuantities:
         measured = {
             **dict(along),
             "single": {"bed_height": bed.bed_height_m, "solid_fraction": bed.solid_fraction},
-            "values_of_run": _estimates(along),
+            "values_of_run": along.estimates(WindowsRecord.shipped().quantities),
         }
     quantities = RunQuantities.model_validate(
         {
@@ -67,12 +67,7 @@ def estimates_along(run_dir: Path, case: CaseOfRun) -> dict[str, Estimate]:
 
     Errors are those of `quantities_along`.
     """
-    return _estimates(quantities_along(run_dir, case))
-
-
-def _estimates(along: PathQuantities) -> dict[str, Estimate]:
-    """With what runs of other scenes say of correlations and of packings."""
-    return along.estimates(WindowsRecord.shipped().quantities)
+    return quantities_along(run_dir, case).estimates(WindowsRecord.shipped().quantities)
 
 
 def _outcome(run_dir: Path) -> RunRecord:
