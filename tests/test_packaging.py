@@ -127,6 +127,16 @@ def test_nothing_is_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert (tmp_path / "config/config.yaml").read_text() == "study: mine\n"
 
 
+@pytest.mark.slow
+def test_a_study_runs_in_a_project_of_an_installed_clone(tmp_path: Path) -> None:
+    """An editable installation has its packages in no folder of Python's path."""
+    path = {"PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}", "PYTHONPATH": ""}
+    assert main(["init", str(tmp_path / "project")]) == 0
+    planned = call(tmp_path / "project", "./run", *STUDY, **path)
+    assert planned.returncode == 0, planned.stdout + planned.stderr
+    assert "run_process" in planned.stdout
+
+
 def test_a_project_uses_what_it_has_and_the_rest_of_dragdeck(tmp_path: Path) -> None:
     project = Project(tmp_path)
     assert project.cases("quickstart")[0].file == ROOT / "studies/quickstart/study.yaml"

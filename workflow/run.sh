@@ -1,5 +1,5 @@
 # Functions of ./run, in a clone and in a project that `dragdeck init` made. $root is its folder,
-# where it works, and $caller the folder of the call.
+# where it works, $caller the folder of the call, and $shipped the one with dragdeck's files.
 
 # A path that the caller gave is the caller's, not this folder's.
 seen_from_here() {
@@ -154,6 +154,10 @@ call() {
         status | open) exec dragdeck "$@" ;;
         *)
             ensure_writable
+            # Snakemake finds a logger plugin in folders of Python's path only, and a clone that is
+            # installed has its packages in none of them.
+            PYTHONPATH=$shipped/workflow${PYTHONPATH:+:$PYTHONPATH}
+            export PYTHONPATH
             # A flag ends the list of loggers: a target may follow.
             exec snakemake --logger dragdeck --show-failed-logs "$@"
             ;;
