@@ -1,6 +1,5 @@
 """Commands behind the evidence and its records: python -m evidence."""
 
-import sys
 from pathlib import Path
 
 from dragchain.cli import OUT_DIR, RUN_DIRS
@@ -67,4 +66,4 @@ PROGRAM = Program(
 main = PROGRAM.main
 
 if __name__ == "__main__":
-    sys.exit(main())
+    PROGRAM()

@@ -96,3 +96,40 @@ def test_a_reader_that_has_seen_enough_is_no_error() -> None:
     whole.stdout.close()
     assert whole.stderr.read() == ""
     assert whole.wait() == 0
+
+
+PROGRAM = """
+import atexit, ctypes, sys
+from dragdeck.command_line import Argument, Command, Program
+
+def command(how):
+    libc = ctypes.CDLL(None)  # as destructors of C++ libraries do now and then
+    libc.__cxa_atexit(ctypes.cast(libc.abort, ctypes.c_void_p), None, None)
+    atexit.register(print, "closed")
+    if how == "wrong":
+        raise ValueError("wrong")
+    return "done"
+
+sys.modules["package.module"] = sys.modules[__name__]
+about = ("command", "help", "about", "module:command", (Argument("how"),))
+Program("package", "about", [Command(*about)])()
+"""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "printed"),
+    [
+        (["command", "right"], 0, "done\nclosed\n"),
+        (["command", "wrong"], 1, "closed\n"),
+        (["no command"], 2, ""),
+    ],
+)
+def test_a_library_that_aborts_at_the_end_costs_no_result(
+    arguments: list[str], status: int, printed: str
+) -> None:
+    ended = subprocess.run(
+        [sys.executable, "-c", PROGRAM, *arguments],
+        capture_output=True, text=True,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+    )  # fmt: skip
+    assert (ended.returncode, ended.stdout) == (status, printed), ended.stderr

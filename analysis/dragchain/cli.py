@@ -1,7 +1,6 @@
 """The commands of ``dragchain``."""
 
 import math
-import sys
 from pathlib import Path
 
 from dragdeck.cli import FIDELITY, STUDY
@@ -210,4 +209,4 @@ PROGRAM = Program(
 main = PROGRAM.main
 
 if __name__ == "__main__":
-    sys.exit(main())
+    PROGRAM()

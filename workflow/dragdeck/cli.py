@@ -1,6 +1,5 @@
 """The commands of ``dragdeck``."""
 
-import sys
 from pathlib import Path
 
 from dragdeck.command_line import Argument, Command, Program
@@ -161,4 +160,4 @@ PROGRAM = Program(
 main = PROGRAM.main
 
 if __name__ == "__main__":
-    sys.exit(main())
+    PROGRAM()

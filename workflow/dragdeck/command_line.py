@@ -1,6 +1,7 @@
 """Commands as a table: each names the function that it calls, and that function's parameters."""
 
 import argparse
+import atexit
 import contextlib
 import os
 import platform
@@ -13,7 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from dragdeck import __version__
 from dragdeck.errors import DragdeckError
@@ -72,6 +73,26 @@ class Program:
     commands: Sequence[Command]
     steps: Sequence[Command] = ()
     call: str = ""
+
+    def __call__(self) -> NoReturn:
+        """Run the command of this process, and end it without the destructors of C++ libraries.
+
+        Arrow's threads abort a process there now and then, or keep it from ending, although all
+        its results are whole (github.com/apache/arrow, issues 34314 and 50482).
+        """
+        status: object = 1
+
+        def end() -> None:
+            with contextlib.suppress(OSError):  # which `guarded` has told
+                sys.stdout.flush()
+            os._exit(status if isinstance(status, int) else status is not None)
+
+        atexit.register(end)  # the first to be registered is the last to be called
+        try:
+            status = self.main()
+        except SystemExit as wrong_use:
+            status = wrong_use.code
+        sys.exit()
 
     def main(self, arguments: Sequence[str] | None = None) -> int:
         """Run a command and return its exit status; see `guarded`.
