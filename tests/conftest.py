@@ -27,7 +27,11 @@ settings.register_profile("explore", deadline=None)
 settings.register_profile("repeat", derandomize=True, deadline=None)
 settings.load_profile("repeat")
 
-ON_DEMAND = {"slurm": "start a Slurm", "audit": "compute tables again from raw outputs"}
+ON_DEMAND = {
+    "slurm": "start a Slurm",
+    "audit": "compute tables again from raw outputs",
+    "long": "take minutes, and the pages' long commands,",
+}
 """Markers of tests that run only when their option is given."""
 
 
@@ -35,7 +39,6 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--update", action="store_true", help="write golden decks and schemas anew")
     for name, what in ON_DEMAND.items():
         parser.addoption(f"--{name}", action="store_true", help=f"run the tests that {what} too")
-    parser.addoption("--long-commands", action="store_true", help="run the pages' long commands")
     parser.addoption("--attacks", action="store_true", help="all attacks instead of a sample")
 
 

@@ -89,9 +89,9 @@ NOT_SNAKEMAKE = (
 def test_a_long_command_would_run(clone: Path, call: str, pytestconfig: pytest.Config) -> None:
     """Targets of Snakemake run dry; of other programs the help must know the command.
 
-    With `--long-commands` they run as they are printed, but for those that run tests: hours.
+    With `--long` they run as they are printed, but for those that run tests: hours.
     """
-    if pytestconfig.getoption("--long-commands") and not call.startswith("./run test"):
+    if pytestconfig.getoption("--long") and not call.startswith("./run test"):
         runs(call, clone)
         return
     match call.split():

@@ -196,7 +196,18 @@ def farthest_corner(folder: Path, steps: np.ndarray, ref_m: np.ndarray) -> float
     return off
 
 
-@pytest.mark.parametrize("name", MOTIONS)
+LONG = {"eight-fixed", "eight-tilt-spin", "inclined-tilt", "waypoints-turn"}
+
+
+def motions(*names: str) -> pytest.MarkDecorator:
+    """One test for each; the long ones when all tests are wanted."""
+    mark = pytest.mark.long
+    return pytest.mark.parametrize(
+        "name", [pytest.param(name, marks=[mark] * (name in LONG)) for name in names]
+    )
+
+
+@motions(*MOTIONS)
 def test_the_engine_moves_the_workpiece_as_both_packages_say(runs: Runs, name: str) -> None:
     """The reference point to 1e-9 m at each step, the facets to the digits of an STL file."""
     folder = runs.driven(name)
@@ -233,9 +244,7 @@ def test_the_bed_rotates_with_the_bowl_about_a_workpiece_at_rest(runs: Runs, rpm
     assert force["drag_n"].mean() < 0
 
 
-@pytest.mark.parametrize(
-    "name", ["clockwise", "waypoints-spin", "tilt-spin-fixed", "eight-tilt-spin", "inclined"]
-)
+@motions("clockwise", "waypoints-spin", "tilt-spin-fixed", "eight-tilt-spin", "inclined")
 def test_a_resumed_run_continues_the_motion(runs: Runs, name: str) -> None:
     """A restart file keeps neither axis nor moved centre. Of stages, from within the second."""
     folder = runs.driven(name)

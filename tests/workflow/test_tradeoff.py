@@ -84,6 +84,7 @@ def validated(traded: Path) -> Path:
     return traded / "results/small/validation"
 
 
+@pytest.mark.long
 def test_a_validation_shares_the_runs_of_a_tradeoff(validated: Path, traded: Path) -> None:
     packings = pd.read_parquet(validated / "packings.parquet")
     assert packings.seed.tolist() == [1, 2]
@@ -92,6 +93,7 @@ def test_a_validation_shares_the_runs_of_a_tradeoff(validated: Path, traded: Pat
     assert jobs(traded, *TRADEOFF) - {"tradeoff"} == set()
 
 
+@pytest.mark.long
 def test_a_thicker_workpiece_meets_more_drag(validated: Path) -> None:
     effects = pd.read_parquet(validated / "effects.parquet")
     (row,) = effects[(effects.field != "") & (effects.quantity == "drag_mean")].to_dict("records")
@@ -100,6 +102,7 @@ def test_a_thicker_workpiece_meets_more_drag(validated: Path) -> None:
     assert row["change"] > 0.0
 
 
+@pytest.mark.long
 def test_the_page_of_a_validation_stands_alone(validated: Path) -> None:
     page = stands_alone((validated / "report.html").read_text())
     assert sum(map(len, page.images)) > 100_000

@@ -50,7 +50,10 @@ MEDIA: dict[str, dict[str, Any]] = {
 }  # fmt: skip
 
 
-@pytest.fixture(scope="module", params=MEDIA)
+@pytest.fixture(
+    scope="module",
+    params=["spheres", *(pytest.param(name, marks=pytest.mark.long) for name in [*MEDIA][1:])],
+)
 def finished(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A project in which the study was run with windows."""
     data, media = soft_study(), MEDIA[request.param]
