@@ -316,15 +316,16 @@ def preview(study: str, fidelity: str | None, case: str | None) -> None:
         raise together(refused)
 
 
-def _swept(scene: CaseLayout) -> list["Trimesh"]:
-    return [swept_volume(body.mesh, body.drag.poses) for body in scene.workpieces]
+def _swept(scene: CaseLayout, share: float = 1.0) -> list["Trimesh"]:
+    return [swept_volume(body.mesh, body.drag.poses, share) for body in scene.workpieces]
 
 
 def draw_set_up(study: str, fidelity: str | None) -> None:
     """Draw the first case of a study for its report."""
     project = find_project(Path.cwd())
     scene = layout(project.cases(study, fidelity)[0])
-    write_bytes(project.results(study) / "set_up.png", small_picture(scene, _swept(scene)))
+    swept = _swept(scene, share=0.05)  # details of a picture of this size
+    write_bytes(project.results(study) / "set_up.png", small_picture(scene, swept))
 
 
 def _case_named(cases: list[Case], name: str | None) -> Case:

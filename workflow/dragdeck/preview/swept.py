@@ -29,7 +29,7 @@ _MOST_TRIANGLES = 8000
 """Of the surface that is drawn."""
 
 
-def swept_volume(mesh: "Trimesh", poses: Floats) -> "Trimesh":
+def swept_volume(mesh: "Trimesh", poses: Floats, share: float = 1.0) -> "Trimesh":
     """The surface of the volume that a body sweeps.
 
     Parameters
@@ -38,6 +38,8 @@ def swept_volume(mesh: "Trimesh", poses: Floats) -> "Trimesh":
         Closed, in m.
     poses : (N, 4, 4) array
         Rigid motions from the mesh to space; what lies between two of them is not swept.
+    share : float
+        Of the cells that there may be at most.
 
     Returns
     -------
@@ -49,7 +51,7 @@ def swept_volume(mesh: "Trimesh", poses: Floats) -> "Trimesh":
     low, high = corners.min(axis=0), corners.max(axis=0)
     thickness = 2 * mesh.volume / mesh.area
     needed = np.prod(high - low), len(poses) * np.prod(mesh.extents)
-    cell = max(thickness / _CELLS_ACROSS, np.cbrt(np.divide(needed, _MOST_CELLS)).max())
+    cell = max(thickness / _CELLS_ACROSS, np.cbrt(np.divide(needed, share * np.array(_MOST_CELLS))).max())
     body = _distances(mesh, cell)
     shape = np.ceil((high - low) / cell).astype(int) + 2 * _MARGIN + 1
     origin, least = low - _MARGIN * cell, np.full(shape, _MARGIN * cell)
