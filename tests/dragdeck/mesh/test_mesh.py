@@ -401,14 +401,15 @@ OBJ = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
 @pytest.mark.parametrize(
     ("name", "content", "problem"),
     [
-        *(("a.obj", OBJ + face, "damaged")
+        *(("a.obj", OBJ + face, "a.obj:5: a facet names a node that is not there")
           for face in (b"f 1 2 9\n", b"f 1 2 3 9\n", b"f 0 1 2\n", b"f -9 1 2\n")),
-        ("five.obj", b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv .5 2 0\nv 0 1 0\nf 1 2 3 4 5\n", "neither"),
-        ("bad.stl", b"solid\nfacet normal 0 0 1\nvertex 0 0 zero\nendsolid\n", "damaged"),
-        ("cut.stl", b"solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvert", "damaged"),
-        ("cut.ply", b"ply\nformat ascii 1.0\nelement vertex 3\n", "damaged"),
+        ("two.obj", OBJ + b"f 1 2\n", "two.obj:5: too few corners"),
+        ("word.obj", OBJ + b"f 1 2 three\n", "word.obj:5: not a corner"),
+        ("bad.stl", b"solid\nfacet normal 0 0 1\nvertex 0 0 zero\nendsolid\n", "l:2: not a whole"),
+        ("cut.stl", b"solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvert", "not a whole"),
+        ("cut.ply", b"ply\nformat ascii 1.0\nelement vertex 3\n", "not a PLY file"),
         ("part.iges", b"S", "unknown mesh format"),
-        ("empty.stl", b"", "the mesh is empty"),
+        ("empty.stl", b"", "neither text nor whole binary"),
         ("no_facet.stl", b"solid x\nendsolid x\n", "the mesh is empty"),
     ],
 )  # fmt: skip

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import re
-import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from dragdeck.errors import InputError
+from dragdeck.mesh import formats
+from dragdeck.mesh.formats import Polygons
 from dragdeck.mesh.step import mesh_step
 from dragdeck.mesh.surface import CAD_VOLUME, MERGED, Floats, Integers, obtuse_third, surface, weld
 
@@ -25,9 +24,6 @@ UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
 STEP = (".step", ".stp")
 """Suffixes of CAD parts, which are meshed here."""
 
-_NAME = re.compile(rb"solid.*")
-_VERTEX = re.compile(rb"vertex\s(.*)")
-
 
 def read(
     path: Path | str,
@@ -37,10 +33,9 @@ def read(
 ) -> Trimesh:
     """Read a surface from STL (ASCII or binary), OBJ, PLY, legacy VTK or VTU, or mesh a STEP part.
 
-    trimesh reads STL, meshio the rest: trimesh cuts quadrilaterals along
-    whichever diagonal comes first, here they are cut along the shorter one. VTK
-    polygon data is refused: meshio does not know it, and VTK's own reader fills
-    a file that was cut short with whatever the memory holds. gmsh meshes STEP.
+    STL, OBJ and PLY are read by `formats`, the rest by meshio. VTK polygon data is refused: meshio
+    does not know it, and VTK's own reader fills a file that was cut short with whatever the memory
+    holds. gmsh meshes STEP.
 
     Parameters
     ----------
@@ -70,9 +65,9 @@ def read(
         )
     if path.suffix.lower() in STEP:
         return _read_step(path, unit, facet_size_m, edge_facet_size_m)
-    points, blocks = _load(path)
     with _damage(path):
-        triangles = [_triangles(block.type, block.data, points, path) for block in blocks]
+        points, cells = _polygons(path)
+        triangles = [_triangles(nodes, points) for nodes in cells]
         joined = np.concatenate([np.empty((0, 3), dtype=np.int64), *triangles])
         body = surface(points * UNITS[unit], joined)
         mesh = weld(body)
@@ -96,39 +91,58 @@ def _refuse_missing(path: Path) -> None:
         raise InputError("there is no such mesh file", file=path)
 
 
-def _load(path: Path) -> tuple[Floats, list[Any]]:
-    """Read nodes, (N, 3), and cells; meshio's own `read` ends the interpreter on bad files."""
-    import meshio
-
-    readers = {
-        ".stl": _read_stl,
-        ".obj": meshio.obj.read,
-        ".ply": _read_ply,
-        ".vtk": meshio.vtk.read,
-        ".vtu": meshio.vtu.read,
-    }
+def _polygons(path: Path) -> Polygons:
     suffix = path.suffix.lower()
-    if suffix not in readers:
+    if suffix not in _READERS:
         raise InputError(
             "unknown mesh format",
             file=path,
             value=path.suffix or "no suffix",
-            limit=", ".join([*readers, *STEP]),
+            limit=", ".join([*_READERS, *STEP]),
             remedy="export the surface as STL",
         )
     _refuse_missing(path)
-    with _damage(path):
-        content = readers[suffix](path)
-        points = np.asarray(content.points, dtype=np.float64)
-        return points.reshape(len(points), 3), content.cells
+    return _READERS[suffix](path)
+
+
+def _vtk(path: Path) -> Polygons:
+    """Read legacy VTK or VTU; meshio's own `read` ends the interpreter on bad files."""
+    import meshio
+
+    content = {".vtk": meshio.vtk.read, ".vtu": meshio.vtu.read}[path.suffix.lower()](path)
+    blocks = [block for block in content.cells if block.type not in ("vertex", "line")]
+    for block in blocks:
+        if block.type not in ("triangle", "quad", "polygon"):
+            raise InputError(
+                "the mesh contains cells that are no polygons",
+                value=f"{len(block.data)} of type {block.type}",
+                limit="triangles, quadrilaterals, polygons",
+                remedy="export the surface alone",
+            )
+    points = np.asarray(content.points, dtype=np.float64).reshape(len(content.points), 3)
+    return Polygons(points, [np.asarray(block.data, dtype=np.int64) for block in blocks])
+
+
+def _bytes(read: Callable[[bytes], Polygons]) -> Callable[[Path], Polygons]:
+    return lambda path: read(path.read_bytes())
+
+
+_READERS: Mapping[str, Callable[[Path], Polygons]] = {
+    ".stl": _bytes(formats.stl),
+    ".obj": _bytes(formats.obj),
+    ".ply": _bytes(formats.ply),
+    ".vtk": _vtk,
+    ".vtu": _vtk,
+}
 
 
 @contextmanager
 def _damage(path: Path) -> Iterator[None]:
-    """What is wrong in a file as an error for the user: both libraries let any error out."""
+    """What is wrong in a file as an error for the user: meshio lets any error out."""
     try:
         yield
-    except InputError:
+    except InputError as error:
+        error.file, error.remedy = path, error.remedy or "export the surface again, as STL"
         raise
     except Exception as error:
         raise InputError(
@@ -139,55 +153,17 @@ def _damage(path: Path) -> Iterator[None]:
         ) from error
 
 
-def _read_stl(path: Path) -> Any:
-    """Read STL, every solid of the file; a text that was cut short holds none."""
-    import meshio
-    from trimesh.exchange.stl import HeaderError, load_stl_binary
-
-    with path.open("rb") as stream:
-        try:
-            corners = load_stl_binary(stream)["vertices"]
-        except HeaderError:
-            corners = _corners(path.read_bytes().lower())
-    return meshio.Mesh(corners, [("triangle", np.arange(len(corners)).reshape(-1, 3))])
-
-
-def _corners(text: bytes) -> Floats:
-    """(3 M, 3) array: the corners of M facets in the text of an STL file."""
-    rows = _VERTEX.findall(_NAME.sub(b"", text))
-    ended = not rows or b"endsolid" in text[text.rfind(b"endfacet") :]
-    if not ended or 3 * text.count(b"endfacet") != len(rows):
-        raise ValueError("the text ends inside a solid")
-    with warnings.catch_warnings():
-        warnings.filterwarnings("error", "string or file could not be read", DeprecationWarning)
-        numbers = np.fromstring(b" ".join(rows).decode("ascii"), sep=" ")
-    return numbers.reshape(len(rows), 3)
-
-
-def _read_ply(path: Path) -> Any:
-    """Read PLY; without the end of its header, meshio would search for it for ever."""
-    import meshio
-
-    if b"end_header" not in path.read_bytes():
-        raise meshio.ReadError("the header has no end")
-    return meshio.ply.read(path)
-
-
-def _triangles(kind: str, cells: ArrayLike, points: Floats, path: Path) -> Integers:
-    if kind in {"vertex", "line"}:
-        return np.empty((0, 3), dtype=np.int64)
-    nodes = np.asarray(cells, dtype=np.int64)
-    if kind == "triangle":
+def _triangles(nodes: Integers, points: Floats) -> Integers:
+    """(K, 3): polygons as triangles, quadrilaterals along the shorter diagonal."""
+    corners = nodes.shape[1]
+    if corners == 3:
         return nodes
-    if kind == "quad":
+    if corners == 4:
         return _split(nodes, points)
-    raise InputError(
-        "the mesh contains cells that are neither triangles nor quadrilaterals",
-        file=path,
-        value=f"{len(nodes)} of type {kind}",
-        limit="triangles or quadrilaterals",
-        remedy="export the surface as triangles",
-    )
+    import pyvista
+
+    polygons = pyvista.PolyData.from_regular_faces(points, nodes.tolist())
+    return np.asarray(polygons.triangulate().regular_faces, dtype=np.int64)
 
 
 def _split(quads: Integers, points: Floats) -> Integers:

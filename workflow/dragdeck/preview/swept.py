@@ -51,7 +51,9 @@ def swept_volume(mesh: "Trimesh", poses: Floats, share: float = 1.0) -> "Trimesh
     low, high = corners.min(axis=0), corners.max(axis=0)
     thickness = 2 * mesh.volume / mesh.area
     needed = np.prod(high - low), len(poses) * np.prod(mesh.extents)
-    cell = max(thickness / _CELLS_ACROSS, np.cbrt(np.divide(needed, share * np.array(_MOST_CELLS))).max())
+    cell = max(
+        thickness / _CELLS_ACROSS, np.cbrt(np.divide(needed, share * np.array(_MOST_CELLS))).max()
+    )
     body = _distances(mesh, cell)
     shape = np.ceil((high - low) / cell).astype(int) + 2 * _MARGIN + 1
     origin, least = low - _MARGIN * cell, np.full(shape, _MARGIN * cell)
