@@ -17,8 +17,11 @@ from dragdeck.cli import PROGRAM as DRAGDECK
 from dragdeck.cli import main
 from dragdeck.command_line import Program
 from dragdeck.project import Project
+from dragdeck.scenes.drop_test import DROP_TEST
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import PROCESS
+from dragdeck.scenes.scene import SceneType
+from dragdeck.sweep.cases import load_cases
 
 
 @pytest.fixture(autouse=True)
@@ -52,6 +55,24 @@ def test_bad_input_writes_nothing(
     write_study(small)
     assert main(["step", "render", "small", "drop_test", "any"]) == 1
     assert not (project.root / "results").exists()
+
+
+@pytest.mark.parametrize("scene", [DROP_TEST, FILLING])
+def test_nothing_is_run_before_a_process_that_cannot_be(
+    scene: SceneType,
+    project: Project,
+    small: dict[str, Any],
+    write_study: Callable[..., Path],
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """The other cases of a sweep run, and what they share with one that cannot be."""
+    deep = {"motion.immersion_depth_m": [0.06, 0.07]}
+    for sweep, status in ((deep, 1), ({"motion.immersion_depth_m": [0.02, 0.07]}, 0)):
+        cases = load_cases(write_study({**small, "sweep": sweep}))
+        run = scene.run_id(cases[1])
+        assert main(["step", "render", "small", scene.name, run]) == status
+        assert project.run_folder(cases[1], scene).exists() == (status == 0)
+    assert capsys.readouterr().err.count("immersion_depth_m") == 2
 
 
 def test_a_process_is_never_rendered_on_a_guess(

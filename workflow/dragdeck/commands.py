@@ -3,7 +3,7 @@
 import os
 import shutil
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -459,6 +459,8 @@ def render(
             remedy="list them with: ./run dragdeck cases",
         )
     case = runs[run]
+    if not kind.needs_bed:
+        _check_processes(case for case in every if kind.run_id(case) == run)
     templates = environment(project.templates, study_templates(case))
     built = _built(kind, case, _bed(kind, packing))
     _check_overrides(built, every, templates)
@@ -472,6 +474,20 @@ def render(
         write_workpiece(built, folder, case.number, whole, templates)
         return
     write_run(built, folder, templates)
+
+
+def _check_processes(cases: Iterable[Case]) -> None:
+    """Refuse a run before the process of cases of which none could run its process."""
+    errors = []
+    for case in cases:
+        try:
+            _built(SCENES["process"], case, None)
+        except InputError as error:
+            errors.append(error)
+        else:
+            return
+    if errors:
+        raise together(errors)
 
 
 def _check_overrides(
