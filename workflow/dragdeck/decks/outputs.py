@@ -7,7 +7,7 @@ definitions, so that no reader has to guess a column.
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 from markupsafe import Markup
 from pydantic import Field, PositiveInt, field_validator, model_validator
@@ -42,6 +42,7 @@ class OutputOfRun(Part):
         Whether it is a binary dump.
     """
 
+    foreign: ClassVar[bool] = False
     name: str = Field(default="", exclude=True)
     kind: Kind
     binary: bool

@@ -1,9 +1,11 @@
 """A place in a dump: bytes and lines from there on, and what is wrong there."""
 
+import gzip
 import io
+import zlib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import NoReturn, Self
+from typing import NoReturn, Self, cast
 
 import numpy as np
 
@@ -23,6 +25,7 @@ class Cursor:
     Parameters
     ----------
     file : Path
+        An ending ``.gz`` marks a compressed one.
     layout : Layout
         What it holds.
     offset : int
@@ -32,14 +35,23 @@ class Cursor:
     ----------
     size : int
         Length of the content in bytes.
+    width : int
+        Numbers in a row.
     frame, offset : int
         Number of the frame (of the data row in a ``fix print`` file), and where it begins.
     """
 
     def __init__(self, file: Path, layout: Layout, offset: int = 0) -> None:
         self.file, self.layout, self.frame, self.offset = file, layout, 0, offset
-        self.size = file.stat().st_size
-        self._stream = io.BufferedReader(file.open("rb", buffering=0), BUFFER_BYTES)
+        self.width = len(layout.columns)
+        opened = gzip.GzipFile if file.suffix == ".gz" else io.FileIO
+        self._stream = io.BufferedReader(cast(io.RawIOBase, opened(file)), BUFFER_BYTES)
+        try:
+            self.size = self._stream.seek(0, io.SEEK_END)
+        except (OSError, EOFError, zlib.error) as error:
+            raise DumpError(
+                file, f"this is not a whole gzip file: {error}", remedy="compress it again"
+            ) from error
         self._stream.seek(offset)
 
     def __enter__(self) -> Self:
@@ -47,11 +59,6 @@ class Cursor:
 
     def __exit__(self, *_: object) -> None:
         self._stream.close()
-
-    @property
-    def width(self) -> int:
-        """Numbers in a row."""
-        return len(self.layout.columns)
 
     @property
     def place(self) -> int:
@@ -115,9 +122,12 @@ class Cursor:
             self.fail(f"found bytes that are not text: {data[:40]!r}", what)
         return data.decode().rstrip()
 
-    def item(self, what: str) -> str:
-        """The next line, which must begin so."""
+    def item(self, what: str, *before: str) -> str:
+        """The next line, which must begin so; other items before it, of a line, are passed over."""
         line = self.line(f"ITEM: {what}")
+        while line in [f"ITEM: {name}" for name in before]:
+            self.line("a line")
+            line = self.line(f"ITEM: {what}")
         if not line.startswith(f"ITEM: {what}"):
             self.fail(f"found {line[:60]!r}", f"a line that begins with 'ITEM: {what}'")
         return line
@@ -138,8 +148,7 @@ class Cursor:
             offset=self.offset,
             expected=expected,
             kept=self._kept,
-            remedy="check that the file is complete and belongs to this run; otherwise "
-            "repeat the run",
+            remedy="check that the file is complete; otherwise write it again: repeat the run",
         )
 
     def cut_short(self, expected: str) -> NoReturn:

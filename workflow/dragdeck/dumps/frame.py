@@ -22,6 +22,10 @@ class Layout(Protocol):
         """Whether it is a binary dump."""
 
     @property
+    def foreign(self) -> bool:
+        """Whether a user's script wrote it: its dumps may have words, nan, and a column twice."""
+
+    @property
     def columns(self) -> Sequence[str]:
         """Name of each column."""
 

@@ -7,16 +7,25 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import takewhile
 from pathlib import Path
+from warnings import warn
 
 import numpy as np
 
 from dragdeck.dumps.content import Cursor
-from dragdeck.dumps.frame import Layout
-from dragdeck.dumps.numbers import Cells, WrongRow, cells_of_text, first_rows
+from dragdeck.dumps.frame import Columns, Layout
+from dragdeck.dumps.numbers import (
+    Cells,
+    WrongRow,
+    cells_of_text,
+    columns_of_numbers,
+    columns_of_words,
+    first_rows,
+    named_columns,
+)
 from dragdeck.errors import DumpError
 
-_HEAD = struct.Struct("<qqi6i")
-"""Of a binary frame: step, number of rows, whether the box is triclinic, its boundaries."""
+_STEP, _HEAD = struct.Struct("<q"), struct.Struct("<qi6i")
+"""Of a binary frame: step; number of rows, whether the box is triclinic, its boundaries."""
 
 _BOX_BYTES, _TILT_BYTES = 48, 24
 _TAIL = struct.Struct("<ii")
@@ -25,6 +34,9 @@ _TAIL = struct.Struct("<ii")
 _COUNT = struct.Struct("<i")
 _MAX_RANKS = 1_000_000
 """A binary frame that claims to come from more ranks is none."""
+
+_LONGEST_MAGIC, _LARGEST_POSITIVE = 64, 0x7F
+"""Length of a name at the begin of a frame; last byte of a number that is not negative."""
 
 _LARGEST_STEP = 2.0**53
 _ROW_BEGINS = [bytes([byte]) for byte in b"0123456789+-. "]
@@ -45,13 +57,13 @@ def frame_steps(at: Cursor) -> Iterator[int]:
         yield step
 
 
-def frame_cells(at: Cursor) -> tuple[int, Cells]:
-    """Step and numbers of the frame that begins at a place, its columns in the layout's order.
+def frame_columns(at: Cursor) -> tuple[int, Columns]:
+    """Step and columns of the frame that begins at a place.
 
     Raises
     ------
     WrongRow
-        At the first row of a text that is not so many numbers.
+        At the first row of a text that is not so many numbers, or not finite ones.
     DumpError
         The frame is not whole, or not one of this output.
     """
@@ -59,19 +71,60 @@ def frame_cells(at: Cursor) -> tuple[int, Cells]:
         step, rows, ranks = _binary_head(at)
         counts = _counts(at, rows, ranks)
         data = b"".join(at.take(8 * count, f"{count} numbers of a rank") for count in counts)
-        return step, np.frombuffer(data, "<f8").reshape(-1, at.width).T.astype(np.float64, "C")
-    step, rows, order = _text_head(at)
-    return step, cells_of_text(b"".join(_row_lines(at, rows)), at.width)[order]
+        cells = np.frombuffer(data, "<f8").reshape(-1, at.width).T.astype(np.float64, "C")
+        return step, _named(at, cells)
+    step, rows, names = _text_head(at)
+    text = b"".join(_row_lines(at, rows))
+    try:
+        cells = cells_of_text(text, at.width)
+    except WrongRow:
+        if not at.layout.foreign:
+            raise
+        return step, columns_of_words(text, names)
+    return step, _named(at, cells[[names.index(name) for name in at.layout.header]])
 
 
-def _binary_head(at: Cursor) -> tuple[int, int, int]:
-    """Step, number of rows and number of ranks of a binary frame."""
-    step, rows, triclinic, *_ = _HEAD.unpack(at.take(_HEAD.size, "a binary frame's header"))
+def _named(at: Cursor, cells: Cells) -> Columns:
+    named = columns_of_numbers if at.layout.foreign else named_columns
+    return named(cells, at.layout.columns)
+
+
+def binary_names(file: Path, layout: Layout) -> list[str]:
+    """Names of the columns of a binary dump; none where it does not have them.
+
+    LAMMPS of 2020 and later writes them in each frame, after a negative length and ``DUMPCUSTOM``.
+    """
+    names: list[str] = []
+    with Cursor(file, layout) as at:
+        if at.take(_STEP.size, "a binary frame's header")[-1] <= _LARGEST_POSITIVE:
+            return names
+    with Cursor(file, layout) as at:
+        _binary_head(at, names)
+    return names
+
+
+def _binary_head(at: Cursor, names: list[str] | None = None) -> tuple[int, int, int]:
+    """Step, number of rows and number of ranks of a binary frame; its names into a list."""
     foreign = f"the header of a binary dump with {at.width} columns"
+    (step,) = _STEP.unpack(at.take(_STEP.size, "a binary frame's header"))
+    revised = step < 0
+    if revised:
+        _magic(at, -step, foreign)
+        (step,) = _STEP.unpack(at.take(_STEP.size, "a binary frame's header"))
+    rows, triclinic, *_ = _HEAD.unpack(at.take(_HEAD.size, "a binary frame's header"))
     if step < 0 or rows < 0 or triclinic not in (0, 1):
         at.fail("this is not the header of a binary dump", foreign)
     at.take(_BOX_BYTES + triclinic * _TILT_BYTES, "the box of a binary frame")
-    width, ranks = _TAIL.unpack(at.take(_TAIL.size, "a binary frame's header"))
+    if revised:
+        width, read = _revised_tail(at)
+        if names is not None:
+            names += read
+            at.width = width
+        elif read != list(at.layout.header):
+            at.fail(f"the columns are {' '.join(read)}", " ".join(at.layout.header))
+        (ranks,) = _COUNT.unpack(at.take(_COUNT.size, "the number of ranks"))
+    else:
+        width, ranks = _TAIL.unpack(at.take(_TAIL.size, "a binary frame's header"))
     if width != at.width:
         at.fail(f"the rows have {width} columns", foreign)
     if not 1 <= ranks <= _MAX_RANKS:
@@ -79,6 +132,31 @@ def _binary_head(at: Cursor) -> tuple[int, int, int]:
     if rows * width * 8 > at.left:
         at.cut_short(f"{rows} rows of {width} numbers")
     return step, rows, ranks
+
+
+def _magic(at: Cursor, length: int, foreign: str) -> None:
+    """Pass over what LAMMPS writes before a frame that has names, or fail."""
+    if length > _LONGEST_MAGIC or not at.take(length, "a name").startswith(b"DUMP"):
+        at.fail("this is not the header of a binary dump", foreign)
+    order, revision = struct.unpack("<ii", at.take(8, "byte order and revision"))
+    if order != 1 or revision != 2:
+        at.fail(f"byte order {order:#x}, revision {revision}", "byte order 0x1 and revision 2")
+
+
+def _revised_tail(at: Cursor) -> tuple[int, list[str]]:
+    """Number of columns, and their names."""
+    (width,) = _COUNT.unpack(at.take(_COUNT.size, "the number of columns"))
+    _string(at)
+    if at.take(1, "whether a time follows") != b"\0":
+        at.take(8, "a time")
+    return width, _string(at).split()
+
+
+def _string(at: Cursor) -> str:
+    (length,) = _COUNT.unpack(at.take(_COUNT.size, "the length of a text"))
+    if not 0 <= length <= at.left:
+        at.cut_short(f"a text of {length} bytes")
+    return at.take(length, "a text").decode("ascii", "replace")
 
 
 def _counts(at: Cursor, rows: int, ranks: int) -> Iterator[int]:
@@ -94,9 +172,9 @@ def _counts(at: Cursor, rows: int, ranks: int) -> Iterator[int]:
         at.fail(f"the ranks wrote {written} rows", f"{rows} rows, as the header says")
 
 
-def _text_head(at: Cursor) -> tuple[int, int, list[int]]:
-    """Step and number of rows of a text frame, and where in a row its columns stand."""
-    at.item("TIMESTEP")
+def _text_head(at: Cursor) -> tuple[int, int, list[str]]:
+    """Step and number of rows of a text frame, and the names of its columns in their order."""
+    at.item("TIMESTEP", "UNITS", "TIME")
     step = at.whole_number("a step")
     at.item("NUMBER OF")
     rows = at.whole_number("a number of rows")
@@ -105,11 +183,12 @@ def _text_head(at: Cursor) -> tuple[int, int, list[int]]:
         at.line("the bounds of the box")
     names = at.item("ENTRIES" if at.layout.kind == "local" else "ATOMS").split()[2:]
     header = at.layout.header
-    if sorted(names) != sorted(header):
+    if set(names) != set(header) or (len(names) != len(header) and not at.layout.foreign):
         at.fail(
             f"the header names the columns {' '.join(names)}", f"{' '.join(header)} in any order"
         )
-    return step, rows, [names.index(name) for name in header]
+    at.width = len(names)
+    return step, rows, names
 
 
 def _row_lines(at: Cursor, rows: int) -> Iterator[bytes]:
@@ -122,6 +201,16 @@ def _row_lines(at: Cursor, rows: int) -> Iterator[bytes]:
             if row is not None:
                 shown = lines[row][:119] + b"\n"
                 at.fail(f"row {done + row}: found {shown!r}", f"{at.width} numbers")
+        if (
+            at.layout.foreign
+            and not at.left
+            and len(piece.rpartition(b"\n")[2].split()) == at.width
+        ):
+            warn(
+                f"{at.file}: the last row has no line end; its last number may have been cut",
+                stacklevel=2,
+            )
+            piece += b"\n"
         done, whole = done + piece.count(b"\n"), piece.endswith(b"\n")
         yield piece
     if done < rows or not whole:

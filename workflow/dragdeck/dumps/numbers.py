@@ -1,6 +1,7 @@
 """Numbers from rows of text, and columns from numbers."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,6 +74,39 @@ def _one_by_one(text: bytes, width: int) -> Cells:
             raise WrongRow(row, f"found {shown!r}", f"{width} numbers")
         rows.append(numbers)
     return np.ascontiguousarray(np.array(rows, dtype=np.float64).reshape(-1, width).T)
+
+
+def columns_of_words(text: bytes, names: Sequence[str]) -> Columns:
+    """Columns by name, as strings where one of their words is no number.
+
+    Raises
+    ------
+    WrongRow
+        At the first line that is not so many words.
+    """
+    rows = [line.split() for line in text.decode("utf-8", "replace").splitlines()]
+    for row, words in enumerate(rows):
+        if len(words) != len(names):
+            raise WrongRow(row, f"found {' '.join(words)[:120]!r}", f"{len(names)} words")
+    columns: dict[str, Any] = {}
+    for name, words in zip(names, map(list, zip(*rows, strict=True)), strict=True):
+        try:
+            columns[name] = _whole_if_it_is(np.array([float(word) for word in words]), name)
+        except ValueError:
+            columns[name] = np.array(words, dtype=object)
+    return columns
+
+
+def columns_of_numbers(cells: Cells, names: Sequence[str]) -> Columns:
+    """Columns by name as they are: ids as int64 where all are whole."""
+    return {name: _whole_if_it_is(cell, name) for name, cell in zip(names, cells, strict=True)}
+
+
+def _whole_if_it_is(column: Cells, name: str) -> Any:
+    if not is_integer_column(name) or not np.isfinite(column).all():
+        return column
+    whole = column.astype(np.int64)
+    return whole if (whole == column).all() else column
 
 
 def first_rows(text: bytes, count: int) -> bytes:

@@ -4,16 +4,19 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, ClassVar
 
 import numpy as np
 
 from dragdeck.dumps.content import Cursor
 from dragdeck.dumps.frame import Columns, Frame, Layout
-from dragdeck.dumps.grammar import frame_cells, print_rows
+from dragdeck.dumps.grammar import binary_names, frame_columns, print_rows
 from dragdeck.dumps.numbers import WrongRow, first_rows, named_columns
 from dragdeck.errors import DumpError
 
 _KINDS = {"ENTRIES": "local", "ATOMS": "custom"}
+_HEADER_LINES = 14
+"""Up to the names of the columns, with units and time before them."""
 
 
 def read_frames(files: Iterable[Path], layout: Layout) -> Iterator[Frame]:
@@ -39,15 +42,47 @@ def read_frames(files: Iterable[Path], layout: Layout) -> Iterator[Frame]:
         If a file is not such a dump, has other columns, or holds something
         that is not a finite number. The frames before have come by then.
     """
+    first: Columns = {}
     for file in files:
         with Cursor(file, layout) as at:
             for number in at.frames():
                 try:
-                    step, cells = frame_cells(at)
-                    columns = named_columns(cells, layout.columns)
+                    step, columns = frame_columns(at)
+                    first = first or {
+                        name: column for name, column in columns.items() if column.size
+                    }
+                    columns = {
+                        name: _like(first.get(name), column, name)
+                        for name, column in columns.items()
+                    }
                 except WrongRow as wrong:
                     at.fail(f"row {wrong.row}: {wrong.problem}", wrong.expected)
                 yield Frame(step, columns, number == 0)
+
+
+def _like(first: Any, column: Any, name: str) -> Any:
+    """A column with the type that it had in the first frame with rows.
+
+    Raises
+    ------
+    WrongRow
+        At the first row that does not fit.
+    """
+    if first is None or column.dtype == first.dtype or not column.size:
+        return column
+    if first.dtype.kind == "O":
+        return np.array([f"{value:.17g}" for value in column], dtype=object)
+    for row, value in enumerate(column.tolist()):
+        if not _fits(value, whole=first.dtype.kind == "i"):
+            raise WrongRow(row, f"{name} is {value}", "a number, or a whole one, as before")
+    return column.astype(first.dtype)
+
+
+def _fits(value: str | float, whole: bool) -> bool:
+    try:
+        return float(value).is_integer() or not whole
+    except ValueError:
+        return False
 
 
 def read_prints(file: Path, layout: Layout, *, block_rows: int = 20_000) -> Iterator[Columns]:
@@ -95,31 +130,37 @@ def read_prints(file: Path, layout: Layout, *, block_rows: int = 20_000) -> Iter
 
 
 def read_dump(source: Path | str, columns: Sequence[str] | None = None) -> Iterator[Frame]:
-    """Read the frames of a ``dump custom`` or ``dump local``, text or binary.
+    """Read the frames of a ``dump custom`` or ``dump local`` of LIGGGHTS or LAMMPS.
 
     Parameters
     ----------
     source : Path or str
         The file; or, for a dump with one file per frame, its pattern with ``*`` for the step.
-        The ending ``.bin`` marks a binary dump.
+        The ending ``.bin`` marks a binary dump, ``.gz`` a compressed one.
     columns : sequence of str, optional
-        Names of the columns: required for a binary dump, in the order of its dump command; a text
-        dump must contain all of them, in any order. By default those in its header.
+        Names of the columns: required for a binary dump without them, in the order of its dump
+        command; a text dump must contain all of them, in any order. By default those in its header.
 
     Yields
     ------
     Frame
         In the order of the file, or of the steps in the names of the files. Columns
-        named ``id``, ``type`` or ``..._id`` are int64, all others float64. At most one frame is in
-        memory.
+        named ``id``, ``type`` or ``..._id`` are int64 if all are whole, those with words are
+        strings, all others float64. A column that a dump has twice comes once. At most one frame
+        is in memory.
+
+    Warns
+    -----
+    UserWarning
+        The last row has no line end: its last number may have been cut.
 
     Raises
     ------
     TruncatedDumpError
         If a file ends inside a frame.
     DumpError
-        If there is no such file, it is not such a dump, or a number is not finite. Both errors
-        name file, frame and byte; the frames before it have been yielded by then.
+        If there is no such file, or it is not such a dump. Both errors name file, frame and byte;
+        the frames before it have been yielded by then.
     """
     files = dump_files(source)
     yield from read_frames(files, layout_of(files[0], columns))
@@ -153,6 +194,7 @@ class DumpLayout:
     kind: str
     columns: tuple[str, ...]
     binary: bool = False
+    foreign: ClassVar[bool] = True
 
     @property
     def header(self) -> tuple[str, ...]:
@@ -168,9 +210,9 @@ def layout_of(file: Path, columns: Sequence[str] | None) -> DumpLayout:
     DumpError
         If it is no dump, or columns of a binary one are not given, or one comes twice.
     """
-    binary = file.suffix == ".bin"
-    kind, names = ("custom", []) if binary else _header(file)
-    wanted = tuple(columns or names)
+    binary = ".bin" in file.suffixes[-2:]
+    kind, names = ("custom", _names(file)) if binary else _header(file)
+    wanted = tuple(columns or dict.fromkeys(names))
     if not wanted:
         raise DumpError(
             file,
@@ -182,20 +224,26 @@ def layout_of(file: Path, columns: Sequence[str] | None) -> DumpLayout:
     return DumpLayout(kind, wanted, binary)
 
 
+def _names(file: Path) -> list[str]:
+    """Names of the columns of a binary dump; none where it does not have them."""
+    return binary_names(file, DumpLayout("custom", (), binary=True))
+
+
 def _header(file: Path) -> tuple[str, list[str]]:
     """Kind of a text dump, and the names of its columns."""
     expected = "the header of a text dump of LIGGGHTS"
     with Cursor(file, DumpLayout("custom", ())) as at:
-        lines = b"".join(at.lines(9)).split(b"\n")
-    words = [word.decode("ascii", "replace") for word in lines[8].split()] if lines[9:] else []
-    if len(words) < 3 or words[0] != "ITEM:" or words[1] not in _KINDS:
+        lines = b"".join(at.lines(_HEADER_LINES)).split(b"\n")
+    named = [line for line in lines if line.startswith((b"ITEM: ATOMS", b"ITEM: ENTRIES"))]
+    words = [word.decode("ascii", "replace") for word in named[0].split()] if named else []
+    if len(words) < 3:
         raise DumpError(
             file,
             f"found {lines[0][:60]!r}, but no names of columns",
             frame=0,
             offset=0,
             expected=expected,
-            remedy="give a file of dump custom or dump local, not compressed; the name of a binary "
-            "file must end with .bin",
+            remedy="give a file of dump custom or dump local; the name of a binary file must end "
+            "with .bin, that of a compressed one with .gz",
         )
     return _KINDS[words[1]], words[2:]
