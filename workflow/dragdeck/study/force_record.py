@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -13,7 +13,7 @@ from scipy.stats import theilslopes
 
 from dragdeck.errors import InputError, RecordError
 from dragdeck.study.reference import Signal, Span
-from dragdeck.study.table import Floats, Table, read_table
+from dragdeck.study.table import Floats, Table, column_name, read_table
 
 TIME_COLUMNS = {"time_s": 1.0, "time_ms": 1e-3, "time_us": 1e-6}
 FORCE_COLUMNS = {"force_n": 1.0, "force_mn": 1e-3, "force_kn": 1e3}
@@ -79,8 +79,10 @@ def read_samples(
     `column` names the force where it is not one of `FORCE_COLUMNS`; `rate_hz` stands in for times.
     """
     table = read_table(file)
-    table = replace(table, names=tuple(name.lower() for name in table.names))
-    forces = FORCE_COLUMNS if column is None else {column.lower(): _unit(column)}
+    forces = FORCE_COLUMNS
+    if column is not None:
+        column = column_name(column)
+        forces = {column: _unit(column)}
     name = _column(table, forces)
     if rate_hz is None or {*table.names} & {*TIME_COLUMNS}:
         time_name = _column(table, TIME_COLUMNS)
@@ -98,7 +100,7 @@ def read_samples(
 def _unit(column: str) -> float:
     """The unit of a force column in N, by the end of its name."""
     for name, unit in FORCE_COLUMNS.items():
-        if column.lower().endswith(name.removeprefix("force")):
+        if column.endswith(name.removeprefix("force")):
             return unit
     problem, limit = "the force column has no unit", "a name that ends in _n, _mn or _kn"
     raise RecordError("columns", problem, value=column, limit=limit, remedy="rename the column")

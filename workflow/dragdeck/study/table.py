@@ -1,13 +1,15 @@
 """Tables of users: CSV files of numbers. Nothing in them is cut, shifted or guessed.
 
-Every table that a study names is read here: measured forces, waypoints, sieve analyses.
+Every table that a study names is read here: measured forces, waypoints, sieve analyses. Measuring
+programs write a head before the names of the columns, and units below them or in brackets.
 """
 
 import csv
 import re
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
-from itertools import islice
+from itertools import islice, zip_longest
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +27,22 @@ _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
 _GROUPED = re.compile(r"[-+]?[1-9]\d{0,2}(,\d{3})+", re.ASCII)
 """What may be thousands as well as a decimal comma."""
 
+_UNITS = {
+    "s": "s", "ms": "ms", "us": "us", "\u00b5s": "us", "\u03bcs": "us", "N": "n", "mN": "mn",
+    "kN": "kn", "m": "m", "mm": "mm", "kg": "kg", "g": "g", "deg": "deg", "\u00b0": "deg",
+}  # fmt: skip
+"""Units as programs write them, and as names of columns end with them."""
+
+_BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]")
+_LABVIEW_TIME = "x_value"
+_TIMES = ("time", "t", "zeit", "temps", _LABVIEW_TIME)
+"""Names of a column of times without its unit; LabVIEW's is in s."""
+
+_COMMENT = "comment"
+"""The last column of LabVIEW, which its rows do not have."""
+
+_MARKS_OF_UTF16 = (b"\xff\xfe", b"\xfe\xff")
+
 _COMMA = (
     "if these are decimal commas, export with a decimal point, or with a semicolon or tab between "
     "the columns"
@@ -41,7 +59,7 @@ class Table:
     separator : str
         What stands between columns: ``;``, a tab or ``,``, whichever the header has first.
     names : tuple of str
-        Columns, as the header names them.
+        Columns, in lower case and with the unit at the end: ``fx_n`` of ``Fx [N]``.
     header_line : int
     lines : sequence of int
         Line of each row in the file.
@@ -166,12 +184,17 @@ def read_table(file: Path, most: int | None = None) -> Table:
     InputError
         The file cannot be read as text of at most 64 MB, or is no CSV file.
     """
-    texts = _text(file).split("\n")
+    texts = re.split("\r\n|\r|\n", _text(file))
     used = [n for n, text in enumerate(texts) if text.strip() and text.lstrip()[0] != "#"]
+    if used and re.fullmatch("sep=.", texts[used[0]].strip(), re.IGNORECASE):  # of Excel
+        del used[0]
     if not used:
         raise InputError("the file is empty", file=file, limit="a header line, and rows of numbers")
-    header = texts[used[0]]
-    separator = next((mark for mark in (";", "\t") if mark in header), ",")
+    before, has_units = _head(texts, used)
+    del used[:before]
+    header = used[0] + 1
+    separator = _separator(texts[used[0]])
+    units = _cells(texts[used.pop(1)], separator) if has_units else []
     lines, rows = [], []
     reader = csv.reader((texts[n] for n in used), delimiter=separator, skipinitialspace=True)
     try:
@@ -182,7 +205,100 @@ def read_table(file: Path, most: int | None = None) -> Table:
     except csv.Error as error:
         line = used[reader.line_num - 1] + 1
         raise InputError(f"not a CSV file: {error}", file=file, line=line) from None
-    return Table(file, separator, tuple(n.strip() for n in names), used[0] + 1, lines, rows)
+    if before and names[-1].lower() == _COMMENT and {*map(len, rows)} == {len(names) - 1}:
+        names.pop()
+    try:
+        named = tuple(column_name(*column) for column in zip_longest(names, units, fillvalue=""))
+    except InputError as error:
+        error.file, error.line = file, header
+        raise
+    if separator == "," and (joined := _joined(rows, len(names))):
+        separator, rows = ";", joined
+    return Table(file, separator, named, header, lines, rows)
+
+
+def column_name(name: str, unit: str = "") -> str:
+    """Name of a column in lower case with its unit at the end.
+
+    The unit is in brackets, as in ``Fx [N]``, or in a row below the names.
+
+    Raises
+    ------
+    InputError
+        Units contradict each other.
+    """
+    bracketed = _BRACKETS.fullmatch(name.strip())
+    base, units = re.sub(r"\s+", "_", name.strip().lower()), {unit.strip("[]() ")}
+    if bracketed:
+        base = re.sub(r"\s+", "_", bracketed[1].lower())
+        units.add(bracketed[2])
+    if base == _LABVIEW_TIME and units == {""}:
+        units.add("s")
+    base = "time" if base in _TIMES else base
+    end = base.rpartition("_")[2]
+    if end in _UNITS.values():
+        units.add(end)
+    known = {_UNITS.get(text, text) for text in units if text}
+    if not known & {*_UNITS.values()}:
+        return name.strip().lower()
+    if len(known) > 1:
+        raise InputError(
+            "a column has two units", field=name, value=" and ".join(sorted(known)), limit="one"
+        )
+    return base if end in known else f"{base}_{known.pop()}"
+
+
+def _joined(rows: Sequence[Sequence[str]], count: int) -> list[list[str]]:
+    """Rows in which commas are decimal marks and separators; none where they are not surely so.
+
+    A second part that begins with 0, such as 060, is no number of its own.
+    """
+    if any(len(row) != 2 * count for row in rows):
+        return []
+    pairs = [[*zip(row[::2], row[1::2], strict=True)] for row in rows]
+    parts = [part for row in pairs for part in row]
+    fractions = [fraction for whole, fraction in parts if re.fullmatch(r"[-+]?\d+", whole.strip())]
+    surely = any(fraction[:1] == "0" and len(fraction) > 1 for fraction in fractions)
+    if not surely or len(fractions) < len(parts) or not all(map(str.isdecimal, fractions)):
+        return []
+    return [[f"{whole},{fraction}" for whole, fraction in row] for row in pairs]
+
+
+def _head(texts: Sequence[str], used: Sequence[int]) -> tuple[int, bool]:
+    """How many used lines are before that of the names, and whether units are below it.
+
+    Names stand before the first two rows of numbers. Where what stands there cannot be names, the
+    first line has them, and the others are rows, of which `Table.numbers` says what is wrong.
+    """
+    numeric = [_is_row(texts[n]) for n in used]
+    first = next((k for k in range(len(used)) if all(numeric[k : k + 2])), 0)
+    units = first > 1 and _is_units(texts[used[first - 1]])
+    names = first - 1 - units
+    if names > 0 and any(map(_is_number, _cells(texts[used[names]]))):
+        return 0, False
+    return max(names, 0), units
+
+
+def _separator(text: str) -> str:
+    return next((mark for mark in (";", "\t") if mark in text), ",")
+
+
+def _cells(text: str, separator: str = "") -> list[str]:
+    return [cell.strip() for cell in text.split(separator or _separator(text))]
+
+
+def _is_number(cell: str) -> bool:
+    return _NUMBER.fullmatch(cell.replace(",", ".", 1)) is not None
+
+
+def _is_row(text: str) -> bool:
+    cells = [cell for cell in _cells(text) if cell]
+    return bool(cells) and all(map(_is_number, cells))
+
+
+def _is_units(text: str) -> bool:
+    cells = [cell.strip("[]() ") for cell in _cells(text)]
+    return any(cells) and all(cell in _UNITS or cell in ("", "-") for cell in cells)
 
 
 def _text(file: Path) -> str:
@@ -190,10 +306,17 @@ def _text(file: Path) -> str:
         if (size := file.stat().st_size) > _MOST_BYTES:
             value, limit = f"{size / 1e6:.0f} MB", f"at most {_MOST_BYTES / 1e6:.0f} MB"
             raise InputError("the file is too large", file=file, value=value, limit=limit)
-        return file.read_text(encoding="utf-8-sig")
+        content = file.read_bytes()
+        if content[:2] in _MARKS_OF_UTF16:
+            return content.decode("utf-16")
+        if b"\0" not in content:
+            with suppress(UnicodeDecodeError):
+                return content.decode("utf-8-sig")
+            return content.decode("latin-1")
+        remedy = "export it as text in the encoding UTF-8"
+        raise InputError("not a CSV file: it has bytes of 0", file=file, remedy=remedy)
     except UnicodeDecodeError as error:
-        problem, remedy = f"not a CSV file: {error}", "export it as text in the encoding UTF-8"
-        raise InputError(problem, file=file, remedy=remedy) from None
+        raise InputError(f"not a CSV file: {error}", file=file) from None
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror}", file=file) from None
 
