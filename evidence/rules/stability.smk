@@ -14,7 +14,7 @@ rule map_stability:
         tables=multiext("results/stability/", "points.csv", "points.parquet"),
         conditions=multiext("results/stability/", "conditions.csv", "conditions.parquet"),
         measured="results/stability/stability.json",
-    threads: workflow.cores
+    threads: min(workflow.cores, or_stop(cores_here))
     resources:
         prints=1,
     params:

@@ -9,7 +9,7 @@ rule measure_costs:
         design="evidence/costs.yaml",
     output:
         WORK.of_tradeoff("costs.json"),
-    threads: workflow.cores
+    threads: min(workflow.cores, or_stop(cores_here))
     resources:
         prints=1,
     params:

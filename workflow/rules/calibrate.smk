@@ -19,7 +19,7 @@ rule fit_coefficients:
             "Calibration",
             run="calibration",
         ),
-    threads: workflow.cores
+    threads: min(workflow.cores, or_stop(cores_here))
     resources:
         prints=1,
     params:

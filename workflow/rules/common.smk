@@ -80,7 +80,7 @@ CASES = WORK.cases
 HOME = home_of(STUDY, idle=not locking_call())
 
 MESSAGES = [text for case in CASES for text in map(str, warnings(case.study))]
-for WARNING in dict.fromkeys([*MESSAGES, *WORK.other_engines()]):
+for WARNING in dict.fromkeys([*MESSAGES, *or_stop(list, WORK.other_engines())]):
     logger.warning(f"warning: {STUDY}: {WARNING}")
 
 

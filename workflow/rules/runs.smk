@@ -183,6 +183,7 @@ checkpoint judge_windows:
         of_run("process", "windows/round-{round}.json"),
     wildcard_constraints:
         round="[1-9][0-9]*",
+    localrule: True
     params:
         asked=WORK.windows_options,
         windows=WORK.windows_of_round,
@@ -199,6 +200,7 @@ rule extrapolate_process:
         windows=WORK.last_round,
     output:
         of_run("process", "tables/extrapolated.json"),
+    localrule: True
     params:
         windows=lambda wildcards, input: f"--round {input.windows}" if input.windows else "",
         source=source_hash("dragchain.windows.extrapolate"),
