@@ -19,6 +19,9 @@ import yaml
 from made_study import put
 from paths import ROOT
 from snakemake_calls import copy_of_project, snakemake
+from soft_study import study_with_windows
+
+from dragchain.quantities.document import Extrapolated
 
 pytestmark = pytest.mark.slurm
 
@@ -175,3 +178,14 @@ def test_a_run_that_its_time_limit_ends_goes_on(
     steps = pd.read_parquet(run / "tables/workpiece_force.parquet").step
     wanted = range(output["first_step"], output["last_step"] + 1, output["period_steps"])
     assert steps.tolist() == list(wanted)
+
+
+def test_a_study_with_a_tolerance_runs_to_its_report(cluster: Cluster, tmp_path: Path) -> None:
+    folder = copy_of_project(tmp_path, study_with_windows())
+    before = set(cluster.jobs().index)
+    succeed(folder, "all", *STUDY, *QUEUE)
+    (run,) = (folder / "results/small/process").iterdir()
+    assert "not give" in Extrapolated.read(run / "tables/extrapolated.json").said
+    assert (folder / "results/small/report/report.html").is_file()
+    jobs = cluster.jobs()
+    assert {jobs.JobState[job] for job in set(jobs.index) - before} == {"COMPLETED"}

@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-import yaml
-from paths import SMALL_STUDY
 from snakemake_calls import copy_of_project, jobs, succeed
+from soft_study import ASKED, COEFFICIENT_M2_N, study_with_windows
 
 from dragchain.quantities.document import Extrapolated, RunQuantities
 from dragchain.run.kinematics import axis_speed, drag_phase
@@ -18,24 +17,6 @@ from dragchain.windows.estimate import Round
 from dragdeck.records.case import load_case
 
 pytestmark = [pytest.mark.engine, pytest.mark.slow]
-
-ASKED = ["drag_mean", "workpiece_contacts", "force_slide"]
-WINDOWS = {"tolerance": 0.01, "quantities": ASKED, "most": 3}
-COEFFICIENT_M2_N = 1e-15
-
-
-def soft_study() -> dict[str, Any]:
-    """The small study with physical moduli as low as cheap windows need, and a longer path."""
-    data: dict[str, Any] = yaml.safe_load(SMALL_STUDY.read_text())
-    for material in data["materials"].values():
-        material["youngs_modulus_pa"] = float(material["youngs_modulus_pa"]) / 100
-    data["motion"] |= {"speed_m_s": 0.05, "transient_m": 0.012}
-    data["motion"]["path"]["revolutions"] = 1
-    data["motion"]["spin"] = {"rpm": 30}
-    data["removal"] = {"coefficient_m2_n": COEFFICIENT_M2_N}
-    data["outputs"] = {"first_touch_fraction": 0.05}
-    return data
-
 
 CLASSES = {
     "coarse": {"material": "ceramic", "fraction": 0.7, "radius_mean_m": 3.3e-3},
@@ -56,12 +37,9 @@ MEDIA: dict[str, dict[str, Any]] = {
 )
 def finished(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A project in which the study was run with windows."""
-    data, media = soft_study(), MEDIA[request.param]
+    data, media = study_with_windows(), MEDIA[request.param]
     data |= {"media": media.get("media", data["media"])}
     data["pairs"] |= media.get("pairs", {})
-    data["fidelity"] = {
-        "youngs_modulus_scale": 0.1, "timestep_fraction": 0.5, "ranks": 1, "windows": WINDOWS,
-    }  # fmt: skip
     folder = copy_of_project(tmp_path_factory.mktemp("windows"), data)
     succeed(folder, "all", "--config", "study=small")
     return folder / "results/small"
