@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 import yaml
 from paths import ROOT
+from snakemake.cli import parse_config
 from snakemake_interface_common.exceptions import WorkflowError
 
 from dragdeck.project import Project
@@ -29,9 +30,16 @@ def test_settings_are_text_and_checked() -> None:
     for config, words in (
         ({"studdy": "a"}, "did you mean 'study'"),
         ({"study": "a b"}, "study=a b: not a name"),
+        ({"study": 202405}, "study=202405: not text"),
     ):
         with pytest.raises(WorkflowError, match=words):
             checked_settings(config, SCHEMA)
+
+
+@pytest.mark.parametrize("name", ["2024_05", "007", "1e3", "true"])
+def test_a_name_is_what_was_typed(name: str) -> None:
+    typed = ["plan=paper", f"study={name}"]
+    assert checked_settings(parse_config(typed), SCHEMA, typed) == {"study": name, "plan": "paper"}
 
 
 def test_what_cannot_be_used_stops_the_workflow() -> None:

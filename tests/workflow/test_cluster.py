@@ -76,6 +76,11 @@ def test_every_rule_that_starts_the_engine_has_time_and_memory() -> None:
     assert all(resources[rule]["runtime"] > 60 for rule in BATCHES)
 
 
+def test_a_study_may_be_named_like_a_number(tmp_path: Path) -> None:
+    folder = copy_of_project(tmp_path, with_windows(), "2024_05")
+    assert "2024_05" in succeed(folder, "all", "-n", "--config", "study=2024_05").stdout
+
+
 def test_a_path_too_short_for_windows_is_an_error_of_the_study(tmp_path: Path) -> None:
     data = with_windows()
     data["motion"]["path"]["revolutions"] = 0.1

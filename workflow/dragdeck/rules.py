@@ -92,25 +92,33 @@ def _stop(error: DragdeckError) -> NoReturn:
     raise WorkflowError(str(error)) from None
 
 
-def checked_settings(config: Mapping[str, object], known: Mapping[str, Json]) -> dict[str, str]:
+def checked_settings(
+    config: Mapping[str, object], known: Mapping[str, Json], typed: Iterable[str] = ()
+) -> dict[str, str]:
     """The keys of config/config.yaml and of --config as text; `known` has the schema of each.
+
+    Snakemake and YAML read a name such as 2024_05 as a number. `typed` has what stands behind
+    --config as it was typed, ``key=value`` each.
 
     Raises
     ------
     WorkflowError
-        A key is unknown, or a value does not fit.
+        A key is unknown, or a value does not fit or is no text.
     """
-    texts = {key: "" if value is None else str(value) for key, value in config.items()}
-    for key, text in texts.items():
+    given = {key: "" if value is None else value for key, value in config.items()}
+    given |= dict(word.split("=", 1) for word in typed if "=" in word)
+    for key, text in given.items():
         rule = known.get(key)
         if rule is None:
             problem, limit = "unknown key", choices(key, known)
+        elif not isinstance(text, str):
+            problem, limit = "not text", "text: in quotes in config/config.yaml"
         elif not Draft202012Validator(rule).is_valid(text):
             problem, limit = str(rule["title"]), str(rule["description"])
         else:
             continue
         raise WorkflowError(f"--config {key}={text}: {problem}\n  limit:  {limit}")
-    return texts
+    return {key: str(text) for key, text in given.items()}
 
 
 def of_run(place: str, file: str) -> str:

@@ -57,7 +57,8 @@ if workflow.is_main_process and workflow.local_exec and workflow.resource_settin
     os.environ[CORES_VARIABLE] = str(given)
 
 SCHEMA = yaml.safe_load(Path(workflow.source_path("../schemas/config.schema.yaml")).read_text())
-config.update(checked_settings(config, SCHEMA["properties"]))
+TYPED = workflow.config_settings.config_args or []
+config.update(checked_settings(config, SCHEMA["properties"], TYPED))
 STUDY, FIDELITY, PLAN, COLOURS = (
     config.get(key, "") for key in ("study", "fidelity", "plan", "colours")
 )
