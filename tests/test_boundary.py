@@ -116,6 +116,21 @@ Program("package", "about", [Command(*about)])()
 """
 
 
+def test_settings_of_the_user_do_not_reach_figures(tmp_path: Path) -> None:
+    settings = tmp_path / "settings"
+    settings.mkdir()
+    (settings / "matplotlibrc").write_text("lines.linewidth: 7\n")
+    code = PROGRAM.replace('return "done"', "import matplotlib.pyplot as plt; return plt.rcParams")
+    code = code.replace("plt.rcParams", 'f"{plt.rcParams[how]}, {plt.get_backend()}"')
+    ended = subprocess.run(
+        [sys.executable, "-c", code, "command", "lines.linewidth"],
+        capture_output=True, text=True,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path),
+             "MPLBACKEND": "module://of_a_notebook", "MATPLOTLIBRC": str(settings)},
+    )  # fmt: skip
+    assert ended.stdout == "1.5, agg\nclosed\n", ended.stderr
+
+
 @pytest.mark.parametrize(
     ("arguments", "status", "printed"),
     [

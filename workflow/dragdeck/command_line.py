@@ -21,6 +21,10 @@ from dragdeck.errors import DragdeckError
 from dragdeck.files import FULL_DISK
 
 
+_OF_FIGURES = {"MPLBACKEND": "agg", "MATPLOTLIBRC": os.devnull}
+"""Figures have the defaults of matplotlib, not a user's: a notebook's backend draws no file."""
+
+
 class Argument:
     """An argument as argparse takes it; its name is that of the function's parameter."""
 
@@ -80,6 +84,7 @@ class Program:
         Arrow's threads abort a process there now and then, or keep it from ending, although all
         its results are whole (github.com/apache/arrow, issues 34314 and 50482).
         """
+        os.environ.update(_OF_FIGURES)
         status: object = 1
 
         def end() -> None:
