@@ -176,6 +176,20 @@ def test_studies_are_run_one_by_one_and_then_compared(clone: Clone) -> None:
     assert failed.returncode != 0 and len(failed.stdout.splitlines()) == 1
 
 
+@pytest.mark.parametrize("option", ["-n", "-np", "-pn", "--dry-run", "--dryrun"])
+@pytest.mark.parametrize("command", ["compare", "search"])
+def test_a_dry_run_ends_after_what_it_can_tell(clone: Clone, command: str, option: str) -> None:
+    (clone.root / "rounds").write_text("round")
+    write_program(clone.packages / "dragchain", STEPS)
+    clone.stamp.write_text(clone.stamp.read_text() + "search\n")
+    config = "studies=a,b" if command == "compare" else "study=a"
+    ended = clone.run(command, "--config", config, "--cores", "1", option)
+    assert ended.returncode == 0
+    called = [line for line in ended.stdout.splitlines() if line.startswith("snakemake")]
+    assert len(called) == (2 if command == "compare" else 1)
+    assert len(called) == len(ended.stdout.splitlines())
+
+
 STEPS = """\
 #!/bin/sh
 state=$(cat rounds)
@@ -192,6 +206,7 @@ printf '%s\\n' "${state%% *}"
         ("unfinished round complete", "", 2, 0),
         ("round round complete", "snakemake", 2, 0),  # a run that failed is a finding
         ("round unfinished", "snakemake", 1, 5),  # nothing can go on
+        ("unfinished unfinished", "", 1, 1),  # a round that changes nothing
     ],
 )
 def test_a_search_goes_on_round_by_round(
@@ -235,6 +250,8 @@ chmod +x ../bin/df"""
         ("", ["compare", "--config", "study=a"], {}, ["no studies to compare", "studies=A,B"]),
         ("", ["compare", "--config", "studies=a b;c"], {}, ["not names of studies", "a b;c"]),
         ("", ["search", "--config", "study=a", "fidelity=full"], {}, ["fidelity=full"]),
+        ("", ["search", "--config", "study=a", "--summary"], {}, ["runs nothing", "--summary"]),
+        ("", ["compare", "--config", "studies=a,b", "-t"], {}, ["runs nothing", "-t"]),
         ("", ["setup", "crates"], {}, ["crates", "cad, crate, docs"]),
     ],
 )

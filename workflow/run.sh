@@ -89,13 +89,35 @@ check_profile() {
     esac
 }
 
+# Letters behind one - may be several options: -np is -n and -p.
 is_dry_run() {
-    case " $* " in *" --dry-run "* | *" -n "*) return 0 ;; esac
+    for word in "$@"; do
+        case $word in
+            --dry-run | --dryrun) return 0 ;;
+            --* | -*[!A-Za-z]*) ;;
+            -*n*) return 0 ;;
+        esac
+    done
     return 1
+}
+
+# Refuse options with which Snakemake runs nothing, or not all: the next step would not come.
+refuse_partial() {
+    for word in "$@"; do
+        case $word in
+            --list* | --summary | --detailed-summary | -D | -S | -l | --dag | --d3dag | --rulegraph* | --filegraph* | --lint* | \
+                --unlock | --cleanup-* | --delete-* | --archive* | --report* | --touch | -t | --until* | -U | --omit-from* | -O | \
+                --batch* | --containerize | --conda-create-envs-only | --generate-unit-tests* | --print-compilation | --version | -v)
+                fail "this option runs nothing, or not all of it" "value:  $word" \
+                    "remedy: leave it out, or give it with a target of one study: ./run report"
+                ;;
+        esac
+    done
 }
 
 # Every study of a list, each to its report, and then their cases side by side.
 compare_studies() {
+    refuse_partial "$@"
     studies=
     for word in "$@"; do
         case $word in studies=*) studies=${word#studies=} ;; esac
@@ -123,6 +145,7 @@ compare_studies() {
 
 # Round by round: the next settings, and their runs. A run that failed is a finding.
 search_setting() {
+    refuse_partial "$@"
     study=
     for word in "$@"; do
         case $word in
@@ -133,12 +156,14 @@ search_setting() {
     done
     [ -n "$study" ] || study=$(sed -n -E "s/^study: *[\"']?([A-Za-z0-9._-]+).*/\1/p" config/config.yaml)
     shift
-    status=0
+    status=0 before=
     while :; do
         state=$(dragchain step search "$study") || return 1
         [ "$state" != complete ] || break
         [ "$state" != unfinished ] || [ "$status" -eq 0 ] || return "$status"
-        status=0
+        [ "$before$state" != unfinishedunfinished ] || fail "the runs of this round are not made" \
+            "remedy: see which jobs there are with: ./run searched --dry-run --config study=$study"
+        status=0 before=$state
         "$root/run" searched "$@" || status=$?
         if is_dry_run "$@"; then return "$status"; fi
     done
