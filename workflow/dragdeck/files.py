@@ -2,12 +2,13 @@
 
 import csv
 import errno
+import fcntl
 import hashlib
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 FULL_DISK = {errno.ENOSPC, errno.EDQUOT}
 """Numbers of the errors of a full disk, and of a user who may not write more."""
@@ -76,3 +77,25 @@ def write_vtp(file: Path, mesh: Any, *, compressed: bool = True) -> None:
     writer.WriteToOutputStringOn()
     writer.Write()
     write_text(file, writer.GetOutputString())
+
+
+_NO_LOCKS = {errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP}
+
+
+def lock(stream: IO[str], how: int) -> bool:
+    """Lock an open file as `fcntl.flock` does; whether its file system has locks.
+
+    Some mounts of Lustre and NFS have none.
+
+    Raises
+    ------
+    BlockingIOError
+        Another process holds it, and `how` does not wait.
+    """
+    try:
+        fcntl.flock(stream, how)
+    except OSError as error:
+        if error.errno not in _NO_LOCKS:
+            raise
+        return False
+    return True

@@ -12,6 +12,8 @@ from typing import TextIO
 
 import psutil
 
+from dragdeck.files import lock
+
 _FILE = "dragdeck.lock"
 
 _held: list[TextIO] = []
@@ -73,17 +75,18 @@ def hold_lock(folder: Path, report: Callable[[str], None], call: str = "") -> No
         return
     _held.append(stream)
     try:
-        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:  # another Snakemake is at work: its locks count
+        if not lock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB):  # then Snakemake's own count
+            return
+    except BlockingIOError:  # another Snakemake is at work: its locks count
         pass
     else:
         stream.truncate(0)
         stale = list((folder / "locks").glob("*.lock"))
-        for lock in stale:
-            lock.unlink()
+        for file in stale:
+            file.unlink()
         if stale:
             report("the locks of a Snakemake that was killed were deleted")
-    fcntl.flock(stream, fcntl.LOCK_SH)
+    lock(stream, fcntl.LOCK_SH)
     if call:
         stream.write(json.dumps(asdict(Holder.of_this_process(call))) + "\n")
         stream.flush()

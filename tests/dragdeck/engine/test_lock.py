@@ -1,13 +1,17 @@
 """One runner a folder, and engines that lost theirs."""
 
+import errno
 import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import NoReturn
 
 import psutil
+import pytest
 
-from dragdeck.engine.process import only_runner
+from dragdeck.engine.process import is_held, only_runner
+from dragdeck.snakemake_lock import hold_lock
 
 HOLD = """
 import sys
@@ -49,3 +53,21 @@ def test_an_engine_without_a_runner_is_ended(tmp_path: Path) -> None:
                 f"ended LIGGGHTS, which had outlived its dragdeck process: process {left.pid}"
             ]
         assert not psutil.pid_exists(left.pid)
+
+
+def no_locks(*_: object) -> NoReturn:
+    raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+
+def test_a_file_system_without_locks_is_told_and_used(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("fcntl.flock", no_locks)
+    lines: list[str] = []
+    with only_runner(tmp_path, lines.append):
+        assert not is_held(tmp_path)
+    assert len(lines) == 1 and "no locks" in lines[0]
+    (tmp_path / "locks").mkdir()
+    (tmp_path / "locks/0.input.lock").touch()
+    hold_lock(tmp_path, lines.append, "all")
+    assert (tmp_path / "locks/0.input.lock").exists() and len(lines) == 1

@@ -22,6 +22,7 @@ import psutil
 from dragdeck.decks import DECK_FILE
 from dragdeck.engine.reports import Report
 from dragdeck.errors import EngineError
+from dragdeck.files import lock
 
 ENGINE_VARIABLE = "DRAGDECK_ENGINE"
 """Environment variable with the path of an engine of one's own."""
@@ -289,12 +290,14 @@ def only_runner(folder: Path, report: Report) -> Iterator[None]:
     """
     with (folder / LOCK_FILE).open("a+", encoding="utf-8") as stream:
         try:
-            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
+            locked = lock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
             stream.seek(0)
             holder = stream.read().strip() or "an unknown process"
             report(f"waiting for another process that runs this folder: {holder}")
-            fcntl.flock(stream, fcntl.LOCK_EX)
+            locked = lock(stream, fcntl.LOCK_EX)
+        if not locked:
+            report("warning: this file system has no locks; let no other process run this folder")
         stream.truncate(0)
         stream.write(f"process {os.getpid()} on {socket.gethostname()}\n")
         stream.flush()
@@ -309,8 +312,8 @@ def is_held(folder: Path) -> bool:
     """Whether a living process runs a folder, here or on another machine that shares its disk."""
     with contextlib.suppress(FileNotFoundError), (folder / LOCK_FILE).open() as stream:
         try:
-            fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except OSError:
+            lock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
             return True
     return False
 
