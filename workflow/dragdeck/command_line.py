@@ -20,7 +20,6 @@ from dragdeck import __version__
 from dragdeck.errors import DragdeckError
 from dragdeck.files import FULL_DISK
 
-
 _OF_FIGURES = {"MPLBACKEND": "agg", "MATPLOTLIBRC": os.devnull}
 """Figures have the defaults of matplotlib, not a user's: a notebook's backend draws no file."""
 
