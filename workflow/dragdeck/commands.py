@@ -3,7 +3,7 @@
 import os
 import shutil
 import textwrap
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -68,6 +68,7 @@ from dragdeck.scenes.process import SCENES
 from dragdeck.scenes.scene import SceneType, StudyScene, read_bed
 from dragdeck.study.check import explained, warnings
 from dragdeck.study.contact_law import coefficients, modelled
+from dragdeck.study.recorded import recorded_file
 from dragdeck.study.yaml import located
 from dragdeck.sweep.cases import new_study
 
@@ -117,11 +118,27 @@ def _check(study: str, fidelity: str | None, verbose: bool) -> None:
     findings.show(verbose)
     if findings.errors:
         raise together(findings.errors)
+    for line in _records(every[0]):
+        print(f"  {line}")
     engine = find_engine()
     warned = f"{len(findings.warnings) or 'no'} warning{'' if len(findings.warnings) == 1 else 's'}"
     cost, *scenes = plan_in_words(runs, cores_here())
     print(*(f"  {line}" for line in scenes), sep="\n")
     print(f"{study}: no errors, {warned}; {len(every)} case(s), {cost}; LIGGGHTS {engine.version}")
+
+
+def _records(case: Case) -> Iterator[str]:
+    """How the measured forces that a study names are read."""
+    from dragdeck.study.force_record import in_words
+
+    study, file = case.study, case.file
+    signal = study.reference.signal if study.reference else None
+    if signal:
+        record = recorded_file(signal.file, file, "reference.signal.file")
+        yield f"reference.signal: {in_words(record, signal.column, signal.rate_hz)}"
+    if study.calibration and study.calibration.record:
+        record = recorded_file(study.calibration.record, file, "calibration.record")
+        yield f"calibration.record: {in_words(record)}"
 
 
 @dataclass

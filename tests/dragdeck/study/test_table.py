@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from dragdeck.errors import InputError
 from dragdeck.study import table
-from dragdeck.study.force_record import read_samples
+from dragdeck.study.force_record import in_words, read_samples
 from dragdeck.study.table import read_table
 
 TIME, FORCE = [0.0, 0.005, 0.01, 0.015], [-0.06, 0.42, -1234.5, 2.0]
@@ -76,6 +76,13 @@ def test_exports_of_programs_give_the_same_numbers(program: str, tmp_path: Path)
         else content
     )
     assert [*lines] == [*range(lines[0], len(text.splitlines()) + 1)]
+
+
+def test_the_reading_is_told_with_its_first_and_last_row(tmp_path: Path) -> None:
+    content, column = EXPORTS["names and units"]
+    assert in_words(written(tmp_path, content), column) == (
+        "table.csv read as fx_n: 4 rows at 200 Hz, 0 s, -0.06 N (line 5) to 0.015 s, 2 N (line 8)"
+    )
 
 
 @given(

@@ -97,6 +97,17 @@ def read_samples(
     return time, force * forces[name], table.lines
 
 
+def in_words(file: Path, column: str | None = None, rate_hz: float | None = None) -> str:
+    """How a record is read: its column, rate, and first and last row; see `read_samples`."""
+    time, force, lines = read_samples(file, column, rate_hz)
+    name = column_name(column) if column else "force"
+    rate = (len(time) - 1) / (time[-1] - time[0]) if len(time) > 1 else math.nan
+    ends = " to ".join(
+        f"{time[row]:.6g} s, {force[row]:.6g} N (line {lines[row]})" for row in (0, -1)
+    )
+    return f"{file.name} read as {name}: {len(time):,} rows at {rate:.5g} Hz, {ends}"
+
+
 def _unit(column: str) -> float:
     """The unit of a force column in N, by the end of its name."""
     for name, unit in FORCE_COLUMNS.items():
