@@ -41,6 +41,15 @@ def test_another_program_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         find_engine()
 
 
+def test_what_an_engine_said_that_cannot_start_is_shown(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = "echo 'error while loading shared libraries: libmpi.so.40' >&2; exit 127"
+    monkeypatch.setenv(ENGINE_VARIABLE, script(tmp_path / "broken", text))
+    with pytest.raises(EngineError, match=r"exit status 127; it said: .*libmpi\.so\.40"):
+        find_engine()
+
+
 def test_one_rank_needs_no_mpirun(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", "")
     engine = Engine("/opt/liggghts", "3.8.0")

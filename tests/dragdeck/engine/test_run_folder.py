@@ -17,7 +17,7 @@ from made_study import Made
 from run_files import rewrite
 
 from dragdeck.engine.checkpoints import checkpoint_files, checkpoint_step
-from dragdeck.engine.process import find_engine
+from dragdeck.engine.process import ENGINE_VARIABLE, find_engine
 from dragdeck.engine.reports import silent
 from dragdeck.engine.run_folder import fingerprint, run
 from dragdeck.engine.watch import EngineEnded, Watcher, cut_screen
@@ -251,6 +251,23 @@ def test_a_queue_that_signals_the_engine_too_stops_the_run(made: Made, project: 
     (folder / "restart_forced_liggghts_7.data").touch()  # the runner was killed before it looked
     assert run(folder, silent).parts[1].from_step > 0
     assert not (folder / "archive").exists()
+
+
+def test_what_a_launcher_said_that_refused_is_shown(
+    filling: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    engine = tmp_path / "refuses"
+    version = "echo 'LIGGGHTS (Version LIGGGHTS-PUBLIC 3.8.0, compiled'"
+    engine.write_text(f"""#!/bin/sh
+[ "$1" = -h ] && {version} && exit
+echo 'There are not enough slots available'
+exit 255
+""")
+    engine.chmod(0o755)
+    monkeypatch.setenv(ENGINE_VARIABLE, str(engine))
+    words = r"without a message \(exit status 255\); the last lines: There are not enough slots"
+    with pytest.raises(EngineError, match=words):
+        run(filling, silent)
 
 
 def test_the_engines_error_reaches_the_user_and_is_not_retried(filling: Path) -> None:

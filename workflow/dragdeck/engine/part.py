@@ -17,7 +17,7 @@ from dragdeck.engine.checkpoints import (
     take_forced_restarts,
 )
 from dragdeck.engine.completeness import cut_outputs, first_gap, part_files
-from dragdeck.engine.process import Ending, Engine, command, execute, keeps_last_words
+from dragdeck.engine.process import Ending, Engine, command, execute, keeps_last_words, last_words
 from dragdeck.engine.reports import Report
 from dragdeck.engine.space import SPARE_BYTES, check_space, free_bytes, space_left
 from dragdeck.engine.watch import EngineEnded, LimitMet, Watcher, cut_screen
@@ -33,6 +33,9 @@ from dragdeck.records.run import (
 )
 
 STATE_FILE = "state.json"
+_SIGNALS = 128, 193
+"""A shell and mpirun add 128 to the number of the signal that killed a program."""
+
 _UNWRITTEN = re.compile("Cannot open (?!mesh|data|clump|file variable)")
 """What LIGGGHTS says of a file that it cannot write; of some that it reads it says the same."""
 
@@ -197,13 +200,14 @@ class PartOfRun:
             return f"the disk is full, or a file cannot be written ({said}); {left}"
         if errors or log.never_settled(screen):
             return None
-        killed = ending.exit_status < 0 or ending.exit_status >= 128
+        killed = ending.exit_status < 0 or _SIGNALS[0] < ending.exit_status < _SIGNALS[1]
         how = "was killed" if killed else "ended prematurely without a message"
         if not killed and not keeps_last_words():
             how += ": stdbuf of GNU coreutils, which would have kept it, is missing"
         if ending.exit_status == 0:  # a signal between two runs of a script leaves no other trace
             how = "was stopped on request, or its script ends early"
-        return f"LIGGGHTS {how} (exit status {ending.exit_status})"
+        said = "" if killed else f"; the last lines: {last_words(screen) or 'none'}"
+        return f"LIGGGHTS {how} (exit status {ending.exit_status}){said}"
 
     def _refuse_new_gap(self, checks: list[AcceptanceCheck]) -> None:
         """A hole in what was written may come from a full disk: it is written again, but once."""

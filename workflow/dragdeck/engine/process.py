@@ -112,8 +112,10 @@ def _version(path: str) -> str:
     match = re.search(r"LIGGGHTS[^\n]*?(\d+)\.(\d+)\.(\d+)", shown.stdout)
     oldest = ".".join(map(str, OLDEST_VERSION))
     if match is None:
+        said = last_words(shown.stderr + shown.stdout) or "nothing"
         raise EngineError(
             f"{path} is not recognised as LIGGGHTS\n"
+            f"  value:  exit status {shown.returncode}; it said: {said}\n"
             f"  limit:  LIGGGHTS {oldest} or newer\n  remedy: correct {ENGINE_VARIABLE}"
         )
     version = tuple(int(part) for part in match.groups())
@@ -123,6 +125,12 @@ def _version(path: str) -> str:
             f"  limit:  {oldest} or newer\n  remedy: install a newer one"
         )
     return ".".join(match.groups())
+
+
+def last_words(text: str) -> str:
+    """The last lines of what a program printed, as one."""
+    lines = [line.strip() for line in text.splitlines() if line.strip()]
+    return " / ".join(lines[-3:])[-300:]
 
 
 def command(engine: Engine, deck: str, ranks: int, part: int, source: Path | None) -> list[str]:
