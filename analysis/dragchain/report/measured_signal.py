@@ -1,37 +1,31 @@
-"""A simulated force signal beside a measured one: quantities, their differences, and a figure.
+"""A simulated force signal beside a measured one: mean, spread and peaks, and a figure.
 
 Both signals are low-pass filtered to the same bandwidth and have the same rate. Each quantity has
-an interval that accounts for autocorrelation (`dragchain.statistics.correlated`). The interval of
-a difference follows from the two intervals (method of variance estimates recovery: Zou, Donner
-2008, Stat. Med. 27, 1693), on the logarithms where the difference is a ratio. All intervals
-together contain all true differences in 95 % of comparisons (Bonferroni).
+an interval that accounts for autocorrelation (`dragchain.statistics.correlated`); that of a
+difference joins both.
 """
 
 import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
-from scipy.signal import butter, sosfiltfilt, welch
-from scipy.special import chdtri, ndtri
+from scipy.signal import welch
 
 from dragchain.arrays import Floats
 from dragchain.drag import find_drag_peaks, peak_separation_s
-from dragchain.errors import SeriesError
 from dragchain.figures.panels import key, legend_below, new_figure, row, row_names
 from dragchain.figures.style import COLOURS, GREEN, GREY, RED, drawing, png
 from dragchain.report.cases import ReportedCase, ReportedRun
 from dragchain.report.findings import ProcessFindings
-from dragchain.report.values import mean_over_packings
 from dragchain.run.kinematics import needed, process_time
-from dragchain.statistics.correlated import MIN_SAMPLES, autocovariance, estimate_mean, estimates
-from dragchain.statistics.estimate import CONFIDENCE, Estimate, flattened, student_quantile
+from dragchain.statistics.correlated import MIN_SAMPLES, estimate_mean, estimates
+from dragchain.statistics.estimate import Estimate, flattened, t_interval
 from dragdeck.errors import DragdeckError
 from dragdeck.study.force_record import RATES_PER_BANDWIDTH as PER_HZ
 from dragdeck.study.force_record import MeasuredSignal, low_passed, measured_signal
@@ -43,42 +37,8 @@ from dragdeck.study.reference import Signal
 Equivalence = Literal["equivalent", "different", "undecided"]
 """What an interval says of a relative difference, see `Difference`."""
 
-
-class SignalQuantity(NamedTuple):
-    """What of a signal is compared: a difference is relative to the measured value if `ratio`.
-
-    Else it is relative to the mean of the measured signal, or its standard deviation if larger.
-    """
-
-    label: str
-    unit: str
-    ratio: bool = True
-
-
-_QUANTILES = (0.05, 0.5, 0.95)
-_BANDS = (0.0625, 0.125, 0.25, 0.5, 1.0)
-"""Edges of the octaves of the power spectrum, relative to the bandwidth."""
-
-SIGNAL_QUANTITIES = (
-    SignalQuantity("mean", "N", ratio=False),
-    SignalQuantity("standard deviation", "N"),
-    *(SignalQuantity(f"{100 * part:g} % quantile", "N", ratio=False) for part in _QUANTILES),
-    SignalQuantity("peak rate", "1/s"),
-    SignalQuantity("mean peak height", "N"),
-    SignalQuantity("correlation time", "s"),
-    *(SignalQuantity(f"amplitude, {a:g} to {b:g} of bandwidth", "N") for a, b in pairwise(_BANDS)),
-)
-
-JOINT = 1.0 - (1.0 - CONFIDENCE) / len(SIGNAL_QUANTITIES)
-"""Level of a single interval."""
-
-_POWER, _NORMAL = float(ndtri(0.95)), float(ndtri(0.5 + 0.5 * JOINT))
-_BLOCKS, _LONGEST_LAG = 12, 4
-"""Blocks of the jackknife of the correlation time, and lags that it reads, in that time."""
-
-_MOST_SAID = 100
-_BEYOND = 0.2
-"""Chance with which packings without scatter of their own are taken to have some."""
+QUANTITIES = {"mean": "N", "standard deviation": "N", "peak rate": "1/s", "mean peak height": "N"}
+"""What is compared, with its unit."""
 
 
 @dataclass(frozen=True)
@@ -87,49 +47,27 @@ class Difference:
 
     Attributes
     ----------
-    quantity : SignalQuantity
+    label, unit : str
     measured, simulated, relative : Estimate
-        Intervals of the level `JOINT`.
     margin : float
-    between : bool
-        Whether the interval includes scatter between packings beyond that within each.
     """
 
-    quantity: SignalQuantity
+    label: str
+    unit: str
     measured: Estimate
     simulated: Estimate
     relative: Estimate
     margin: float
-    between: bool
 
     @property
     def verdict(self) -> Equivalence:
         """The interval is within the margin; or excludes zero; or neither, or is not reliable."""
-        one = self.relative
-        if not (one.known and one.reliable):
+        relative = self.relative
+        if not (relative.known and relative.reliable):
             return "undecided"
-        if -self.margin <= one.ci95_low and one.ci95_high <= self.margin:
+        if -self.margin <= relative.ci95_low and relative.ci95_high <= self.margin:
             return "equivalent"
-        return "undecided" if one.contains(0.0) else "different"
-
-    @property
-    def needs(self) -> float | None:
-        """How many times the length decides in 95 % of cases on a difference of the margin.
-
-        A difference that large is then found, and one of zero is called equivalent.
-        """
-        one = self.relative
-        if self.verdict != "undecided" or not one.known:
-            return None
-        half = max(one.value - one.ci95_low, one.ci95_high - one.value)
-        return (half / self.margin * (1.0 + _POWER / _NORMAL)) ** 2
-
-    @property
-    def said(self) -> str:
-        """The verdict in words."""
-        more, times = "packings" if self.between else "length", self.needs or 0.0
-        size = f"{times:.2g}" if times < _MOST_SAID else f"more than {_MOST_SAID}"
-        return self.verdict + (f": needs {size} times the {more}" if times else "")
+        return "undecided" if relative.contains(0.0) else "different"
 
 
 def compared(
@@ -141,6 +79,9 @@ def compared(
     margin: float,
 ) -> list[Difference]:
     """Compare the signals of packings with a measured one.
+
+    Differences are relative to the measured value, that of the mean to the measured standard
+    deviation if this is larger.
 
     Parameters
     ----------
@@ -158,117 +99,55 @@ def compared(
     SeriesError
         If a signal is too short.
     """
-    theirs = _described(measured_n, low_pass_hz, separation_s)
-    described = [_described(force, low_pass_hz, separation_s) for force in simulated_n]
-    each = zip(*described, strict=True)
-    scale = max(abs(float(measured_n.mean())), float(measured_n.std()))
-    found = []
-    for quantity, one, packings in zip(SIGNAL_QUANTITIES, theirs, each, strict=True):
-        ours, between = _over_packings(packings)
-        relative = _difference(ours, one, None if quantity.ratio else scale)
-        found.append(Difference(quantity, one, ours, relative, margin, between))
-    return found
+    measured, *simulated = (
+        _described(force, PER_HZ * low_pass_hz, separation_s)
+        for force in (measured_n, *simulated_n)
+    )
+    differences = []
+    for (label, unit), theirs, *packings in zip(
+        QUANTITIES.items(), measured, *simulated, strict=True
+    ):
+        ours, size = _over_packings(packings), abs(theirs.value)
+        if label == "mean":
+            size = max(size, float(measured_n.std()))
+        half = math.hypot(ours.half_width, theirs.half_width)
+        difference = Estimate.around(ours.value - theirs.value, half).over(size)
+        relative = replace(difference, reliable=ours.reliable and theirs.reliable)
+        differences.append(Difference(label, unit, theirs, ours, relative, margin))
+    return differences
 
 
-def _difference(ours: Estimate, theirs: Estimate, scale: float | None) -> Estimate:
-    with np.errstate(invalid="ignore", divide="ignore"):
-        a, b = (one.mapped(np.log) if scale is None else one.over(scale) for one in (ours, theirs))
-    value = a.value - b.value
-    below = math.hypot(a.value - a.ci95_low, b.ci95_high - b.value)
-    above = math.hypot(a.ci95_high - a.value, b.value - b.ci95_low)
-    reliable = ours.reliable and theirs.reliable
-    found = Estimate(value, value - below, value + above, reliable=reliable)
-    return found.exp(minus=1.0) if scale is None else found
+def _over_packings(values: Sequence[Estimate]) -> Estimate:
+    """The mean over packings; its interval is Student's t for the difference from one more.
 
-
-def _over_packings(values: Sequence[Estimate]) -> tuple[Estimate, bool]:
-    """The mean over packings, and whether these scatter by more than their own intervals say.
-
-    The interval then is Student's t between packings, for the difference from one more: the
-    measured signal has a packing of its own.
+    The measured signal has a packing of its own. That of a single packing is along its path.
     """
-    if len(values) == 1:
-        return values[0], False
-    within, count = mean_over_packings(values), len(values)
-    reliable = all(one.reliable for one in values)
-    own = np.mean([one.half_width**2 for one in values]) / _NORMAL**2
-    variance = float(np.var([one.value for one in values], ddof=1))
-    half = within.half_width
-    between = variance * (count - 1) > own * chdtri(count - 1, _BEYOND)
-    if between:
-        reach = student_quantile(count - 1, JOINT) * math.sqrt(variance * (1 + 1 / count))
-        half = max(half, reach)
-    return replace(Estimate.around(within.value, half), reliable=reliable), bool(between)
+    count = len(values)
+    if count == 1:
+        return values[0]
+    numbers = np.array([estimate.value for estimate in values])
+    scatter = float(numbers.std(ddof=1)) * math.sqrt(1 + 1 / count)
+    mean = t_interval(float(numbers.mean()), scatter, count - 1)
+    return replace(mean, reliable=all(estimate.reliable for estimate in values))
 
 
-def _described(force: Floats, low_pass_hz: float, separation_s: float) -> list[Estimate]:
-    """The quantities of a signal in the order of `SIGNAL_QUANTITIES`."""
-    if len(force) < MIN_SAMPLES:
-        raise SeriesError(f"after the transient, {len(force)} samples of the bandwidth remain")
-    rate, rest = PER_HZ * low_pass_hz, force - force.mean()
-    time = np.arange(len(force)) / rate
+def _described(force: Floats, rate_hz: float, separation_s: float) -> list[Estimate]:
+    """The quantities of a signal in the order of `QUANTITIES`."""
+    mean = estimate_mean(force).estimate
+    time = np.arange(len(force)) / rate_hz
     peaks = find_drag_peaks(time, -force, min_separation_s=separation_s)
     apart = _mean(np.diff(peaks.time_s))
-    edges = np.array(_BANDS) * low_pass_hz
-    filters = (butter(2, both, "bandpass", fs=rate, output="sos") for both in pairwise(edges))
-    return [
-        _mean(force),
-        _rms(rest),
-        *(_quantile(force, part) for part in _QUANTILES),
-        Estimate(1 / apart.value, 1 / apart.ci95_high, 1 / apart.ci95_low, reliable=apart.reliable),
-        _mean(-peaks.drag_n),
-        _correlation_time(rest, rate),
-        *(_rms(sosfiltfilt(one, rest)) for one in filters),
-    ]
+    rate = Estimate(1 / apart.value, 1 / apart.ci95_high, 1 / apart.ci95_low,
+                    reliable=apart.reliable)  # fmt: skip
+    spread = estimates((force - force.mean())[:, None] ** 2, np.sqrt)[0]
+    return [mean, spread, rate, _mean(-peaks.drag_n)]
 
 
 def _mean(series: Floats) -> Estimate:
     """The mean of a series in the order of time, not known if it is too short."""
     if len(series) < MIN_SAMPLES:
         return Estimate(math.nan, math.nan, math.nan)
-    return estimate_mean(series, confidence=JOINT).estimate
-
-
-def _rms(series: Floats) -> Estimate:
-    """The root mean square of a series."""
-    return estimates(series[:, None] ** 2, np.sqrt, confidence=JOINT)[0]
-
-
-def _quantile(force: Floats, part: float) -> Estimate:
-    """A quantile; its interval from that of the fraction below it (Woodruff 1952)."""
-    value = float(np.quantile(force, part))
-    below = estimate_mean((force <= value).astype(np.float64), confidence=JOINT)
-    half = below.ci95_high - below.mean
-    low, high = np.quantile(force, np.clip([part - half, part + half], 0.0, 1.0))
-    inside = half <= min(part, 1.0 - part)
-    return Estimate(value, float(low), float(high), reliable=below.reliable and inside)
-
-
-def _correlation_time(rest: Floats, rate_hz: float) -> Estimate:
-    """The time after which the autocorrelation is 1/e, between two lags on a straight line.
-
-    The interval is that of a jackknife over blocks of the logarithm (Kuensch 1989, Ann. Stat. 17,
-    1217), with Student's t: linear in the autocovariances, as of the other quantities, it is too
-    narrow for so skewed a ratio.
-    """
-    covariance = autocovariance(rest)
-    lag = int(np.argmax(covariance < covariance[0] / math.e))
-    lags = range(_LONGEST_LAG * lag + 2)
-    rows = len(rest) - len(lags)
-    if rows < MIN_SAMPLES * _BLOCKS:
-        return Estimate(math.nan, math.nan, math.nan)
-    products = np.stack([rest[:rows] * rest[one : one + rows] for one in lags], axis=1)
-    parts = np.array([part.mean(axis=0) for part in np.array_split(products, _BLOCKS)])
-    rho = np.vstack([parts.mean(axis=0), (parts.sum(axis=0) - parts) / (_BLOCKS - 1)])
-    rho /= rho[:, :1]
-    below = rho < 1 / math.e
-    after = np.where(below.any(axis=1), np.maximum(np.argmax(below, axis=1), 1), len(lags) - 1)
-    above, under = (rho[np.arange(len(rho)), after + shift] for shift in (-1, 0))
-    whole, *others = np.log((after - 1 + (above - 1 / math.e) / (above - under)) / rate_hz)
-    se = math.sqrt((_BLOCKS - 1) * np.var(others))
-    half = student_quantile(_BLOCKS - 1, JOINT) * se
-    reliable = estimate_mean(rest**2).reliable
-    return replace(Estimate.around(float(whole), half), reliable=reliable).exp()
+    return estimate_mean(series).estimate
 
 
 # --- report --------------------------------------------------------------------------------------
@@ -314,12 +193,12 @@ class SignalComparison:
 
     def table(self) -> pd.DataFrame:
         """One row per quantity; the intervals are those of the report."""
-        names = ("measured", "simulated", "relative", "verdict", "needs")
-        rows = (
-            {"case": self.case.name, **one.quantity._asdict()} | {k: getattr(one, k) for k in names}
-            for one in self.differences
+        names = ("label", "unit", "measured", "simulated", "relative", "verdict")
+        return pd.DataFrame(
+            {"case": self.case.name}
+            | flattened({name: getattr(difference, name) for name in names})
+            for difference in self.differences
         )
-        return pd.DataFrame(map(flattened, rows))
 
     def picture(self) -> bytes:
         """The figure as PNG."""
@@ -392,6 +271,6 @@ def _drawn(found: SignalComparison) -> Figure:
         row(right, place, relative.value, relative, _MARKS[one.verdict])
     for verdict, colour in _MARKS.items():
         key(right, verdict, color=colour)
-    row_names(right, [one.quantity.label for one in found.differences])
+    row_names(right, [one.label for one in found.differences])
     right.set(xlabel="relative difference (%)", xlim=(-100, 100))
     return legend_below(figure)
