@@ -100,7 +100,6 @@ TABLES = {
     "particles": "particles",
     "contacts": "contacts",
     "network": "network",
-    "clusters": "clusters",
     "chains": "chains",
     "thermo": "thermo",
 }

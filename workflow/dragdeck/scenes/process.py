@@ -462,7 +462,7 @@ PROCESS = SceneType(
         "closure.json",
         "corrections.json",
     ),
-    network=("network.parquet", "chains.parquet", "clusters.parquet"),
+    network=("network.parquet", "chains.parquet"),
     loading=("facets.parquet", "contact_events.parquet", "loading.json", "workpiece.vtp"),
     regime="drag",
     impact_speed=fastest_motion,
