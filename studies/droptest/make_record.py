@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from dragchain.calibration.drops import IMPACTS, Drop, full, run_drops
-from dragchain.calibration.simulated_drops import DropRun, read_drops
+from dragchain.calibration.drops import IMPACTS, Drop, full
+from dragchain.calibration.simulated_drops import DropRun, Drops, run_drops
 from dragdeck.cases.case import Case
 from dragdeck.decks.templates import environment
 from dragdeck.engine.batch import Batch
@@ -75,19 +75,19 @@ def drop_of(case: Case, seed: int) -> Drop:
     measured = measurements(study.calibration, case.file)
     value = round(float(random.uniform(*RESTITUTIONS)), 4)
     height = study.drop_test.height_m + float(random.normal(0.0, measured.height_std_m))
-    option = study.contact.limit_force
-    return Drop("drop", "reference", value, option, height, full(study, STEP_FRACTION))
+    return Drop("drop", "reference", value, height, full(study, STEP_FRACTION))
 
 
-def synthetic_record(run: DropRun, sensor: Sensor, seed: int) -> str:
-    """A CSV that says what it is."""
+def synthetic_record(drops: Drops, sensor: Sensor, seed: int) -> str:
+    """A CSV of the first drop that says what it is."""
+    run = drops.runs[0]
     drop, record = run.drop, record_of(run, sensor, np.random.default_rng(seed))
-    fraction = f"{drop.timestep_fraction:.2%}"
     head = [
         "# SYNTHETIC: no measurement. A drop of the engine as a force sensor would show it.",
         f"# engine: restitution {drop.restitution:g} in the deck,"
-        f" limitForce {'on' if drop.limit_force else 'off'},",
-        f"#   modulus times {drop.youngs_modulus_scale:g}, step {fraction} of the",
+        f" limitForce {'on' if drops.known.limit_force else 'off'},",
+        f"#   modulus times {drop.fidelity.youngs_modulus_scale:g},"
+        f" step {STEP_FRACTION:.2%} of the",
         f"#   Rayleigh time, height {drop.height_m * 1e3:.4f} mm;"
         f" it rebounds with {run.effective:.5f}",
         f"# sensor: {sensor.rate_hz:g} Hz, noise {sensor.noise_n:g} N (standard deviation),",
@@ -119,7 +119,7 @@ def main() -> None:
     case = project.cases("droptest")[0]
     batch = Batch(options.folder, environment(project.templates, study_templates(case)))
     drops = run_drops(case, [drop_of(case, options.seed)], batch, say)
-    text = synthetic_record(read_drops(drops, batch.folder).runs[0], sensor, options.seed)
+    text = synthetic_record(drops, sensor, options.seed)
     options.out.write_text(text, encoding="utf-8")
 
 

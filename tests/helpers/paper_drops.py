@@ -6,8 +6,9 @@ from typing import Literal
 
 import numpy as np
 
-from dragchain.calibration.drops import DropTest, Purpose, SimulatedDrop
+from dragchain.calibration.drops import Drop, DropTest, Purpose
 from dragchain.calibration.simulated_drops import DropRun, Drops, Waveform
+from dragdeck.scenes.drop_test import DropFidelity
 
 G, HEIGHT = 9.81, 0.010
 FALL_S = math.sqrt(2 * HEIGHT / G)
@@ -28,7 +29,6 @@ def paper_drop(
     purpose: Purpose = "reference",
     contact_s: float = 25e-6,
     jitter: float = 0.0,
-    limit_force: bool = True,
 ) -> DropRun:
     """A drop by the laws of free flight; contacts are sin^1.5, peaks go with v^1.2."""
     e = rebound(deck, bias) + jitter
@@ -43,16 +43,7 @@ def paper_drop(
         impacts.append(Waveform(time, force, down, down + contact_s, middle, peak))
         down += contact_s + 2 * float(after) / G
     modulus = 1.0 if purpose != "production" else 0.01
-    drop = SimulatedDrop(
-        folder="",
-        purpose=purpose,
-        restitution=deck,
-        limit_force=limit_force,
-        height_m=height,
-        youngs_modulus_scale=modulus,
-        timestep_s=1e-7,
-        timestep_fraction=0.01,
-    )
+    drop = Drop("", purpose, deck, height, DropFidelity(modulus, 1e-7))
     return DropRun(drop, speeds, tuple(impacts))
 
 
@@ -62,21 +53,18 @@ def paper_drops(
     """A sweep; production is biased and its contacts are six times as long."""
     random = np.random.default_rng(0)
     runs = []
-    for option in (True, False):
-        for deck in np.round(np.arange(0.4, 1.001, 0.05), 2):
-            runs.append(paper_drop(float(deck), limit_force=option))
-            for _ in range(2):
-                noise = float(random.normal(0, jitter))
-                runs.append(
-                    paper_drop(
-                        float(deck),
-                        bias=bias if option else 0.0,
-                        purpose="production",
-                        contact_s=150e-6,
-                        jitter=noise,
-                        limit_force=option,
-                    )
-                )
+    for deck in np.round(np.arange(0.4, 1.001, 0.05), 2).tolist():
+        runs.append(paper_drop(deck))
+        runs += [
+            paper_drop(
+                deck,
+                bias=bias,
+                purpose="production",
+                contact_s=150e-6,
+                jitter=float(random.normal(0, jitter)),
+            )
+            for _ in range(2)
+        ]
     known = DropTest(
         study="paper",
         title="on paper",
@@ -89,7 +77,5 @@ def paper_drops(
         gravity_m_s2=G,
         limit_force=True,
         restitution_now=0.7,
-        fall_time_s=FALL_S,
-        contact_time_s=25e-6,
     )
     return Drops(known, tuple(runs))

@@ -4,7 +4,7 @@ A measured drop test is compared with drops of the same particle on the same pla
 process runs: same modulus, step and contact options.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
@@ -12,12 +12,10 @@ from pydantic import PositiveFloat
 
 from dragdeck.cases.bed import bed_rayleigh_time, particle_material
 from dragdeck.cases.case import Case
-from dragdeck.documents import Document, Part
-from dragdeck.engine.batch import Batch
-from dragdeck.engine.reports import Report
+from dragdeck.documents import Part
 from dragdeck.physics import contact_mechanics as mechanics
 from dragdeck.physics.rounding import timestep
-from dragdeck.scenes.drop_test import DropFidelity, drop_scene
+from dragdeck.scenes.drop_test import DropFidelity
 from dragdeck.study.calibration import measurements
 from dragdeck.study.model import Study
 
@@ -28,7 +26,7 @@ Purpose = Literal["production", "reference", "confirm"]
 """Of a drop: as the process runs; full modulus, fine step; production at the fitted value."""
 
 
-class DropTest(Document):
+class DropTest(Part):
     """The drop test of the study, as in ``result.json``.
 
     Attributes
@@ -45,11 +43,7 @@ class DropTest(Document):
         Whether tensile normal forces are suppressed, as in the study.
     restitution_now : float
         Coefficient of restitution of the study.
-    fall_time_s, contact_time_s : float
-        Time of the fall before the first impact, and contact time of an elastic impact, s.
     """
-
-    remedy = "make it with: ./run calibrate"
 
     study: str
     title: str
@@ -62,49 +56,29 @@ class DropTest(Document):
     gravity_m_s2: PositiveFloat
     limit_force: bool
     restitution_now: float
-    fall_time_s: PositiveFloat
-    contact_time_s: float
 
-
-class Settings(Part):
-    """Modulus and step of a drop; the fraction is that of this particle's Rayleigh time."""
-
-    youngs_modulus_scale: PositiveFloat
-    timestep_s: PositiveFloat
-    timestep_fraction: PositiveFloat
-
-
-class SimulatedDrop(Settings):
-    """A drop that was run.
-
-    Attributes
-    ----------
-    folder : str
-        Beside those of the other drops.
-    purpose : str
-        ``production``, ``reference`` or ``confirm``.
-    restitution : float
-        In the deck.
-    """
-
-    folder: str
-    purpose: Purpose
-    restitution: PositiveFloat
-    limit_force: bool
-    height_m: PositiveFloat
-
-
-class DropSet(DropTest):
-    """The drop test and drops for it."""
-
-    drops: tuple[SimulatedDrop, ...]
+    @classmethod
+    def of(cls, case: Case) -> "DropTest":
+        """The drop test of a case with a measured one."""
+        study, section = case.study, measurements(case.study.calibration, case.file)
+        particle, plate = study.media.main_material, study.workpiece.material
+        return cls(
+            study=case.study_name,
+            title=study.title,
+            pair=f"{particle}-{plate}",
+            fidelity=case.fidelity_name,
+            record=section.record or "",
+            height_m=study.drop_test.height_m,
+            height_std_m=section.height_std_m,
+            peaks=section.peaks,
+            gravity_m_s2=study.gravity_m_s2,
+            limit_force=study.contact.limit_force,
+            restitution_now=study.pair(particle, plate).restitution,
+        )
 
 
 _RESTITUTIONS = tuple(round(0.05 * k, 2) for k in range(8, 21))
 """Deck values of the sweep: 0.40, 0.45, ... 1.00."""
-
-_OTHER_RESTITUTIONS = _RESTITUTIONS[::2]
-"""With the contact option that the study does not use."""
 
 _PHASES = 4
 """Production drops per deck value. Their heights differ by a fraction of a step's
@@ -130,7 +104,6 @@ class Drop:
         step; ``confirm``: production at the fitted value.
     restitution : float
         In the deck.
-    limit_force : bool
     height_m : float
     fidelity : DropFidelity
     """
@@ -138,7 +111,6 @@ class Drop:
     name: str
     purpose: Purpose
     restitution: float
-    limit_force: bool
     height_m: float
     fidelity: DropFidelity
 
@@ -151,35 +123,28 @@ def production(study: Study) -> DropFidelity:
 
 
 def sweep(study: Study) -> Iterator[Drop]:
-    """Drops over a range of deck values, with limitForce on and off.
+    """Drops over a range of deck values.
 
     At production several drops a value, over the phase of the first contact in
     its step; at the reference, where the step is fine, one, each at another
     phase.
     """
     coarse, fine = production(study), full(study, _REFERENCE_FRACTION)
-    for limit_force in (True, False):
-        used = limit_force == study.contact.limit_force
-        word = "limited" if limit_force else "free"
-        for number, value in enumerate(_RESTITUTIONS if used else _OTHER_RESTITUTIONS):
-            for phase in range(_PHASES):
-                height = _height(study, coarse, (phase + 0.5) / _PHASES)
-                name = f"production-{word}-{value:.2f}-{phase}"
-                yield Drop(name, "production", value, limit_force, height, coarse)
-            height = _height(study, fine, (number * _GOLDEN) % 1.0)
-            name = f"reference-{word}-{value:.2f}"
-            yield Drop(name, "reference", value, limit_force, height, fine)
+    for number, value in enumerate(_RESTITUTIONS):
+        for phase in range(_PHASES):
+            height = _height(study, coarse, (phase + 0.5) / _PHASES)
+            yield Drop(f"production-{value:.2f}-{phase}", "production", value, height, coarse)
+        height = _height(study, fine, (number * _GOLDEN) % 1.0)
+        yield Drop(f"reference-{value:.2f}", "reference", value, height, fine)
 
 
 def confirmation(study: Study, restitution: float, full_restitution: float) -> Iterator[Drop]:
     """Drops at the fitted values: production over the phases, and one at full modulus."""
-    coarse, option = production(study), study.contact.limit_force
+    coarse, fine = production(study), full(study, _REFERENCE_FRACTION)
     for phase in range(2 * _PHASES):
         height = _height(study, coarse, (phase + 0.25) / (2 * _PHASES))
-        yield Drop(f"confirm-{phase}", "confirm", restitution, option, height, coarse)
-    fine = full(study, _REFERENCE_FRACTION)
-    height = study.drop_test.height_m
-    yield Drop("confirm-full", "reference", full_restitution, option, height, fine)
+        yield Drop(f"confirm-{phase}", "confirm", restitution, height, coarse)
+    yield Drop("confirm-full", "reference", full_restitution, study.drop_test.height_m, fine)
 
 
 def full(study: Study, fraction: float) -> DropFidelity:
@@ -196,7 +161,7 @@ def _height(study: Study, fidelity: DropFidelity, phase: float) -> float:
 
 
 def drop_case(case: Case, drop: Drop) -> Case:
-    """The case with a drop's restitution, height and contact option in place."""
+    """The case with a drop's restitution and height in place."""
     study = case.study
     particle, plate = study.media.main_material, study.workpiece.material
     pair = study.pair(particle, plate).model_copy(update={"restitution": drop.restitution})
@@ -207,62 +172,6 @@ def drop_case(case: Case, drop: Drop) -> Case:
             "drop_test": study.drop_test.model_copy(
                 update={"height_m": drop.height_m, "impacts": max(IMPACTS, study.drop_test.impacts)}
             ),
-            "contact": study.contact.model_copy(update={"limit_force": drop.limit_force}),
         }
     )
     return Case(case.file, case.settings, changed)
-
-
-def run_drops(case: Case, drops: Sequence[Drop], batch: Batch, report: Report) -> DropSet:
-    """Run drops, each in a folder of its own.
-
-    Parameters
-    ----------
-    case : Case
-    drops : sequence of Drop
-    batch : Batch
-        Its folder gets a folder for each drop.
-    report : callable
-        Gets a line now and then.
-
-    Raises
-    ------
-    EngineError, RejectedRunError
-        A drop did not run to its end, or is no result.
-    """
-    rows = []
-    for number, drop in enumerate(drops, start=1):
-        scene = drop_scene(drop_case(case, drop), drop.fidelity)
-        batch.result(drop.name, scene)
-        step = scene.case.timestep_s
-        steps = {"timestep_s": step, "timestep_fraction": step / scene.case.rayleigh_time_s}
-        known = {**vars(drop), **vars(drop.fidelity), **steps, "folder": drop.name}
-        rows.append(SimulatedDrop.model_validate(known))
-        if number % 20 == 0 or number == len(drops):
-            report(f"{number} of {len(drops)} drops done")
-    return _listed(case, rows)
-
-
-def _listed(case: Case, rows: Sequence[SimulatedDrop]) -> DropSet:
-    study, section = case.study, measurements(case.study.calibration, case.file)
-    particle, plate = study.media.main_material, study.workpiece.material
-    material, radius = particle_material(study), study.media.typical_radius_m
-    modulus = mechanics.effective_modulus(material, study.materials[plate])
-    height, gravity = study.drop_test.height_m, study.gravity_m_s2
-    mass, speed = mechanics.particle_mass(material, radius), mechanics.fall_speed(height, gravity)
-    return DropSet(
-        study=case.study_name,
-        title=study.title,
-        pair=f"{particle}-{plate}",
-        fidelity=case.fidelity_name,
-        record=section.record or "",
-        height_m=height,
-        height_std_m=section.height_std_m,
-        peaks=section.peaks,
-        gravity_m_s2=gravity,
-        limit_force=study.contact.limit_force,
-        restitution_now=study.pair(particle, plate).restitution,
-        fall_time_s=mechanics.fall_time(height, gravity),
-        contact_time_s=mechanics.hertz_contact_time(mass, radius, modulus, speed),
-        drops=tuple(rows),
-    )

@@ -7,20 +7,19 @@ contact option, so that whatever these do to the rebound is corrected.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from scipy.linalg import block_diag
-from scipy.optimize import brentq, minimize_scalar
+from scipy.optimize import least_squares
 from scipy.stats import chi2
 
 from dragchain.arrays import Floats
-from dragchain.calibration.drops import IMPACTS
+from dragchain.calibration.drops import IMPACTS, DropTest
 from dragchain.calibration.measured_impacts import Impact, Measured, pulse
 from dragchain.calibration.simulated_drops import DropRun, Drops, Emulator, Waveform
-from dragchain.statistics.estimate import CONFIDENCE
+from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate
 from dragdeck.documents import Part
 from dragdeck.errors import RecordError
 
@@ -148,72 +147,9 @@ def _since_first(std: Floats) -> Floats:
 # --- fit -----------------------------------------------------------------------------------------
 
 
-_RISE = float(chi2.ppf(CONFIDENCE, 1))
-"""Chi square above its least value at the ends of a 95 % interval of one number: 3.84."""
-
 WIDTH_LIMIT = 1.25
 """A measured impact wider than this times the simulated one, seen at the same
 rate, shows the sensor and not the contact: its peaks are not compared."""
-
-
-@dataclass(frozen=True)
-class Misfit:
-    """Weighted sum of squares between a record and a sweep, by deck value.
-
-    The drop height is a second unknown, known to `height_std_m`: flight times go
-    with its root. For a given restitution the best height has a closed form,
-    so what is left is a function of one number (profile likelihood).
-
-    Attributes
-    ----------
-    observed : Observed
-    emulator : Emulator
-        The sweep at production.
-    contact_s : callable
-        Contact part of the times by deck value, at the full modulus: the real particle is hard.
-    height_m, height_std_m : float
-    """
-
-    observed: Observed
-    emulator: Emulator
-    contact_s: Callable[[float], Floats]
-    height_m: float
-    height_std_m: float
-
-    @cached_property
-    def _spread(self) -> float:
-        """Relative standard uncertainty of the height's root."""
-        return 0.5 * self.height_std_m / self.height_m
-
-    @cached_property
-    def _root(self) -> Floats:
-        """Cholesky root of the covariance, that of the sweep's models included."""
-        flights, logs = len(self.observed.times_s), len(self.observed.log_peaks)
-        errors = self.emulator.errors
-        model = np.diag(np.square([*errors[:flights], *errors[IMPACTS - 1 : IMPACTS - 1 + logs]]))
-        return np.asarray(np.linalg.cholesky(self.observed.covariance + model))
-
-    def _parts(self, restitution: float) -> tuple[Floats, Floats]:
-        """Whitened: measured less what does not depend on the height, and what does."""
-        e, flights, peaks = self.emulator, len(self.observed.times_s), len(self.observed.log_peaks)
-        touch = np.cumsum(self.contact_s(restitution)[:flights])
-        logs = self.observed.log_peaks - e.log_peaks(restitution)[:peaks]
-        rest = np.concatenate([self.observed.times_s - touch, logs])
-        flight = np.cumsum(e.flights_s(restitution)[:flights])
-        with_height = np.concatenate([flight, np.zeros(peaks)])
-        return np.linalg.solve(self._root, rest), np.linalg.solve(self._root, with_height)
-
-    def best(self, restitution: float) -> tuple[float, Floats]:
-        """Best root of the height over the nominal one, and measured less simulated, whitened."""
-        rest, slope = self._parts(restitution)
-        weight = self._spread**-2
-        scale = float((slope @ rest + weight) / (slope @ slope + weight))
-        return scale, np.asarray(rest - scale * slope)
-
-    def __call__(self, restitution: float) -> float:
-        """Chi square at the best height."""
-        scale, left = self.best(restitution)
-        return float(left @ left + ((scale - 1.0) / self._spread) ** 2)
 
 
 class Fit(Part):
@@ -233,7 +169,7 @@ class Fit(Part):
         Probability of a larger `chi2` if the model is right.
     inflation : float
         Factor by which the interval is widened if the residuals exceed their uncertainties:
-        sqrt(chi2 / degrees), at least 1.
+        sqrt(chi2 / degrees), at least 1 (Birge 1932, Physical Review 40, 207).
     residuals : tuple of float
         (Measured - simulated) / standard uncertainty.
     """
@@ -249,56 +185,67 @@ class Fit(Part):
     residuals: tuple[float, ...]
 
 
-def fit(misfit: Misfit) -> Fit:
-    """The deck value with the least misfit, and its interval by profile likelihood.
+def fit(observed: Observed, emulator: Emulator, contact: Emulator, known: DropTest) -> Fit:
+    """The deck value with the least misfit, and its interval, by weighted least squares.
 
-    The interval ends where chi square is 3.84 (95 % of one degree of freedom)
-    above its least value, times chi square over degrees of freedom where that
-    is above 1 (Birge 1932, Physical Review 40, 207).
+    The drop height is a second unknown, known to `height_std_m`: flight times go with its root.
+
+    Parameters
+    ----------
+    observed : Observed
+    emulator : Emulator
+        The sweep.
+    contact : Emulator
+        That at the full modulus, for the contact part of the times: the real particle is hard.
+    known : DropTest
 
     Raises
     ------
     RecordError
         ``range``: the best value or its interval leaves the sweep.
     """
-    e = misfit.emulator
-    bounds = (e.low, e.high)
-    result = minimize_scalar(misfit, bounds=bounds, method="bounded", options={"xatol": 1e-9})
-    best, least = float(result.x), float(result.fun)
-    degrees = len(misfit.observed.times_s) + len(misfit.observed.log_peaks) - 1
+    flights, peaks = len(observed.times_s), len(observed.log_peaks)
+    spread = 0.5 * known.height_std_m / known.height_m
+    errors = [*emulator.errors[:flights], *emulator.errors[IMPACTS - 1 : IMPACTS - 1 + peaks]]
+    root = np.linalg.cholesky(observed.covariance + np.diag(np.square(errors)))
+    seen = np.append(observed.times_s, observed.log_peaks)
+
+    def misfit(at: Floats) -> Floats:
+        restitution, scale = at
+        parts = scale * emulator.flights_s(restitution) + contact.contact_s(restitution)
+        logs = emulator.log_peaks(restitution)[:peaks]
+        away = np.linalg.solve(root, seen - np.append(np.cumsum(parts)[:flights], logs))
+        return np.append(away, (scale - 1.0) / spread)
+
+    low, high = emulator.low, emulator.high
+    best = least_squares(
+        misfit, ((low + high) / 2, 1.0), bounds=((low, 0.5), (high, 2.0)), x_scale=(0.1, spread),
+        xtol=1e-12, ftol=1e-12, gtol=1e-12,
+    )  # fmt: skip
+    least, degrees = 2.0 * float(best.cost), flights + peaks - 1
     inflation = math.sqrt(max(1.0, least / degrees)) if degrees else 1.0
-    rise = _RISE * inflation**2
-
-    def above(value: float) -> float:
-        return misfit(value) - least - rise
-
-    low, high = _edge(above, best, e.low), _edge(above, best, e.high)
-    scale, residuals = misfit.best(best)
+    std = math.sqrt(np.linalg.inv(best.jac.T @ best.jac)[0, 0])
+    value = Estimate.around(float(best.x[0]), NORMAL_QUANTILE * inflation * std)
+    if not low < value.ci95_low < value.ci95_high < high:
+        raise RecordError(
+            "range",
+            "the fitted restitution lies outside the sweep",
+            value=f"{value.value:.3f}, CI {value.ci95_low:.3f} to {value.ci95_high:.3f}",
+            limit=f"value and confidence interval within {low:g} to {high:g}",
+            remedy="check drop_test.height_m, and that particle and plate of the record "
+            "are those of the study",
+        )
     return Fit(
-        restitution=best,
-        ci95_low=low,
-        ci95_high=high,
-        height_m=misfit.height_m * scale**2,
+        restitution=value.value,
+        ci95_low=value.ci95_low,
+        ci95_high=value.ci95_high,
+        height_m=known.height_m * float(best.x[1]) ** 2,
         chi2=least,
         degrees=degrees,
         p_value=float(chi2.sf(least, degrees)) if degrees else None,
         inflation=inflation,
-        residuals=tuple(residuals.tolist()),
+        residuals=tuple(best.fun[:-1].tolist()),
     )
-
-
-def _edge(above: Callable[[float], float], best: float, end: float) -> float:
-    """Where the misfit has risen enough, between the best value and the sweep's end."""
-    if above(end) <= 0.0:
-        raise RecordError(
-            "range",
-            "the fitted restitution lies outside the sweep",
-            value=f"{best:.3f}, confidence interval beyond {end:g}",
-            limit="value and confidence interval within the range of the sweep",
-            remedy="check drop_test.height_m, and that particle and plate of the record "
-            "are those of the study",
-        )
-    return float(brentq(above, best, end, xtol=1e-10))
 
 
 @dataclass(frozen=True)
@@ -340,16 +287,15 @@ def calibrate(measured: Measured, drops: Drops) -> RecordFit:
         ``coarse`` or ``range``.
     """
     known = drops.known
-    shapes = _nearest_shapes(measured.impacts, drops.select("reference", known.limit_force))
+    shapes = _nearest_shapes(measured.impacts, drops.select("reference"))
     sampling = sample_impacts(shapes, measured)
     ratio = measured.impacts[0].width_s / float(sampling.width_s[0])
     with_peaks = ratio <= WIDTH_LIMIT if known.peaks == "auto" else known.peaks == "yes"
     if ratio > WIDTH_LIMIT:
         sampling = _as_the_sensor_shows(measured, sampling)
     observed = observe(measured, sampling, with_peaks=with_peaks)
-    contact_s = drops.reference.contact_s
     production, reference = (
-        fit(Misfit(observed, emulator, contact_s, known.height_m, known.height_std_m))
+        fit(observed, emulator, drops.reference, known)
         for emulator in (drops.production, drops.reference)
     )
     return RecordFit(measured, sampling, observed, ratio, drops, production, reference)

@@ -1,6 +1,6 @@
 """The command that calibrates a study: runs, fits, figures and one self-contained page."""
 
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from dragchain.arrays import Floats
 from dragchain.calibration.angle_runs import run_angles
-from dragchain.calibration.drops import Drop, confirmation, run_drops, sweep
+from dragchain.calibration.drops import Drop, confirmation, sweep
 from dragchain.calibration.fit import RecordFit, calibrate
 from dragchain.calibration.friction import FrictionFile, Posterior, angle_models, write_friction
 from dragchain.calibration.measured_impacts import measure_impacts
@@ -25,7 +25,7 @@ from dragchain.calibration.results import (
     result,
     write_calibration,
 )
-from dragchain.calibration.simulated_drops import DropRun, Drops, read_drops
+from dragchain.calibration.simulated_drops import DropRun, Drops, run_drops
 from dragchain.figures.panels import key, legend_below, new_figure, new_panels
 from dragchain.figures.style import BLUE, COLOURS, GREY, LIGHT, ORANGE
 from dragchain.report.campaign import write_report
@@ -181,8 +181,7 @@ def calibrate_restitution(case: Case, folder: Path, templates: jinja2.Environmen
     """Run the drops that a record is compared with, in ``sweep/`` and ``confirm/``, and fit it."""
 
     def simulated(name: str, drops: Iterable[Drop]) -> Drops:
-        batch = Batch(folder / name, templates)
-        return read_drops(run_drops(case, list(drops), batch, say), batch.folder)
+        return run_drops(case, list(drops), Batch(folder / name, templates), say)
 
     study, name = case.study, measurements(case.study.calibration, case.file).record or ""
     record = read_record(recorded_file(name, case.file, "calibration.record"))
@@ -251,15 +250,9 @@ def _of_drops(drops: FittedRecord) -> Mapping[str, object]:
         "result": result(fit),
         "impacts": impact_table(fit).to_dict("records"),
         "residuals": list(zip(names, fit.fit.residuals, strict=True)),
-        "bias": _by_deck_value(bias_table(fit.drops)),
+        "bias": bias_table(fit.drops)
+        .pivot(index="restitution_deck", columns="purpose", values="restitution_effective")
+        .reset_index()
+        .to_dict("records"),
         "confirm": confirmed(drops.confirm),
     }
-
-
-def _by_deck_value(bias: pd.DataFrame) -> Sequence[Mapping[Hashable, object]]:
-    """Effective restitution, one row per deck value, one key per purpose and contact option."""
-    setting = bias["purpose"] + bias["limit_force"].map({True: "_on", False: "_off"})
-    wide = bias.assign(setting=setting).pivot(
-        index="restitution_deck", columns="setting", values="restitution_effective"
-    )
-    return wide.astype(object).where(wide.notna(), None).reset_index().to_dict("records")

@@ -1,25 +1,20 @@
 """The files of a calibration: record, result and tables."""
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 import pandas as pd
 
-from dragchain.calibration.drops import DropTest, Settings
+from dragchain.calibration.drops import DropTest
 from dragchain.calibration.fit import Fit, RecordFit
 from dragchain.calibration.measured_impacts import Measured
-from dragchain.calibration.simulated_drops import Drops, Emulator
+from dragchain.calibration.simulated_drops import Drops
 from dragchain.errors import TableError
-from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate
+from dragchain.statistics.estimate import Estimate
 from dragdeck.documents import Document, Part
 from dragdeck.files import write_text
-
-SweepPurpose = Literal["production", "reference"]
-PURPOSES: tuple[SweepPurpose, ...] = ("production", "reference")
 
 
 class Put(Part):
@@ -35,48 +30,6 @@ class Put(Part):
 
     field: str
     value: float
-
-
-class Direct(Part):
-    """Restitution calculated directly from the flight times, without a contact law.
-
-    That of the first impact is flight time / (2 x fall time), which depends on the drop height;
-    that of the second is the ratio of the second to the first flight time, which does not.
-    Contact times are not part of the flights.
-
-    Attributes
-    ----------
-    first_impact : float
-        Of the first impact.
-    second_impact : float or None
-        Of the second impact.
-    """
-
-    first_impact: float
-    second_impact: float | None
-
-
-class PutFor(Part):
-    """The input value that reproduces the measured rebound with given settings.
-
-    Attributes
-    ----------
-    purpose : str
-        ``production`` (settings of the study) or ``reference``.
-    limit_force : bool
-        Whether tensile forces are suppressed.
-    used : bool
-        Whether the study uses these settings.
-    value, ci95_low, ci95_high : float or None
-        Input value and its interval; None outside the sweep.
-    """
-
-    purpose: SweepPurpose
-    limit_force: bool
-    used: bool
-    value: float | None
-    ci95_low: float | None
-    ci95_high: float | None
 
 
 class CalibrationFile(Document):
@@ -100,12 +53,6 @@ class CalibrationFile(Document):
         The value to set in the study.
     peaks_compared : bool
         Whether peak forces were fitted too.
-    direct : Direct
-        Restitution without a contact law.
-    put_for : tuple of PutFor
-        Input values for other settings.
-    settings : mapping
-        Modulus and time step by purpose.
     record : Measured
         Impacts of the measured record.
     """
@@ -120,10 +67,7 @@ class CalibrationFile(Document):
     effective: float
     peaks_compared: bool
     width_ratio: float
-    direct: Direct
     correction: float
-    put_for: tuple[PutFor, ...]
-    settings: Mapping[SweepPurpose, Settings]
     record: Measured
 
 
@@ -152,14 +96,7 @@ def result(fit: RecordFit) -> CalibrationFile:
         fit_full=fit.fit_reference,
         peaks_compared=fit.with_peaks,
         width_ratio=fit.width_ratio,
-        direct=_direct(fit),
         correction=deck - measured.value,
-        put_for=tuple(
-            _put_for(drops, measured, fit.fit, purpose, option)
-            for purpose in PURPOSES
-            for option in (True, False)
-        ),
-        settings={purpose: drops.select(purpose)[0].drop for purpose in PURPOSES},
         record=fit.measured,
     )
 
@@ -170,55 +107,18 @@ def _rounded(fit: Fit) -> float:
     return round(fit.restitution, max(2, math.ceil(-math.log10(width)) + 1))
 
 
-def _direct(fit: RecordFit) -> Direct:
-    since = np.append(0.0, fit.observed.times_s)
-    contact = fit.drops.reference.contact_s(fit.fit_reference.restitution)
-    flights = (np.diff(since) - contact[: len(since) - 1]).tolist()
-    return Direct(
-        first_impact=flights[0] / (2.0 * fit.drops.known.fall_time_s),
-        second_impact=flights[1] / flights[0] if len(flights) > 1 else None,
-    )
-
-
-def read_off(
-    model: Emulator, measured: Estimate
-) -> tuple[float | None, float | None, float | None]:
-    """The deck value that rebounds as measured, and the ends of its interval.
-
-    The interval includes that of the measured rebound and the scatter of the drops.
-    """
-    value, error = measured.value, NORMAL_QUANTILE * model.rebound_error
-    low = value - math.hypot(value - measured.ci95_low, error)
-    high = value + math.hypot(measured.ci95_high - value, error)
-    return model.inverse(value), model.inverse(low), model.inverse(high)
-
-
-def _put_for(
-    drops: Drops, measured: Estimate, fit: Fit, purpose: SweepPurpose, limit_force: bool
-) -> PutFor:
-    """The fit for the setting of the study, a reading off the curve for another."""
-    used = purpose == "production" and limit_force == drops.known.limit_force
-    model = drops.emulator(purpose, limit_force)
-    ends = (fit.restitution, fit.ci95_low, fit.ci95_high) if used else read_off(model, measured)
-    known = dict(zip(("value", "ci95_low", "ci95_high"), ends, strict=True))
-    return PutFor(purpose=purpose, limit_force=limit_force, used=used, **known)
-
-
 def bias_table(drops: Drops) -> pd.DataFrame:
-    """Effective against deck restitution for each purpose and contact option."""
-    impacts = pd.DataFrame(
-        [
-            {**dict(run.drop), "restitution_deck": run.drop.restitution, "rebound": rebound}
-            for run in drops.runs
-            if run.drop.purpose in PURPOSES
-            for rebound in run.rebound
-        ]
-    )
-    setting = ["purpose", "limit_force", "restitution_deck"]
-    table = impacts.groupby(setting)["rebound"].agg(
+    """Effective against deck restitution for each purpose."""
+    setting = ["purpose", "restitution_deck"]
+    rows = [
+        (run.drop.purpose, run.drop.restitution, rebound)
+        for run in drops.runs
+        for rebound in run.rebound
+    ]
+    table = pd.DataFrame(rows, columns=[*setting, "rebound"]).groupby(setting)["rebound"]
+    return table.agg(
         restitution_effective="mean", lowest="min", highest="max", impacts="size"
-    )
-    return table.reset_index().sort_values(setting, ascending=[True, False, True])
+    ).reset_index()
 
 
 def impact_table(fit: RecordFit) -> pd.DataFrame:

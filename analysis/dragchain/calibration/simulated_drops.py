@@ -10,13 +10,16 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from numpy.polynomial.polynomial import polyfit, polyval
-from scipy.optimize import brentq
 
 from dragchain.arrays import Floats
-from dragchain.calibration.drops import IMPACTS, DropSet, DropTest, Purpose, SimulatedDrop
+from dragchain.calibration.drops import IMPACTS, Drop, DropTest, Purpose, drop_case
 from dragchain.errors import TableError
 from dragchain.tables.impacts import speed_at_plate
 from dragchain.tables.run_folder import Run
+from dragdeck.cases.case import Case
+from dragdeck.engine.batch import Batch
+from dragdeck.engine.reports import Report
+from dragdeck.scenes.drop_test import drop_scene
 
 _SAMPLES = ("step", "time_s", "z_m", "vz_m_s", "force_n")
 """Columns of a drop's output around its impacts."""
@@ -52,7 +55,7 @@ class DropRun:
 
     Attributes
     ----------
-    drop : SimulatedDrop
+    drop : Drop
         What it simulates.
     speeds_m_s : (K + 1,) ndarray
         Speed at the plate's surface before the first impact and after each.
@@ -60,7 +63,7 @@ class DropRun:
         K of them.
     """
 
-    drop: SimulatedDrop
+    drop: Drop
     speeds_m_s: Floats
     impacts: tuple[Waveform, ...]
 
@@ -82,44 +85,55 @@ class Drops:
     known: DropTest
     runs: tuple[DropRun, ...]
 
-    def select(self, purpose: Purpose, limit_force: bool | None = None) -> list[DropRun]:
-        """The runs of a purpose, and of a contact option unless None."""
-        return [
-            run
-            for run in self.runs
-            if run.drop.purpose == purpose and limit_force in (None, run.drop.limit_force)
-        ]
+    def select(self, purpose: Purpose) -> list[DropRun]:
+        """The runs of a purpose."""
+        return [run for run in self.runs if run.drop.purpose == purpose]
 
-    def emulator(self, purpose: Purpose, limit_force: bool) -> "Emulator":
-        """The model of the drops of a purpose and a contact option."""
-        known, runs = self.known, self.select(purpose, limit_force)
+    def _emulator(self, purpose: Purpose) -> "Emulator":
+        known, runs = self.known, self.select(purpose)
         return emulate(runs, known.height_m, known.gravity_m_s2, single=purpose == "reference")
 
     @cached_property
     def production(self) -> "Emulator":
         """The model of the drops at the settings of the process runs."""
-        return self.emulator("production", self.known.limit_force)
+        return self._emulator("production")
 
     @cached_property
     def reference(self) -> "Emulator":
         """The model of the drops at the full modulus with a fine step."""
-        return self.emulator("reference", self.known.limit_force)
+        return self._emulator("reference")
 
 
-def read_drops(known: DropSet, folder: Path) -> Drops:
-    """Read drops that were run in a folder.
+def run_drops(case: Case, drops: Sequence[Drop], batch: Batch, report: Report) -> Drops:
+    """Run drops, each in a folder of its own, and read them.
+
+    Parameters
+    ----------
+    case : Case
+    drops : sequence of Drop
+    batch : Batch
+        Its folder gets a folder for each drop.
+    report : callable
+        Gets a line now and then.
 
     Raises
     ------
+    EngineError, RejectedRunError
+        A drop did not run to its end, or is no result.
     TableError
         A drop has too few impacts.
     DumpError
         As from the readers of a run.
     """
-    return Drops(known, tuple(_read_drop(folder / drop.folder, drop) for drop in known.drops))
+    for number, drop in enumerate(drops, start=1):
+        batch.result(drop.name, drop_scene(drop_case(case, drop), drop.fidelity))
+        if number % 20 == 0 or number == len(drops):
+            report(f"{number} of {len(drops)} drops done")
+    runs = tuple(_read_drop(batch.folder / drop.name, drop) for drop in drops)
+    return Drops(DropTest.of(case), runs)
 
 
-def _read_drop(folder: Path, drop: SimulatedDrop) -> DropRun:
+def _read_drop(folder: Path, drop: Drop) -> DropRun:
     run = Run.open(folder)
     rows = pd.concat(
         [pd.DataFrame({name: block[name] for name in _SAMPLES}) for block in run.prints("impacts")]
@@ -210,8 +224,6 @@ class Emulator:
         3 over that of impact 1.
     errors : (4,) ndarray
         Standard uncertainty of flights (s) and logarithms.
-    rebound_error : float
-        Standard uncertainty of the rebound.
     """
 
     low: float
@@ -219,7 +231,6 @@ class Emulator:
     by_value: Floats
     by_log: Floats
     errors: Floats
-    rebound_error: float
 
     def flights_s(self, restitution: float) -> Floats:
         """Time of the flight after each impact but the last, s."""
@@ -236,13 +247,6 @@ class Emulator:
     def rebound(self, restitution: float) -> float:
         """Speed after over speed before, mean of the impacts."""
         return float(polyval(restitution, self.by_value[:, -1]))
-
-    def inverse(self, rebound: float) -> float | None:
-        """The deck value that rebounds so, or None outside the sweep."""
-        ends = self.rebound(self.low) - rebound, self.rebound(self.high) - rebound
-        if ends[0] * ends[1] > 0.0:
-            return None
-        return float(brentq(lambda e: self.rebound(e) - rebound, self.low, self.high))
 
 
 def emulate(
@@ -287,7 +291,6 @@ def emulate(
         by_value=by_value,
         by_log=by_log,
         errors=np.append(errors[: IMPACTS - 1], of_peaks),
-        rebound_error=float(errors[-1]),
     )
 
 
