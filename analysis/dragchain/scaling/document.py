@@ -1,9 +1,8 @@
 """The document of a scaling, ``scaling.json``: what the runs say of one field."""
 
+import math
 from collections.abc import Mapping
 from typing import Literal, NamedTuple
-
-from pydantic import Field
 
 from dragchain.statistics.estimate import CONFIDENCE, Estimate, Verdict
 from dragdeck.documents import Document, Part
@@ -45,60 +44,22 @@ class Expectation(Part):
     within: tuple[float, float] | None = None
 
 
-class BandPoint(Part):
-    """A point of a curve with its 95 % confidence interval.
-
-    Attributes
-    ----------
-    x : float
-        Value of the field.
-    value, ci95_low, ci95_high : float
-        Drag and its interval, N.
-    """
-
-    x: float
-    value: float
-    ci95_low: float
-    ci95_high: float
-
-
 class FittedLaw(Part):
-    """A power law fitted to the levels from `lowest` to `highest`.
+    """A power law fitted to the levels at which its exponent is expected.
 
     Attributes
     ----------
-    change_per_decade : Estimate
-        Relative change of the drag for ten times the level.
-    centre : float
-        Geometric mean of the levels.
-    degrees : int
-        Degrees of freedom of the intervals.
-    residual_std, bed_fraction : float
-        Standard deviation of a run about the law, of the logarithm, and the fraction of this
-        variance that is common to runs with the same packing.
     exponent : Estimate
         Fitted exponent.
-    drag_at_centre_n : Estimate
-        Drag at `centre`, N.
-    from, to : float
-        Lowest and highest level.
+    change_per_decade : Estimate
+        Relative change of the drag for ten times the level.
     runs : int
         Number of runs.
-    curve : tuple of BandPoint
-        The law with its confidence band.
     """
 
     exponent: Estimate
     change_per_decade: Estimate
-    centre: float
-    drag_at_centre_n: Estimate
-    lowest: float = Field(alias="from")
-    highest: float = Field(alias="to")
     runs: int
-    degrees: int
-    residual_std: float
-    bed_fraction: float
-    curve: tuple[BandPoint, ...]
 
 
 class Level(Part):
@@ -211,6 +172,12 @@ class ScalingFile(Document):
     started: str | None
     engine: str | None
     cpu_time_s: float | None
+
+    @property
+    def fitted(self) -> tuple[ScaledRun, ...]:
+        """The runs that the law is fitted to."""
+        low, high = self.expected.within or (0.0, math.inf)
+        return tuple(run for run in self.runs if low <= run.level <= high)
 
     @property
     def axis(self) -> Axis:

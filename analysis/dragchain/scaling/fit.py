@@ -1,9 +1,8 @@
 """How the mean drag depends on one field of a study: runs, power law and its figure."""
 
-import html
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
@@ -17,19 +16,11 @@ from dragchain.errors import SeriesError, TableError
 from dragchain.figures.panels import legend_below, log_ticks, new_panels
 from dragchain.figures.style import BLUE, INK, ORANGE, WIDTH_IN, drawing, png
 from dragchain.quantities.document import MEASURED_FILE, RunQuantities
-from dragchain.report.page import page_environment
 from dragchain.run.case import changed_inputs, study_of
 from dragchain.run.kinematics import motion_of, needed
-from dragchain.scaling.document import (
-    BandPoint,
-    Expectation,
-    FittedLaw,
-    Level,
-    ScaledRun,
-    ScalingFile,
-)
+from dragchain.scaling.document import Expectation, FittedLaw, Level, ScaledRun, ScalingFile
 from dragchain.statistics.bed_effects import EffectsFit, fit_effects
-from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate, flattened
+from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate, EstimateColumns
 from dragdeck.files import write_bytes, write_text
 from dragdeck.records.case import CaseOfRun, load_case
 from dragdeck.records.run import RunRecord
@@ -222,7 +213,11 @@ def find(
             if expected.exponent is None
             else law.exponent.agrees_with(expected.exponent)
         ),
-        fit=_fitted(law, len(fitted)),
+        fit=FittedLaw(
+            exponent=law.exponent,
+            change_per_decade=law.exponent.exp(factor=math.log(10.0), minus=1.0),
+            runs=len(fitted),
+        ),
         eta=_mean_eta(fitted),
         levels=tuple(_level(law, x, [run for run in runs if run.row.level == x]) for x in levels),
         runs=tuple(run.row for run in runs),
@@ -236,24 +231,6 @@ def find(
         started=min((record.started for record in records), default=None),
         engine=records[0].engine_version if records else None,
         cpu_time_s=sum(record.cpu_time_s for record in records) if records else None,
-    )
-
-
-def _fitted(law: PowerLaw, runs: int) -> FittedLaw:
-    lowest, highest = (float(end) for end in law.levels[[0, -1]])
-    curve = (float(x) for x in np.geomspace(lowest, highest, _CURVE_POINTS))
-    return FittedLaw(
-        exponent=law.exponent,
-        change_per_decade=law.exponent.exp(factor=math.log(10.0), minus=1.0),
-        centre=law.centre,
-        drag_at_centre_n=law.at(law.centre),
-        lowest=lowest,
-        highest=highest,
-        runs=runs,
-        degrees=law.fit.degrees,
-        residual_std=law.fit.residual_std,
-        bed_fraction=law.fit.bed_fraction,
-        curve=tuple(BandPoint(x=x, **asdict(law.at(x))) for x in curve),
     )
 
 
@@ -326,8 +303,7 @@ def write_scaling(
 
 def table(scaling: ScalingFile) -> pd.DataFrame:
     """The levels of a scaling, one row each."""
-    rows = [flattened(dict(level)) for level in scaling.levels]
-    return pd.DataFrame(rows).rename(columns={"x": scaling.field})
+    return pd.DataFrame(map(dict, scaling.levels)).rename(columns={"x": scaling.field})
 
 
 def read_scalings() -> list[ScalingFile]:
@@ -340,12 +316,21 @@ def read_scalings() -> list[ScalingFile]:
 
 
 def said(scaling: ScalingFile) -> str:
-    """What a scaling says in words, one remark per line."""
-    words = page_environment().get_template("scaling/words.html.j2").module
-    statement, remarks = (str(getattr(words, name)(scaling)) for name in ("statement", "remarks"))
-    lines = [f"{scaling.field}: {statement.strip()}"]
-    lines += [f"  {line}" for line in remarks.splitlines() if line]
-    return html.unescape("\n".join(lines))
+    """The exponent, and whether its confidence interval contains the expected one."""
+    expected = scaling.expected
+    words = f"{scaling.field}: exponent {_rounded(scaling.fit.exponent)}"
+    if expected.exponent is None:
+        return words
+    source = f" ({expected.source})" if expected.source else ""
+    return f"{words}; expected {expected.exponent:g}{source}: {scaling.verdict}"
+
+
+def _rounded(exponent: Estimate) -> str:
+    value, low, high = (
+        f"{round(number, 2) + 0.0:.2f}"
+        for number in (exponent.value, exponent.ci95_low, exponent.ci95_high)
+    )
+    return f"{value} ({low} to {high})"
 
 
 # --- the figure ------------------------------------------------------------------------------
@@ -376,26 +361,21 @@ def draw_scalings(scalings: Sequence[ScalingFile]) -> Figure:
 
 
 def _title(scaling: ScalingFile) -> str:
-    exponent, expected = scaling.fit.exponent, scaling.expected.exponent
-    value, low, high = (
-        f"{round(number, 2) + 0.0:.2f}"
-        for number in (exponent.value, exponent.ci95_low, exponent.ci95_high)
-    )
-    words = f"exponent {value} ({low} to {high})"
+    words, expected = f"exponent {_rounded(scaling.fit.exponent)}", scaling.expected.exponent
     return words if expected is None else f"{words}, expected {expected:g}: {scaling.verdict}"
 
 
 def _law(axes: Axes, scaling: ScalingFile, factor: float) -> None:
-    law = scaling.fit
-    x = factor * np.array([point.x for point in law.curve])
-    low, drag, high = (
-        [getattr(point, name) for point in law.curve] for name in ("ci95_low", "value", "ci95_high")
-    )
+    law = fit_power_law(scaling.fitted)
+    level = np.geomspace(law.levels[0], law.levels[-1], _CURVE_POINTS)
+    drag = EstimateColumns.of([law.at(float(x)) for x in level])
+    x = factor * level
+    low, high = drag.ci95_low, drag.ci95_high
     axes.fill_between(x, low, high, color=BLUE, alpha=0.15, lw=0, label="95 % confidence band")
-    axes.plot(x, drag, color=BLUE, lw=1.8, label="fitted power law")
+    axes.plot(x, drag.value, color=BLUE, lw=1.8, label="fitted power law")
     if scaling.expected.exponent is not None:
         slope = (x / (factor * law.centre)) ** scaling.expected.exponent
-        slope *= law.drag_at_centre_n.value
+        slope *= law.at(law.centre).value
         axes.plot(x, slope, "--", color=ORANGE, lw=1.4, label="expected slope")
 
 
