@@ -32,9 +32,6 @@ _LEAST_NOISE = 1e-4
 _REFUSED_LIMIT, _REFUSED_SE = 0.5, 0.05
 """Of the response that is 1 where a setting was refused, and else 0."""
 
-_DRAWS = 200
-"""Simulated sets of measurements."""
-
 
 @dataclass(frozen=True)
 class Trials:
@@ -118,20 +115,6 @@ class Response:
         mean, error = self._process.predict(places, return_std=True)
         return centre + spread * mean, spread * error
 
-    def measured_again(self, places: Floats) -> Floats:
-        """Expectations at (M, D) places after other measurements of the same places, (M, draws).
-
-        Each draw has the expectation as the true response, and errors of their own.
-        """
-        from sklearn.base import clone
-
-        centre, spread = self._scale
-        truth, noise = self._process.predict(self.places), np.random.default_rng(0)
-        scatter = (self.errors / spread)[:, None] * noise.normal(size=(len(truth), _DRAWS))
-        again = clone(self._process).set_params(kernel=self._process.kernel_, optimizer=None)
-        mean = again.fit(self.places, truth[:, None] + scatter).predict(places)
-        return np.asarray(centre + spread * mean)
-
 
 @dataclass(frozen=True)
 class Responses:
@@ -156,12 +139,6 @@ class Responses:
         mean, error = (np.stack(columns, axis=1) for columns in zip(*each, strict=True))
         return mean, error
 
-    def measurement(self, place: Floats) -> tuple[float, float]:
-        """What a new measurement at a place (D,) is expected to be, and its standard error."""
-        mean, error = (columns[0, 0] for columns in self.predict(place[None]))
-        nearest = ((self.trials.known - place) ** 2).sum(axis=1).argmin()
-        return float(mean), float(np.hypot(error, self._each[0].errors[nearest]))
-
     def allowed(self, places: Floats) -> Floats:
         """Logarithm of the probability that (M, D) places meet all limits, each apart, (M,)."""
         mean, error = self.predict(places)
@@ -176,18 +153,6 @@ class Responses:
         """Whether all limits are expected to be met at (M, D) places, (M,)."""
         mean, _ = self.predict(places)
         return ((mean >= self.trials.low) & (mean <= self.trials.high)).all(axis=1)
-
-    def optimism(self, places: Floats) -> float:
-        """By how much the least expectation at (M, D) places is too small, on average.
-
-        The least of many uncertain values is so partly by chance: measured again, with the
-        expectation as the truth, the least one is chosen anew and compared with that truth
-        (parametric bootstrap, Efron and Tibshirani 1993).
-        """
-        truth, _ = self._each[0].predict(places)
-        again = self._each[0].measured_again(places)
-        least = again.argmin(axis=0)
-        return float(np.mean(truth[least] - again.min(axis=0)))
 
 
 def spread_places(count: int, dimensions: int, seed: int) -> Floats:
@@ -222,35 +187,15 @@ def propose(trials: Trials, seed: int) -> Floats:
     return np.asarray(places[(np.log(np.maximum(gain, 1e-300)) + model.allowed(places)).argmax()])
 
 
-@dataclass(frozen=True)
-class BestPlace:
-    """The best place by the model.
-
-    Attributes
-    ----------
-    place : (D,) ndarray
-    value, error : float
-        What a new measurement there is expected to be, and its standard error.
-    """
-
-    place: Floats
-    value: float
-    error: float
-
-
-def best_place(trials: Trials, accepted: Callable[[Floats], bool]) -> BestPlace | None:
-    """The place of the least expected response where all limits are expected to be met.
+def best_place(trials: Trials, accepted: Callable[[Floats], bool]) -> Floats | None:
+    """The place, (D,), of the least expected response where all limits are expected to be met.
 
     Where that is nowhere, of the largest probability that they do; None if none is accepted.
     """
     model = trials.responses
     places = np.vstack([trials.known, candidates(trials.places.shape[1])])
-    meets, allowed = model.meets(places), model.allowed(places)
+    meets = model.meets(places)
     mean = model.predict(places)[0][:, 0]
-    rank = np.where(meets, mean, np.inf) if meets.any() else -allowed
-    for k in np.argsort(rank, kind="stable")[:200]:
-        if np.isfinite(rank[k]) and accepted(places[k]):
-            more = model.optimism(places[meets]) if meets.any() else 0.0
-            value, error = model.measurement(places[k])
-            return BestPlace(places[k], value + more, error)
-    return None
+    rank = np.where(meets, mean, np.inf) if meets.any() else -model.allowed(places)
+    best = (k for k in np.argsort(rank, kind="stable")[:200] if np.isfinite(rank[k]))
+    return next((places[k] for k in best if accepted(places[k])), None)

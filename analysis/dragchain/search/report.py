@@ -82,47 +82,26 @@ def advance(
 class SearchRow:
     """A point on the page.
 
-    `objective` and `limits` are as measured; `predicted` is what the model expected of them before
-    the run, of the distance from the value where the goal is a target.
+    `objective` and `limits` are as measured.
     """
 
     number: int
     point: SearchPoint
     objective: Estimate | None
     limits: tuple[Estimate, ...]
-    predicted: Estimate | None
     verdicts: Sequence[Verdict]
     as_good: bool
-
-
-def _signed(findings: SearchFindings, value: float, error: float) -> Estimate:
-    """An expectation of the model in the unit of the objective."""
-    sign = -1.0 if findings.studied.search.objective.goal == "maximise" else 1.0
-    return t_interval(sign * value, error, findings.degrees)
 
 
 def rows_of(findings: SearchFindings) -> list[SearchRow]:
     """The points in the order of the search."""
     rows = []
     for k, point in enumerate(findings.points):
-        known = (
-            []
-            if point.refused
-            else [findings.estimate(k, m) for m in range(findings.means.shape[1])]
-        )
-        said = None
-        if point.predicted is not None and point.predicted_se is not None:
-            said = _signed(findings, point.predicted, point.predicted_se)
+        measures = range(0 if point.refused else findings.means.shape[1])
+        objective, *limits = [findings.estimate(k, measure) for measure in measures] or [None]
+        verdicts = [] if point.refused else findings.verdict(k)
         rows.append(
-            SearchRow(
-                k + 1,
-                point,
-                known[0] if known else None,
-                tuple(known[1:]),
-                said,
-                findings.verdict(k) if known else (),
-                k in findings.as_good,
-            )
+            SearchRow(k + 1, point, objective, tuple(limits), verdicts, k in findings.as_good)
         )
     return rows
 
@@ -136,7 +115,7 @@ def at_bounds(findings: SearchFindings, point: SearchPoint) -> list[str]:
 
 
 def draw_search(findings: SearchFindings, rows: list[SearchRow]) -> dict[str, Figure]:
-    """The path of the search, the response along each field, and predicted against measured."""
+    """The path of the search, and the response along each field."""
     objective = fill(label(findings.studied.search.objective), 30)
     path, (axes,) = new_panels(3.2, width_in=WIDE_IN)
     for purpose, marker in zip(_COLOURS, MARKERS, strict=False):
@@ -159,26 +138,15 @@ def draw_search(findings: SearchFindings, rows: list[SearchRow]) -> dict[str, Fi
             along[:, k] = np.linspace(0, 1, 101)
             mean, error = (columns[:, 0] for columns in model.predict(along))
             x = np.linspace(low, high, 101)
-            each = [_signed(findings, *pair) for pair in zip(mean, error, strict=True)]
-            axes.plot(x, [prediction.value for prediction in each], color=GREEN)
-            columns = EstimateColumns.of(each)
-            band(axes, x, Estimate(0.0, columns.ci95_low, columns.ci95_high), GREEN)  # type: ignore[arg-type]
+            sign = -1.0 if findings.studied.search.objective.goal == "maximise" else 1.0
+            pairs = zip(sign * mean, error, strict=True)
+            columns = EstimateColumns.of([t_interval(*pair, findings.degrees) for pair in pairs])
+            axes.plot(x, columns.value, color=GREEN)
+            band(axes, x, columns, GREEN)
             drawn = [row for row in rows if row.objective and not row.point.confirms]
             _bars(axes, [row.point.values[field] for row in drawn], drawn, "model", "o")
             axes.axvline(low + at[k] * (high - low), color=RED, ls=":")
             axes.set(xlabel=field, ylabel="" if k % 3 else objective)
-    said = [row for row in rows if row.predicted and row.objective]
-    if said and findings.studied.search.objective.goal != "target":
-        figures["predicted"], (axes,) = new_panels(3.6, width_in=4.6)
-        for row in said:
-            assert row.predicted and row.objective
-            colour = _COLOURS[row.point.purpose]
-            axes.errorbar(row.predicted.value, row.objective.value, row.objective.half_width,
-                          row.predicted.half_width, fmt="o", color=colour)  # fmt: skip
-        first = said[0].predicted
-        assert first
-        axes.axline((first.value, first.value), slope=1, color=GREY)
-        axes.set(xlabel="predicted before the run", ylabel="measured")
     return figures
 
 
@@ -223,7 +191,6 @@ def write_search(out_dir: Path, findings: SearchFindings) -> None:
                 "fidelity": row.point.values.get("fidelity", ""),
                 search.objective.quantity: row.objective or math.nan,
                 **{f"limit_{k}": value for k, value in enumerate(row.limits, 1)},
-                "predicted": row.predicted or math.nan,
                 "as_good": row.as_good,
                 "refused": row.point.refused,
             }

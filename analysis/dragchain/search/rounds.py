@@ -39,6 +39,7 @@ from dragdeck.study.model import Study
 from dragdeck.study.search import (
     RECORD,
     Objective,
+    Purpose,
     Search,
     SearchedMeasure,
     SearchLimit,
@@ -383,10 +384,10 @@ def next_points(findings: SearchFindings) -> list[SearchPoint]:
         and len(chosen) < _MOST_REFUSED
     ):
         seed = search.seed + 1000 * len(findings.points) + len(chosen)
-        point = _point(studied, propose(trials, seed), number, "model", findings.trials)
+        point = _point(studied, propose(trials, seed), number, "model")
         if any(point.values == other.values for other in (*findings.points, *chosen)):
             place = np.random.default_rng(seed).random(len(search.vary))
-            point = _point(studied, place, number, "model", findings.trials)
+            point = _point(studied, place, number, "model")
         place = studied.place(point.values)
         gone = bool(point.refused)
         trials = trials.joined(place, math.nan, math.nan) if gone else trials.believing(place)
@@ -403,16 +404,10 @@ def _stuck(studied: SearchedStudy, problem: str, value: str = "") -> InputError:
     )
 
 
-def _point(
-    studied: SearchedStudy, place: Floats, number: int, purpose: Any, trials: Trials | None = None
-) -> SearchPoint:
+def _point(studied: SearchedStudy, place: Floats, number: int, purpose: Purpose) -> SearchPoint:
     values = studied.values_at(place)
-    said: dict[str, float] = {}
-    if trials is not None:
-        value, error = trials.responses.measurement(studied.place(values))
-        said = {"predicted": value, "predicted_se": error}
     return SearchPoint(
-        values=values, round=number, purpose=purpose, refused=studied.refusal(values), **said
+        values=values, round=number, purpose=purpose, refused=studied.refusal(values)
     )
 
 
@@ -428,8 +423,7 @@ def _confirmation(findings: SearchFindings, number: int) -> list[SearchPoint]:
     best = best_place(findings.trials, accepted)
     if best is None:
         raise _stuck(studied, "every setting that the model expects to be good is refused")
-    point = _point(studied, best.place, number, "confirmation")
-    soft = point.model_copy(update={"predicted": best.value, "predicted_se": best.error})
+    soft = _point(studied, best, number, "confirmation")
     if studied.search.confirm == studied.study.fidelity:
         return [soft]
     values = {**soft.values, "fidelity": studied.search.confirm}

@@ -11,11 +11,10 @@ import pytest
 from made_study import Load
 from pages import stands_alone
 
-from dragchain.search import proposals, report, rounds
+from dragchain.search import report, rounds
 from dragchain.search.proposals import Responses, Trials, best_place, propose, spread_places
 from dragchain.search.report import advance, at_bounds
 from dragchain.search.rounds import SearchedStudy, read_findings
-from dragchain.statistics.estimate import t_interval
 from dragdeck.cli import main
 from dragdeck.errors import InputError
 from dragdeck.project import Project
@@ -48,22 +47,20 @@ def test_the_best_place_is_that_of_the_model_within_the_limit() -> None:
     known = trials(30)
     best = best_place(known, lambda place: True)
     assert best is not None
-    np.testing.assert_allclose(best.place, BEST, atol=0.12)
-    mean, error = Responses(known).predict(best.place[None])
-    assert abs(mean[0] - truth(best.place)) == pytest.approx([0, 0], abs=3 * error[0].max())
+    np.testing.assert_allclose(best, BEST, atol=0.12)
+    mean, error = Responses(known).predict(best[None])
+    assert abs(mean[0] - truth(best)) == pytest.approx([0, 0], abs=3 * error[0].max())
     assert error[0, 0] < SD[0]  # it knows that neighbours have noise of their own
-    assert best.error == pytest.approx(math.hypot(error[0, 0], SD[0]))  # a measurement has its own
-    assert 0 < abs(best.value - mean[0, 0]) < error[0, 0]  # corrected for its selection
     other = best_place(known, lambda place: place[1] > 0.3)
-    assert other is not None and other.place[1] > 0.3
+    assert other is not None and other[1] > 0.3
 
 
 def test_where_no_limit_holds_the_most_probable_place_is_taken() -> None:
     known = trials(12)
     out = Trials(known.places, known.values, known.errors, known.low, np.array([np.inf, -9.0]))
     best, tried = best_place(out, lambda place: True), propose(out, 1)
-    assert best is not None and not out.responses.meets(best.place[None])[0]
-    assert best.place.sum() < 0.3 and tried.sum() < 0.3
+    assert best is not None and not out.responses.meets(best[None])[0]
+    assert best.sum() < 0.3 and tried.sum() < 0.3
 
 
 @pytest.mark.slow
@@ -73,38 +70,6 @@ def test_proposals_follow_from_the_trials_and_keep_off_what_was_refused() -> Non
     assert (propose(known, 3) == first).all()
     assert first[0] < 0.75
     assert Responses(known).allowed(first[None])[0] > math.log(0.2)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("curvature", [3.0, 0.0])
-def test_a_new_measurement_lies_in_its_interval_as_often_as_stated(
-    curvature: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Of 200 searches with a planted truth, a bowl or a plain."""
-    monkeypatch.setattr(proposals, "_CANDIDATES", 8)
-    noise = 0.2
-
-    def planted(at: np.ndarray) -> Any:
-        return curvature * ((at - 0.4) ** 2).sum(axis=-1)
-
-    rng, count, inside, away = np.random.default_rng(11), 200, 0, np.zeros(200)
-    raw = away.copy()
-    for k in range(count):
-        places = spread_places(14, 2, k)
-        packings = planted(places)[:, None] + noise * rng.normal(size=(14, 2))
-        error = math.sqrt(packings.var(axis=1, ddof=1).mean() / 2)
-        values, none = packings.mean(axis=1)[:, None], np.array([np.inf])
-        known = Trials(places, values, np.full((14, 1), error), -none, none)
-        best = best_place(known, lambda place: True)
-        assert best is not None
-        true = float(planted(best.place))
-        again = true + noise / math.sqrt(2) * rng.normal()
-        inside += t_interval(best.value, best.error, 14).contains(again)
-        mean, model_error = known.responses.predict(best.place[None])
-        away[k], raw[k] = (true - np.array([best.value, mean[0, 0]])) / model_error[0, 0]
-    assert 0.91 * count <= inside <= 0.99 * count  # 93 to 97 % within three standard errors
-    assert raw.mean() > 0.35  # what the correction is for
-    assert abs(away.mean()) < 0.9 * raw.mean()
 
 
 # --- rounds --------------------------------------------------------------------------------------
@@ -162,7 +127,6 @@ def test_a_search_finds_the_best_setting_and_resumes_as_if_never_stopped(
     assert full.values["fidelity"] == "full" and full.purpose == "confirmation"
     place = studied.place(full.values)
     assert truth(place)[0] < 0.45 and truth(place)[1] < LIMIT + 0.05
-    assert full.predicted == pytest.approx(truth(place)[0], abs=4 * (full.predicted_se or 0))
     # every run is one of an ordinary case, and none is there twice
     cases = project.cases("small")
     assert len(engine.runs) == len(set(engine.runs)) == len(cases) == 3 * len(points)

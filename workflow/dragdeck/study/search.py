@@ -198,8 +198,6 @@ class SearchPoint(Part):
     round : int
         In which it was chosen, from 1.
     purpose : Purpose
-    predicted, predicted_se : float or None
-        Objective and its standard error by the model before the run.
     refused : str
         Why no run of it counts; empty if there is no reason.
     ran : bool
@@ -209,8 +207,6 @@ class SearchPoint(Part):
     values: Mapping[str, Any]
     round: int
     purpose: Purpose
-    predicted: float | None = None
-    predicted_se: float | None = None
     refused: str = ""
     ran: bool = False
 
