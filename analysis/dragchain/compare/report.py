@@ -7,6 +7,7 @@ are taken packing by packing, so that what the packings have in common cancels.
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations, product
@@ -19,12 +20,11 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 from pydantic import JsonValue
 
 from dragchain.arrays import Floats
 from dragchain.drag import circumference
-from dragchain.errors import TableError
+from dragchain.errors import SeriesError, TableError
 from dragchain.figures.panels import head, new_panels
 from dragchain.figures.style import MARKERS, SERIES, WIDE_IN, force_map
 from dragchain.quantities.along import MAP_AZIMUTHS, MAP_DEPTHS
@@ -34,12 +34,9 @@ from dragchain.report.campaign import write_report
 from dragchain.report.cases import ReportedCase, StudyRuns, cases_of, read_study_runs
 from dragchain.report.page import NETWORK_PAGE, TIMES, render_page, with_interval, write_bundle
 from dragchain.run.case import changed_inputs
-from dragchain.statistics.bed_effects import fit_effects
+from dragchain.statistics.bed_effects import Factors, fit_effects
 from dragchain.statistics.estimate import Estimate, flattened, mean_of
 from dragchain.tables.by_step import read_table
-
-_LARGEST_MODEL = 4
-"""Factors whose interactions are estimated at most."""
 
 
 @dataclass(frozen=True)
@@ -203,11 +200,13 @@ def effects_of(
 ) -> list[FactorEffect]:
     """Main effects and interactions of two factors on a quantity, by least squares.
 
-    Every level of a factor has a coefficient of its own, so that no shape of the response is
+    Every combination of levels has a coefficient of its own, so that no shape of the response is
     assumed; numbers are ordered, others are as they come. A packing that all cases share is a
-    block. Interactions are left out where too few runs remain for the scatter.
+    block. Where too few runs remain for the scatter, the effects of single factors are added up.
     """
-    columns = {name: _ordered(levels) for name, levels in factors.items()}
+    levels = {name: _levels(column) for name, column in factors.items()}
+    settings = [dict(zip(factors, map(str, row), strict=True))
+                for row in zip(*factors.values(), strict=True)]  # fmt: skip
     values = [
         (number, seed, standing.run.value)
         for number, case in enumerate(cases)
@@ -221,61 +220,44 @@ def effects_of(
     shared = all(case.by_seed.keys() == cases[0].by_seed.keys() for case in cases)
     packings = list(dict.fromkeys(seeds))[1:] if shared else []
     blocks = np.array([[float(seed == packing) for packing in packings] for seed in seeds])
-    pairs = list(combinations(columns, 2)) if len(columns) <= _LARGEST_MODEL else []
-    singles = [(name,) for name in columns]
-    for terms in ([*singles, *pairs], singles):
-        changes = [change for term in terms for change in _changes(term, columns)]
-        of_cases = np.column_stack([np.ones(len(cases)), *(_at(c, columns) for c in changes)])
-        design = np.hstack([of_cases[list(numbers)], blocks])
-        if np.linalg.matrix_rank(design) == design.shape[1] < len(design):
+    reference = {name: known[0] for name, known in levels.items()}
+    for additive in (False, True):
+        model = Factors([settings[number] for number in numbers], reference, additive)
+        design = np.hstack([model.design(), blocks])
+        with suppress(SeriesError):
+            fit = fit_effects(design, np.array(measured), range(len(design)))
             break
     else:
         return []
-    fit = fit_effects(design, np.array(measured), range(len(design)))
+    of_cases = np.array([model.row(setting) for setting in settings])
+    terms = [[name] for name in levels] + ([] if additive else [*combinations(levels, 2)])
     effects = []
-    for change in changes:
-        weights = np.append(_contrast(of_cases, columns, change), np.zeros(len(packings)))
-        words = tuple(
-            f"{columns[name][1][0]} to {columns[name][1][level]}" for name, level in change.items()
-        )
-        effects.append(FactorEffect(quantity, tuple(change), words, fit.estimate(weights)))
+    for term in terms:
+        for others in product(*(levels[name][1:] for name in term)):
+            change = {name: (reference[name], other)
+                      for name, other in zip(term, others, strict=True)}  # fmt: skip
+            weights = np.append(_contrast(of_cases, settings, change), np.zeros(len(packings)))
+            words = tuple(" to ".join(both) for both in change.values())
+            effects.append(FactorEffect(quantity, tuple(change), words, fit.estimate(weights)))
     return effects
 
 
-_Columns = Mapping[str, tuple[list[int], list[str]]]
-"""The number of each case's level and the names of the levels, by factor."""
+def _levels(column: Sequence[JsonValue]) -> list[str]:
+    """What the levels of a factor are called, numbers in their order."""
+    if all(isinstance(level, int | float) for level in column):
+        column = sorted(column, key=lambda level: float(str(level)))
+    return list(dict.fromkeys(map(str, column)))
 
 
-def _changes(term: Sequence[str], columns: _Columns) -> list[dict[str, int]]:
-    """Every combination of levels of some factors but their first ones."""
-    others = product(*(range(1, len(columns[name][1])) for name in term))
-    return [dict(zip(term, levels, strict=True)) for levels in others]
-
-
-def _at(levels: Mapping[str, int], columns: _Columns) -> NDArray[np.bool_]:
-    """Which cases have these levels, (cases,)."""
-    alike = [np.equal(columns[name][0], level) for name, level in levels.items()]
-    return np.asarray(np.all(alike, axis=0))
-
-
-def _ordered(levels: Sequence[JsonValue]) -> tuple[list[int], list[str]]:
-    """The number of each case's level, from 0, and what the levels are called."""
-    numeric = all(isinstance(item, int | float) for item in levels)
-    known: list[JsonValue] = []
-    for level in sorted(levels, key=lambda item: float(str(item))) if numeric else levels:
-        if level not in known:
-            known.append(level)
-    return [known.index(item) for item in levels], [str(item) for item in known]
-
-
-def _contrast(of_cases: Floats, columns: _Columns, change: Mapping[str, int]) -> Floats:
+def _contrast(
+    of_cases: Floats, settings: Sequence[Mapping[str, str]], change: Mapping[str, tuple[str, str]]
+) -> Floats:
     """Weights of coefficients: from the first levels to others, averaged over other factors."""
     weights = np.zeros(of_cases.shape[1])
     for ends in product((0, 1), repeat=len(change)):
-        levels = {
-            name: level * end for (name, level), end in zip(change.items(), ends, strict=True)
-        }
-        weights += (-1) ** (len(change) - sum(ends)) * of_cases[_at(levels, columns)].mean(axis=0)
+        levels = {name: change[name][end] for name, end in zip(change, ends, strict=True)}
+        alike = [setting.items() >= levels.items() for setting in settings]
+        weights += (-1) ** (len(change) - sum(ends)) * of_cases[alike].mean(axis=0)
     return weights / len(change)  # of an interaction, half
 
 
