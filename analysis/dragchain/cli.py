@@ -56,15 +56,12 @@ COMMANDS = (
                   help="show forces from green to red, as in Uhlmann et al. (2015) (default: "
                   "colours for every kind of colour vision)"))),
     Command("export", "export a run to ParaView or OVITO",
-            "Export the frames of a run to other programs. It reads the tables of the run and "
-            "writes one file per frame for ParaView, or one file for OVITO.",
-            "export.write:export_command", (
+            "Export the frames of a run to ParaView, whose files OVITO reads too. It reads the "
+            "tables of the run and writes VTP files for each frame with a PVD time series.",
+            "export.write:write_export", (
         RUN_DIR,
-        Argument("--to", required=True, choices=("paraview", "xyz"),
-                  help="paraview: VTP files with a PVD time series; xyz: extended XYZ for OVITO; "
-                  "required"),
         Argument("--out", type=Path, metavar="DIR",
-                  help="folder for the export (default: export/paraview or export/xyz in RUN_DIR)"),
+                  help="folder for the export (default: export/paraview in RUN_DIR)"),
         Argument("--from-time", type=float, metavar="S",
                   help="simulated time of the first frame, s (default: start of the run)"),
         Argument("--to-time", type=float, metavar="S",
@@ -73,7 +70,7 @@ COMMANDS = (
                   help="export every N-th frame only (default: %(default)s)"),
         Argument("--replace", action="store_true",
                   help="overwrite an earlier export (default: refuse to)")),
-            "./run dragchain export results/uhlmann2015/process/RUN --to paraview --every 10"),
+            "./run dragchain export results/uhlmann2015/process/RUN --every 10"),
     Command("project", "project load and removal on a mesh of your own",
             "Project the load on the workpiece, and the removal if the study has a law, onto a "
             "mesh of your own; sums are conserved. It reads the tables of the runs and writes "

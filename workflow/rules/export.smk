@@ -11,4 +11,4 @@ rule export_paraview:
     params:
         source=source_hash("dragchain.export.write"),
     shell:
-        "dragchain export $(dirname {input.run}) --to paraview --replace > {log} 2>&1"
+        "dragchain export $(dirname {input.run}) --replace > {log} 2>&1"

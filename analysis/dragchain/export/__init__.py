@@ -1,1 +1,1 @@
-"""Runs in the formats of other programs: ParaView and OVITO."""
+"""Runs in the format of ParaView, which OVITO reads too."""

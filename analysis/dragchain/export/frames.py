@@ -18,7 +18,6 @@ from dragchain.network.frame import KINDS, PARTICLE, WORKPIECE, NetworkFrame, fr
 from dragchain.tables.by_step import RisingSteps, read_steps
 from dragchain.tables.columns import CONTACTS, KINEMATICS, ORIENTATION
 from dragchain.tables.run_folder import Run, workpiece_places
-from dragdeck.records.case import CaseOfRun
 from dragdeck.study.drive import Orientations
 
 _BODY = {name: body for body, name in KINDS.items()}
@@ -118,23 +117,6 @@ def _contacts(frame: NetworkFrame) -> dict[tuple[int, ...], list[int]]:
 
 
 @dataclass(frozen=True)
-class Selection:
-    """Which frames are wanted.
-
-    Attributes
-    ----------
-    first_s, last_s : float or None
-        First and last simulated time, ``time_s`` of the tables; None: no limit.
-    every : int
-        Every how many frames of that stretch one is taken, beginning with its first.
-    """
-
-    first_s: float | None = None
-    last_s: float | None = None
-    every: int = 1
-
-
-@dataclass(frozen=True)
 class FrameData:
     """One frame: what there is of particles, contacts, chains and the workpiece.
 
@@ -181,8 +163,18 @@ class FrameSeries:
     times_s: Floats
 
     @classmethod
-    def of(cls, run: Run, selection: Selection) -> "FrameSeries":
-        """Find the frames of a selection.
+    def of(
+        cls, run: Run, first_s: float | None = None, last_s: float | None = None, every: int = 1
+    ) -> "FrameSeries":
+        """Find frames.
+
+        Parameters
+        ----------
+        run : Run
+        first_s, last_s : float, optional
+            First and last simulated time, ``time_s`` of the tables; None: no limit.
+        every : int
+            Every how many frames of that stretch one is taken, beginning with its first.
 
         Raises
         ------
@@ -191,20 +183,26 @@ class FrameSeries:
         TableError
             If ``particles.parquet`` is not there.
         """
-        if selection.every < 1:
-            raise ExportError(f"--every must be at least 1, but is {selection.every}")
+        if every < 1:
+            raise ExportError(f"--every must be at least 1, but is {every}")
         if not run.wrote("particles"):
             raise ExportError(
-                f"{run.folder}: this {run.case.scene} run wrote no output particles, so there is"
-                " nothing to export\n  remedy: export a filling or a process that lists "
-                "particles in"
-                " its outputs"
+                f"{run.folder}: this {run.case.scene} run wrote no output particles, so there is "
+                "nothing to export\n  remedy: export a filling or a process that lists particles "
+                "in its outputs"
             )
         steps, times_s = _frame_times(run.file("particles.parquet"))
-        wanted = _inside(times_s, selection, run.case)
+        half = 0.5 * run.case.timestep_s  # no difference
+        low = -np.inf if first_s is None else first_s - half
+        high = np.inf if last_s is None else last_s + half
+        wanted = (times_s >= low) & (times_s <= high)
         if not wanted.any():
-            raise ExportError(_nothing(run, times_s, selection))
-        every = selection.every
+            ends = f"{times_s[0]:g} to {times_s[-1]:g} s" if times_s.size else "no time"
+            raise ExportError(
+                f"{run.folder}: there is no frame from {low:g} to {high:g} s\n"
+                f"  limit:  the {times_s.size} frames are of {ends}\n"
+                "  remedy: give --from-time and --to-time as simulated time, time_s of the tables"
+            )
         return cls(run, steps[wanted][::every], times_s[wanted][::every])
 
     def __len__(self) -> int:
@@ -253,29 +251,6 @@ class FrameSeries:
         for rows in (particles, contacts, chains):
             if rows is not None:
                 rows.finish()
-
-
-def _inside(times_s: Floats, selection: Selection, case: CaseOfRun) -> np.ndarray:
-    """Which times are in the interval; half a step is no difference."""
-    low = -np.inf if selection.first_s is None else selection.first_s
-    high = np.inf if selection.last_s is None else selection.last_s
-    half = 0.5 * case.timestep_s
-    return (times_s >= low - half) & (times_s <= high + half)
-
-
-def _nothing(run: Run, times_s: Floats, selection: Selection) -> str:
-    if not times_s.size:
-        return f"{run.file('particles.parquet')} contains no frames, so there is nothing to export"
-    wanted = [
-        f"{word} {value:g} s"
-        for word, value in (("from", selection.first_s), ("to", selection.last_s))
-        if value is not None
-    ]
-    return (
-        f"{run.folder}: there is no frame {' '.join(wanted)}\n"
-        f"  limit:  the {times_s.size} frames are of {times_s[0]:g} to {times_s[-1]:g} s\n"
-        "  remedy: give --from-time and --to-time as simulated time, time_s of the tables"
-    )
 
 
 # --- tables, step by step --------------------------------------------------------------------

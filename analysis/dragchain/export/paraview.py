@@ -5,7 +5,7 @@ files (``id``, ``radius``, ``v``, ``omega``), so that OVITO opens the same serie
 """
 
 from collections import defaultdict
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import quoteattr
@@ -27,15 +27,18 @@ MAIN = "run.pvd"
 """The file to open: all there is."""
 
 _FRAMES = "frames"
+FILES = (_FRAMES, MAIN, *(f"{part}.pvd" for part in ("particles", "contacts", "workpiece")))
+"""What an export consists of."""
+
 _LOADING = ("mean_pressure_pa", "friction_work_pa", "peak_normal_force_n")
 
 
-def write_paraview(folder: Path, series: FrameSeries, frames: Iterable[FrameData]) -> None:
+def write_paraview(folder: Path, series: FrameSeries) -> None:
     """Write the frames of a series into an empty folder, and the lists of them."""
     workpiece = None if series.run.case.workpiece is None else _loaded_workpiece(series.run)
     listed = defaultdict[str, list[str]](list)
     (folder / _FRAMES).mkdir()
-    for frame_data in frames:
+    for frame_data in series:
         parts = _parts(frame_data, workpiece, with_chains=series.has_chains)
         name = f"{frame_data.step:0{len(str(series.steps[-1]))}d}"
         for part, file in _write_frame(folder / _FRAMES, name, parts).items():

@@ -1,7 +1,5 @@
 """What other programs' readers find in an export is what the tables hold."""
 
-import json
-import shlex
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -14,15 +12,14 @@ import pyvista as pv
 from finished_runs import write_finished_run
 from made_run import with_motion
 from networks import random_frame
-from tiny_run_files import CHAIN_Z_M, LAST, TIMESTEP_S, workpiece_x_m
+from tiny_run_files import LAST, TIMESTEP_S, workpiece_x_m
 
 from dragchain.cli import main
 from dragchain.errors import ExportError, TableError
-from dragchain.export.frames import Membership, Selection, chain_membership
+from dragchain.export.frames import Membership, chain_membership
 from dragchain.export.write import fresh_folder, write_export
 from dragchain.network.chains import WidestPath, dominant_path, peters_rows, widest_paths
-from dragchain.network.frame import WORKPIECE, NetworkFrame, network_frames
-from dragchain.network.statistics import contact_counts
+from dragchain.network.frame import WORKPIECE, NetworkFrame
 from dragchain.network.write import chain_table
 from dragchain.run.workpiece import read_surface
 from dragdeck.records.case import load_case
@@ -51,6 +48,11 @@ def table(run_dir: Path, name: str) -> pd.DataFrame:
     return pd.read_parquet(run_dir / "tables" / f"{name}.parquet")
 
 
+def exported(run_dir: Path, *options: Any, **named: Any) -> Path:
+    """The file to open of an export."""
+    return Path(write_export(run_dir, *options, **named).partition(": ")[2])
+
+
 def series(file: Path) -> dict[float, Any]:
     """Read every time of a PVD file."""
     reader = pv.PVDReader(file)
@@ -65,10 +67,10 @@ def series(file: Path) -> dict[float, Any]:
 
 
 def test_paraview_reads_what_the_tables_hold(run: Path) -> None:
-    done = write_export(run, "paraview")
-    assert done.file == run / "export/paraview/run.pvd"
+    file = exported(run)
+    assert file == run / "export/paraview/run.pvd"
     particles, contacts = table(run, "particles"), table(run, "contacts")
-    found = series(done.file)
+    found = series(file)
     assert list(found) == sorted(set(particles["time_s"])) == [s * TIMESTEP_S for s in STEPS]
     for time_s, blocks in found.items():
         assert blocks.keys() == ["particles", "contacts", "workpiece"]
@@ -93,7 +95,7 @@ def test_paraview_reads_what_the_tables_hold(run: Path) -> None:
 
 
 def test_lines_go_from_centre_to_centre_or_to_the_contact_point(run: Path) -> None:
-    last = list(series(write_export(run, "paraview").file).values())[-1]
+    last = list(series(exported(run)).values())[-1]
     lines, particles = last["contacts"], last["particles"]
     contacts = table(run, "contacts")
     point = contacts[contacts["step"] == LAST][["point_x_m", "point_y_m", "point_z_m"]].to_numpy()
@@ -114,7 +116,7 @@ def test_the_load_map_is_on_the_right_facets(run: Path, missing: int | None) -> 
     loads = 10.0 * np.arange(len(surface.corners))[missing:]
     names = ("mean_pressure_pa", "friction_work_pa", "peak_normal_force_n")
     pd.DataFrame(dict.fromkeys(names, loads)).to_parquet(run / "tables/facets.parquet")
-    mesh = series(write_export(run, "paraview").file)[LAST * TIMESTEP_S]["workpiece"]
+    mesh = series(exported(run))[LAST * TIMESTEP_S]["workpiece"]
     if missing:
         assert mesh.array_names == []
         return
@@ -127,7 +129,7 @@ def test_the_load_map_is_on_the_right_facets(run: Path, missing: int | None) -> 
 def test_chains_mark_particles_and_contacts_where_they_were_searched(run: Path) -> None:
     """The chain from the workpiece over particles 1 and 2 to the side is the only, dominant
     path."""
-    found = series(write_export(run, "paraview").file)
+    found = series(exported(run))
     for step, blocks in zip(STEPS, found.values(), strict=True):
         particles, lines = blocks["particles"], blocks["contacts"]
         on_path = np.isin(particles["id"], [1, 2])
@@ -152,7 +154,7 @@ def test_the_workpiece_turns_with_its_path(run: Path, edit_json) -> None:
     edit_json(run / "case.json", circle)
     force = table(run, "workpiece_force").assign(direction_rad=np.pi / 2)
     force.to_parquet(run / "tables/workpiece_force.parquet")
-    workpiece = series(write_export(run, "paraview").file)[LAST * TIMESTEP_S]["workpiece"]
+    workpiece = series(exported(run))[LAST * TIMESTEP_S]["workpiece"]
     x, y, z = pv.read(run / "workpiece.stl").points.T
     moved = np.column_stack([workpiece_x_m(LAST) - y, x, z + 0.02])
     np.testing.assert_allclose(workpiece.points, moved, atol=1e-8)
@@ -162,7 +164,7 @@ def test_a_frame_without_contacts_has_none(run: Path) -> None:
     contacts = table(run, "contacts")
     contacts[contacts["step"] != 60].to_parquet(run / "tables/contacts.parquet")
     (run / "tables/chains.parquet").unlink()
-    folder = write_export(run, "paraview").file.parent
+    folder = exported(run).parent
     lines = series(folder / "contacts.pvd")
     assert [mesh.n_cells for mesh in lines.values()] == [2, 5, 5, 0, 5, 5]
     particles = series(folder / "particles.pvd")[60 * TIMESTEP_S]
@@ -175,10 +177,7 @@ def test_a_filling_has_particles_only(run: Path, edit_json) -> None:
     bare = {"scene": "filling", "workpiece": None, "motion": None}
     edit_json(run / "case.json", lambda case: case.update(bare))
     edit_json(run / "columns.json", lambda content: content["outputs"].pop("contacts"))
-    for format_ in ("paraview", "xyz"):
-        folder = write_export(run, format_).file.parent
-    assert "Coordination" not in (folder / "run.xyz").read_text()
-    found = series(run / "export/paraview/run.pvd")
+    found = series(exported(run))
     assert {tuple(blocks.keys()) for blocks in found.values()} == {("particles",)}
     assert not (run / "export/paraview/contacts.pvd").exists()
 
@@ -231,78 +230,33 @@ def test_a_chain_that_the_frame_does_not_have_is_an_error(run: Path, other: int)
     chains["particle_ids"] = [[1, other] for _ in range(len(chains))]
     chains.to_parquet(run / "tables/chains.parquet")
     with pytest.raises(TableError, match="a chain of step 40 has a particle or"):
-        write_export(run, "paraview")
-
-
-# --- extended XYZ ----------------------------------------------------------------------------
-
-
-def read_xyz(file: Path) -> list[tuple[dict[str, str], dict[str, np.ndarray]]]:
-    """Read extended XYZ by the letter: each frame's keys, and the columns that it declares."""
-    lines = iter(file.read_text().splitlines())
-    frames = []
-    for count in lines:
-        keys = dict(word.split("=", 1) for word in shlex.split(next(lines)))
-        rows = [next(lines).split(" ") for _ in range(int(count))]
-        words, columns, at = keys["Properties"].split(":"), {}, 0
-        for name, kind, width in zip(words[::3], words[1::3], map(int, words[2::3]), strict=True):
-            read = {"S": str, "I": int, "R": float}[kind]
-            columns[name] = np.array([[read(v) for v in row[at : at + width]] for row in rows])
-            at += width
-        assert all(len(row) == at for row in rows)
-        frames.append((keys, columns))
-    return frames
-
-
-def test_xyz_holds_what_the_tables_hold(run: Path) -> None:
-    done = write_export(run, "xyz")
-    assert done.file == run / "export/xyz/run.xyz"
-    particles = table(run, "particles")
-    frames = read_xyz(done.file)
-    assert [int(keys["Timestep"]) for keys, _ in frames] == list(STEPS)
-    last = None
-    for (keys, columns), last in zip(frames, network_frames(run, (0, LAST)), strict=True):
-        step = int(keys["Timestep"])
-        rows = particles[particles["step"] == step].sort_values("particle_id")
-        assert float(keys["Time"]) == rows["time_s"].iloc[0]
-        workpiece_m = [float(value) for value in keys["workpiece_m"].split()]
-        np.testing.assert_allclose(workpiece_m, [workpiece_x_m(step), 0.0, 0.02], rtol=1e-14)
-        assert keys["pbc"] == "F F F" and "Lattice" not in keys
-        assert list(columns) == [
-            "species", "id", "pos", "velo", "omega", "radius", "Coordination"
-        ]  # fmt: skip
-        assert set(columns["species"].ravel()) == {"X"}
-        np.testing.assert_array_equal(columns["id"].ravel(), rows["particle_id"])
-        np.testing.assert_array_equal(columns["pos"], rows[PLACE])
-        np.testing.assert_array_equal(columns["velo"], rows[SPEED])
-        np.testing.assert_array_equal(columns["omega"], rows[SPIN])
-        np.testing.assert_array_equal(columns["radius"].ravel(), rows["radius_m"])
-        np.testing.assert_array_equal(columns["Coordination"].ravel(), contact_counts(last))
-    assert last is not None and (frames[-1][1]["pos"][:2, 2] == CHAIN_Z_M).all()
+        write_export(run)
 
 
 # --- which frames ----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
-    ("selection", "steps"),
+    ("first_s", "last_s", "every", "steps"),
     [
-        (Selection(first_s=0.04), [40, 60, 80, 100]),
-        (Selection(first_s=0.0401, last_s=0.0801), [40, 60, 80]),
-        (Selection(first_s=0.02, every=3), [20, 80]),
+        (0.04, None, 1, [40, 60, 80, 100]),
+        (0.0401, 0.0801, 1, [40, 60, 80]),
+        (0.02, None, 3, [20, 80]),
     ],
 )
-def test_frames_are_those_asked_for(run: Path, selection: Selection, steps: list[int]) -> None:
-    frames = read_xyz(write_export(run, "xyz", selection=selection).file)
-    assert [int(keys["Timestep"]) for keys, _ in frames] == steps
+def test_frames_are_those_asked_for(
+    run: Path, first_s: float, last_s: float | None, every: int, steps: list[int]
+) -> None:
+    frames = series(exported(run, None, first_s, last_s, every))
+    assert list(frames) == [step * TIMESTEP_S for step in steps]
 
 
 def test_row_groups_and_batches_may_cut_a_frame(run: Path, monkeypatch) -> None:
-    whole = write_export(run, "paraview", run / "whole").file.parent
+    whole = exported(run, run / "whole").parent
     for name in ("particles", "contacts", "workpiece_force", "chains"):
         table(run, name).to_parquet(run / f"tables/{name}.parquet", row_group_size=3)
     monkeypatch.setattr("dragchain.tables.by_step.PIECE_ROWS", 2)
-    cut = write_export(run, "paraview", run / "cut").file.parent
+    cut = exported(run, run / "cut").parent
     files = sorted(file.relative_to(whole) for file in whole.rglob("*.vt*"))
     assert len(files) == 6 * 4
     assert all((whole / file).read_bytes() == (cut / file).read_bytes() for file in files)
@@ -312,78 +266,30 @@ def test_row_groups_and_batches_may_cut_a_frame(run: Path, monkeypatch) -> None:
 
 
 def test_an_interval_without_frames_says_where_they_are(run: Path) -> None:
-    with pytest.raises(ExportError, match=r"no frame from 0.5 s to 0.7 s\n.* of 0 to 0.1 s\n"):
-        write_export(run, "xyz", selection=Selection(0.5, 0.7))
-    with pytest.raises(ExportError, match="--every must be at least 1, but is 0"):
-        write_export(run, "xyz", selection=Selection(every=0))
+    with pytest.raises(ExportError, match=r"(?s)no frame.* of 0 to 0.1 s\n"):
+        write_export(run, None, 0.5, 0.7)
+    with pytest.raises(ExportError, match="--every"):
+        write_export(run, every=0)
 
 
 # --- the folder ------------------------------------------------------------------------------
 
 
-def test_the_list_names_every_file(run: Path) -> None:
-    done = write_export(run, "paraview", selection=Selection(every=2))
-    folder = done.file.parent
-    listed = json.loads((folder / "export.json").read_text())
-    found = {str(file.relative_to(folder)) for file in folder.rglob("*") if file.is_file()}
-    assert set(listed["files"]) == found - {"export.json"}
-    sizes = sum((folder / name).stat().st_size for name in listed["files"])
-    assert listed["bytes"] == done.size == sizes and listed["frames"] == done.frames == 3
-
-
 def test_replacing_takes_the_files_of_the_export_and_no_others(run: Path) -> None:
-    folder = write_export(run, "paraview").file.parent
+    folder = exported(run).parent
     (folder / "mine.pvsm").write_text("a state of ParaView")
-    (folder / "frames/mine.txt").write_text("notes")
-    write_export(run, "paraview", selection=Selection(0.1), replace=True)
+    exported(run, None, 0.1, replace=True)
     assert len(series(folder / "run.pvd")) == 1
     assert (folder / "mine.pvsm").read_text() == "a state of ParaView"
-    assert sorted(file.name for file in (folder / "frames").iterdir()) == [
-        "100", "100.vtm", "mine.txt"
-    ]  # fmt: skip
+    assert sorted(file.name for file in (folder / "frames").iterdir()) == ["100", "100.vtm"]
 
 
-def test_a_file_of_the_user_is_never_written_over(run: Path) -> None:
-    folder = write_export(run, "paraview", selection=Selection(0.1)).file.parent
-    (folder / "frames/000.vtm").write_text("mine")
-    with pytest.raises(ExportError, match=r"000.vtm already exists"):
-        write_export(run, "paraview", replace=True)
-    assert (folder / "frames/000.vtm").read_text() == "mine"
-    assert len(series(folder / "run.pvd")) == 1
-
-
-LISTED = """{"schema": 2, "format": "xyz", "study": "s", "scene": "process", "run": "r",
- "frames": 1, "first_time_s": 0.0, "last_time_s": 0.0, "bytes": 1, "files": ["run.xyz"]}"""
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("{}", "schema: "),
-        (LISTED.replace("run.xyz", "../mine.txt"), "names files of other folders"),
-    ],
-)
-def test_a_list_that_is_none_removes_nothing(run: Path, text: str, message: str) -> None:
-    folder = write_export(run, "xyz").file.parent
-    (folder.parent / "mine.txt").write_text("notes")
-    (folder / "export.json").write_text(text)
-    with pytest.raises(ExportError, match=message):
-        write_export(run, "xyz", replace=True)
-    assert (folder.parent / "mine.txt").exists() and (folder / "run.xyz").exists()
-
-
-@pytest.mark.parametrize("replace", [False, True])
-def test_a_folder_with_other_files_is_left_alone(run: Path, tmp_path: Path, replace: bool) -> None:
-    mine = tmp_path / "mine"
-    mine.mkdir()
-    write_export(run, "xyz", mine)
-    shutil.move(mine / "run.xyz", mine / "export.json")
-    (mine / "export.json").rename(mine / "data.xyz")
-    with pytest.raises(ExportError, match="files that are not an export"):
-        write_export(run, "xyz", mine, replace=replace)
-    with pytest.raises(ExportError, match="is a file, not a folder"):
-        write_export(run, "xyz", mine / "data.xyz", replace=replace)
-    assert [file.name for file in mine.iterdir()] == ["data.xyz"]
+def test_a_folder_with_other_files_is_left_alone(run: Path, tmp_path: Path) -> None:
+    (tmp_path / "data.txt").write_text("mine")
+    for target, problem in ((tmp_path, "not an export"), (tmp_path / "data.txt", "not a folder")):
+        with pytest.raises(ExportError, match=problem):
+            write_export(run, target, replace=True)
+    assert (tmp_path / "data.txt").read_text() == "mine"
 
 
 def test_nothing_is_left_of_an_export_that_ends_early(tmp_path: Path) -> None:
@@ -393,25 +299,13 @@ def test_nothing_is_left_of_an_export_that_ends_early(tmp_path: Path) -> None:
     assert not any((tmp_path / "a").iterdir())
 
 
-def test_no_more_is_written_than_the_disk_has_room_for(run: Path, monkeypatch) -> None:
-    usage = shutil.disk_usage(run)._replace(free=20_000)
-    monkeypatch.setattr("shutil.disk_usage", lambda folder: usage)
-    told: list[str] = []
-    with pytest.raises(
-        ExportError, match=r"not enough free disk space for 6 frames\n.*\n.* 0 MB are free"
-    ):
-        write_export(run, "paraview", report=told.append)
-    assert told[0].startswith("6 frames, about 0.")
-    assert not any((run / "export").iterdir())
-
-
 # --- the command -----------------------------------------------------------------------------
 
 
 def test_the_command_replaces_only_when_asked(run: Path, tmp_path: Path, capsys) -> None:
-    arguments = ["export", str(run), "--to", "xyz", "--out", str(tmp_path / "out"), "--every", "2"]
+    arguments = ["export", str(run), "--out", str(tmp_path / "out"), "--every", "2"]
     assert main([*arguments, "--from-time", "0.04", "--to-time", "0.08"]) == 0
-    assert f"2 frames, 0.0 MB: {tmp_path / 'out/run.xyz'}" in capsys.readouterr().out
+    assert f"2 frames: {tmp_path / 'out/run.pvd'}" in capsys.readouterr().out
     assert main(arguments) == 1
     assert "already contains an export" in capsys.readouterr().err
     assert main([*arguments, "--replace"]) == 0
