@@ -17,8 +17,7 @@ def frame(names: Sequence[str], rows: Any, step: int = 100) -> Frame:
 
 
 def wall(
-    forces: Any = (), points: Any = None, normals: Any = None, evaluated: Any = None,
-    silent: Any = None,
+    forces: Any = (), points: Any = None, normals: Any = None, silent: Any = None
 ) -> WallContacts:  # fmt: skip
     """Contacts of particles 1, 2 and so on; what is not given is zero, or the force."""
     force = np.array(forces, dtype=float).reshape(-1, 3)
@@ -28,7 +27,6 @@ def wall(
         facet_id=np.arange(count),
         point_m=none if points is None else np.array(points, dtype=float),
         force_n=force,
-        evaluated_n=force if evaluated is None else np.array(evaluated, dtype=float),
         normal=none if normals is None else np.array(normals, dtype=float),
         surface_m_s=none,
         overlap_m=np.full(count, 1e-6),

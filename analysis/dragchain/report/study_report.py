@@ -29,7 +29,6 @@ from dragchain.run.case import upstream_folders
 from dragchain.run.workpiece import read_surface
 from dragchain.statistics.correlated import RELIABLE_TIMES
 from dragchain.statistics.noisy_map import LARGEST_ERROR
-from dragchain.tables.network_contacts import Corrections
 from dragdeck.errors import DragdeckError
 from dragdeck.files import write_bytes
 from dragdeck.records.advice import OptionEntry
@@ -178,7 +177,6 @@ class RunSection:
     assumptions: list[AssumptionOfRun]
     pictures: dict[str, str]
     network: Path | None
-    corrections: Corrections | None
     costs: list[CostRow]
     cost_source: str | None
 
@@ -282,14 +280,12 @@ def _section(study: StudyRuns, options: Sequence[OptionEntry]) -> RunSection:
     process = study.process
     expected = prediction_for(process.case, options)
     records = {str(run.case.scene): run.record for run in study.runs}
-    corrections = process.folder / "tables" / "corrections.json"
     network = process.folder / NETWORK_PAGE
     return RunSection(
         study=study,
         assumptions=_assumptions(study),
         pictures=dict(picture for run in study.runs for picture in _pictures(run)),
         network=network if network.is_file() else None,
-        corrections=Corrections.read(corrections) if corrections.is_file() else None,
         costs=list(cost_rows(expected, records)) if expected else [],
         cost_source=expected.source if expected else None,
     )

@@ -12,6 +12,7 @@ import math
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,94 +21,6 @@ from scipy.optimize import minimize_scalar
 from dragchain.arrays import Floats
 from dragchain.errors import SeriesError
 from dragchain.statistics.estimate import Estimate, student_quantile, t_interval
-
-
-def same(labels: Sequence[Hashable]) -> Floats:
-    """1 where two runs have the same label, else 0, (N, N)."""
-    numbers = {label: number for number, label in enumerate(dict.fromkeys(labels))}
-    codes = np.array([numbers[label] for label in labels])
-    return np.asarray(codes[:, None] == codes[None, :], dtype=np.float64)
-
-
-def shares_beds(beds: Sequence[Hashable]) -> bool:
-    """Whether there are several beds, and some have several runs."""
-    return 1 < len(set(beds)) < len(beds)
-
-
-def free_degrees(beds: Sequence[Hashable], effects: int) -> int:
-    """Degrees of freedom that some effects leave of N runs; beds that are shared take theirs.
-
-    What the runs from one bed have in common is estimated from the same runs. Where it is much,
-    an effect is as good as one of the differences within the beds, of which there are as many
-    fewer as there are beds, minus one.
-    """
-    return len(beds) - effects - (len(set(beds)) - 1 if shares_beds(beds) else 0)
-
-
-def correlation(same_bed: Floats, fraction: float) -> Floats:
-    """Covariance of runs of which those from the same bed share a part, over the variance."""
-    return np.asarray((1.0 - fraction) * np.eye(len(same_bed)) + fraction * same_bed)
-
-
-@dataclass(frozen=True)
-class Whitened:
-    """A linear model whose residuals are independent and of equal variance.
-
-    Attributes
-    ----------
-    root : (N, N) ndarray
-        Lower Cholesky factor of the covariance.
-    design : (N, P) ndarray
-    values : (N,) ndarray
-        Design and values, each multiplied by the inverse of `root`.
-    """
-
-    root: Floats
-    design: Floats
-    values: Floats
-
-    @classmethod
-    def of(cls, design: Floats, values: Floats, covariance: Floats) -> "Whitened":
-        """Whiten a design (N, P) and values (N,) by their covariance (N, N)."""
-        root = np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
-        left, right = (np.linalg.solve(root, part) for part in (design, values))
-        return cls(root, np.asarray(left), np.asarray(right))
-
-    @cached_property
-    def effects(self) -> Floats:
-        """The effects by least squares, (P,)."""
-        solution = np.linalg.lstsq(self.design, self.values, rcond=None)[0]
-        return np.asarray(solution, dtype=np.float64)
-
-    @cached_property
-    def residuals(self) -> Floats:
-        """What the effects leave, (N,)."""
-        return np.asarray(self.values - self.design @ self.effects)
-
-    @cached_property
-    def square(self) -> float:
-        """Sum of the squared residuals."""
-        return float(np.sum(self.residuals**2))
-
-    @property
-    def degrees(self) -> int:
-        """Runs less effects."""
-        return int(len(self.values) - self.design.shape[1])
-
-    @property
-    def covariance(self) -> Floats:
-        """Covariance of the effects for a variance of one, (P, P)."""
-        return np.asarray(np.linalg.inv(self.design.T @ self.design))
-
-    @property
-    def log_determinants(self) -> float:
-        """What the restricted likelihood takes off for the covariance and for the effects.
-
-        Half of the sum of ``ln |V|`` and ``ln |X' V^-1 X|``, V the covariance and X the design.
-        """
-        _, triangle = np.linalg.qr(self.design)
-        return float(np.log(np.diag(self.root)).sum() + np.log(np.abs(np.diag(triangle))).sum())
-
 
 Combination = tuple[tuple[str, Hashable], ...]
 """Factors and their levels, those of the reference left out."""
@@ -179,25 +92,50 @@ def fit_effects(design: Floats, values: Floats, beds: Sequence[Hashable]) -> Eff
         raise SeriesError(f"{runs} runs are too few to estimate {number} effects: run more seeds")
     if np.linalg.matrix_rank(design) < number:
         raise SeriesError("the effects are confounded: vary one setting at a time as well")
-    same_bed, bed_fraction, degrees = same(beds), 0.0, runs - number
-    left = free_degrees(beds, number)
-    if shares_beds(beds) and left >= 1:
-        bed_fraction, degrees = _best_fraction(design, values, same_bed), left
-    model = Whitened.of(design, values, correlation(same_bed, bed_fraction))
-    variance = model.square / model.degrees
-    covariance = np.asarray(variance * model.covariance)
-    return EffectsFit(model.effects, covariance, degrees, math.sqrt(variance), bed_fraction)
+    codes = np.unique([str(bed) for bed in beds], return_inverse=True)[1]
+    same_bed = np.asarray(codes[:, None] == codes, dtype=np.float64)
+    bed_fraction, degrees, count = 0.0, runs - number, int(codes.max()) + 1
+    # what the runs from one bed have in common is estimated from the same runs: where it is much,
+    # an effect is as good as one of the differences within the beds
+    left = degrees - (count - 1)
+    if 1 < count < runs and left >= 1:
+
+        def loss(fraction: float) -> float:
+            solution = _solved(design, values, same_bed, fraction)
+            square = max(solution.square, 1e-300)
+            return solution.log_determinants + 0.5 * (runs - number) * math.log(square)
+
+        optimum = minimize_scalar(loss, bounds=(0.0, _LARGEST_FRACTION), method="bounded")
+        bed_fraction = float(optimum.x) if optimum.fun < loss(0.0) else 0.0
+        degrees = left
+    solution = _solved(design, values, same_bed, bed_fraction)
+    variance = solution.square / (runs - number)
+    covariance = np.asarray(variance * solution.covariance)
+    return EffectsFit(solution.effects, covariance, degrees, math.sqrt(variance), bed_fraction)
 
 
-def _best_fraction(design: Floats, values: Floats, same_bed: Floats) -> float:
-    """The fraction of the beds that maximises the restricted likelihood at the best variance."""
+class _Solution(NamedTuple):
+    """Effects, their covariance for a variance of one, and the sum of squares that they leave.
 
-    def loss(fraction: float) -> float:
-        model = Whitened.of(design, values, correlation(same_bed, fraction))
-        return model.log_determinants + 0.5 * model.degrees * math.log(max(model.square, 1e-300))
+    `log_determinants` is what the restricted likelihood takes off: half of the sum of ``ln |V|``
+    and ``ln |X' V^-1 X|``, V the covariance and X the design.
+    """
 
-    optimum = minimize_scalar(loss, bounds=(0.0, _LARGEST_FRACTION), method="bounded")
-    return float(optimum.x) if optimum.fun < loss(0.0) else 0.0
+    effects: Floats
+    covariance: Floats
+    square: float
+    log_determinants: float
+
+
+def _solved(design: Floats, values: Floats, same_bed: Floats, fraction: float) -> _Solution:
+    """Least squares of runs of which those from the same bed share a part of their variance."""
+    root = np.linalg.cholesky((1.0 - fraction) * np.eye(len(values)) + fraction * same_bed)
+    white, known = (np.linalg.solve(root, part) for part in (design, values))
+    effects = np.linalg.lstsq(white, known, rcond=None)[0]
+    triangle = np.linalg.qr(white)[1]
+    logs = np.log(np.diag(root)).sum() + np.log(np.abs(np.diag(triangle))).sum()
+    square = float(np.sum((known - white @ effects) ** 2))
+    return _Solution(effects, np.linalg.inv(white.T @ white), square, float(logs))
 
 
 @dataclass(frozen=True)

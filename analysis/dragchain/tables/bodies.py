@@ -81,7 +81,6 @@ class Bodies:
             normal_force_n=along,
             tangential_force_n=np.linalg.norm(force - along[:, None] * normal, axis=1),
             overlap_m=_largest(at, len(first), rows.overlap_m),
-            removed_n=_sum(at, rows.removed_n, len(first)),
         )
 
     def of_spheres(self, contacts: WallContacts) -> WallContacts:

@@ -22,9 +22,7 @@ _FLOOR_N = 1e-3
 """Smaller forces on the workpiece do not serve as the scale of the error."""
 
 
-_COLUMNS = [
-    *("step", "gap_n", "relative", "evaluated_n", "evaluated_relative", "counted", "opening")
-]
+_COLUMNS = ["step", "gap_n", "relative", "opening"]
 """How far the forces of a step miss the force on the workpiece, and what kind of step it is."""
 
 
@@ -36,15 +34,12 @@ class ClosureRecord(Document):
     frames, worst_step, max_relative, max_n
         Frames that were checked, and the worst of them: its step, its error relative to the
         force and in N.
-    opening_frames, opening_max_relative
-        The same of frames that open a file (see `Frame`).
+    opening_frames
+        Frames that open a file (see `Frame`).
     unplaced_forces, unplaced_max_n
         Forces on particles without a contact.
-    silent_contacts, silent_evaluated_max_n
-        Contacts that carry no force, and the largest force that LIGGGHTS evaluated for one.
-    evaluated_max_n, evaluated_counted_max_relative, evaluated_counted_mean_relative
-        Error of the forces that LIGGGHTS evaluated for output; relative in the frames that
-        statistics use, None without any.
+    silent_contacts
+        Contacts that carry no force.
     """
 
     remedy = "make it with: ./run dragchain tables"
@@ -52,21 +47,15 @@ class ClosureRecord(Document):
     verdict: Literal["pass", "fail"]
     problem: str | None
     limit: float
-    force_floor_n: float
     frames: int
     worst_step: int | None
     max_relative: float
     max_n: float
     opening_frames: int
-    opening_max_relative: float
     contacts: int
     unplaced_forces: int
     unplaced_max_n: float
     silent_contacts: int
-    silent_evaluated_max_n: float
-    evaluated_max_n: float
-    evaluated_counted_max_relative: float | None
-    evaluated_counted_mean_relative: float | None
 
 
 @dataclass
@@ -87,14 +76,11 @@ class Closure:
     limit: float = LIMIT
     contacts: int = 0
     silent: int = 0
-    silent_max_n: float = 0.0
     unplaced: int = 0
     unplaced_max_n: float = 0.0
     _parts: list[Floats] = field(default_factory=list)
 
-    def add(
-        self, frames: WorkpieceFrames, workpiece_force_n: Floats, counted: NDArray[np.bool_]
-    ) -> NDArray[np.bool_]:
+    def add(self, frames: WorkpieceFrames, workpiece_force_n: Floats) -> NDArray[np.bool_]:
         """Take in the contacts of F steps.
 
         Parameters
@@ -103,8 +89,6 @@ class Closure:
             The contacts.
         workpiece_force_n : (F, 3) ndarray
             Force on the workpiece at each step; NaN if it was not written.
-        counted : (F,) ndarray of bool
-            Whether statistics use a step.
 
         Returns
         -------
@@ -113,13 +97,11 @@ class Closure:
             applied ones.
         """
         contacts = frames.workpiece
-        silent_n = contacts.evaluated_n[contacts.silent]
         self.contacts += len(contacts)
-        self.silent += len(silent_n)
-        self.silent_max_n = max(self.silent_max_n, _largest(silent_n))
+        self.silent += int(contacts.silent.sum())
         self.unplaced += len(frames.unplaced_n)
         self.unplaced_max_n = max(self.unplaced_max_n, _largest(frames.unplaced_n))
-        errors = _errors(frames, workpiece_force_n, counted)
+        errors = _errors(frames, workpiece_force_n)
         self._parts.append(errors[~np.isnan(workpiece_force_n).any(axis=1)])
         return ~(frames.opening & (errors[:, _COLUMNS.index("relative")] > self.limit))
 
@@ -154,44 +136,31 @@ class Closure:
     def record(self) -> ClosureRecord:
         """The content of ``closure.json``."""
         problem, errors = self.problem(), self._steps(opening=False)
-        opening = self._steps(opening=True)["relative"]
         worst = errors.iloc[int(errors["relative"].argmax())] if len(errors) else None
-        evaluated = errors["evaluated_relative"][errors["counted"] == 1.0].to_numpy()
         return ClosureRecord(
             verdict="pass" if problem is None else "fail",
             problem=problem,
             limit=self.limit,
-            force_floor_n=_FLOOR_N,
             frames=len(errors),
             worst_step=None if worst is None else int(worst["step"]),
             max_relative=0.0 if worst is None else worst["relative"],
             max_n=0.0 if worst is None else worst["gap_n"],
-            opening_frames=len(opening),
-            opening_max_relative=opening.max() if len(opening) else 0.0,
+            opening_frames=len(self._steps(opening=True)),
             contacts=self.contacts,
             unplaced_forces=self.unplaced,
             unplaced_max_n=self.unplaced_max_n,
             silent_contacts=self.silent,
-            silent_evaluated_max_n=self.silent_max_n,
-            evaluated_max_n=errors["evaluated_n"].max() if len(errors) else 0.0,
-            evaluated_counted_max_relative=evaluated.max() if len(evaluated) else None,
-            evaluated_counted_mean_relative=evaluated.mean() if len(evaluated) else None,
         )
 
 
-def _errors(
-    frames: WorkpieceFrames, workpiece_force_n: Floats, counted: NDArray[np.bool_]
-) -> Floats:
-    """The `_COLUMNS` of F frames, (F, 7); NaN where the force on the workpiece was not written."""
-    count, at = len(frames.step), frames.workpiece_at
-    placed = sums(at, frames.workpiece.force_n, count)
-    applied = placed + sums(frames.unplaced_at, frames.unplaced_n, count)
-    evaluated = sums(at, frames.workpiece.evaluated_n, count)
-    scale = np.maximum(_lengths(workpiece_force_n), _FLOOR_N)
-    gap, evaluated_gap = (_lengths(total + workpiece_force_n) for total in (applied, evaluated))
-    relative, evaluated_relative = gap / scale, evaluated_gap / scale
-    of_forces = (gap, relative, evaluated_gap, evaluated_relative)
-    return np.column_stack([frames.step, *of_forces, counted, frames.opening])
+def _errors(frames: WorkpieceFrames, workpiece_force_n: Floats) -> Floats:
+    """The `_COLUMNS` of F frames, (F, 4); NaN where the force on the workpiece was not written."""
+    count = len(frames.step)
+    applied = sums(frames.workpiece_at, frames.workpiece.force_n, count)
+    applied += sums(frames.unplaced_at, frames.unplaced_n, count)
+    gap = _lengths(applied + workpiece_force_n)
+    relative = gap / np.maximum(_lengths(workpiece_force_n), _FLOOR_N)
+    return np.column_stack([frames.step, gap, relative, frames.opening])
 
 
 def _lengths(vectors: Floats) -> Floats:

@@ -1,7 +1,6 @@
 """All contacts of a network frame in one form: point, force on body a, normal part."""
 
-from dataclasses import dataclass, replace
-from typing import Self
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +9,6 @@ from dragchain.arrays import Floats, Ints, places
 from dragchain.errors import TableError
 from dragchain.tables.columns import CENTRE, FLOOR_FORCES, FORCES, SIDE_FORCES
 from dragchain.tables.workpiece_contacts import WallContacts, tangential_force
-from dragdeck.documents import Document
 from dragdeck.dumps.frame import Frame
 from dragdeck.physics.coulomb import within_friction
 from dragdeck.study.contact_law import FrictionLimit
@@ -37,8 +35,6 @@ class ContactRows:
     normal_force_n, tangential_force_n, overlap_m : (N,) ndarray
         Normal part of the force, positive in compression; magnitude of the
         rest; overlap.
-    removed_n : (N,) ndarray
-        What was cut off the tangential force as written; see `within_friction`.
     normal : (N, 3) ndarray
         Unit vector from the contact into body a.
     """
@@ -51,7 +47,6 @@ class ContactRows:
     normal_force_n: Floats
     tangential_force_n: Floats
     overlap_m: Floats
-    removed_n: Floats
     normal: Floats
 
 
@@ -156,9 +151,8 @@ def _particle_particle(
     reduced = first_m * second_m / (first_m + second_m)
     limit = friction.at(first, second)
     attraction = limit.attraction_n(reduced, overlap)
-    force, removed = within_friction(contacts.vectors(*FORCES), -away, limit.friction, attraction)
-    rows = _rows("particle-particle", first, second, point, force, -away, overlap)
-    return replace(rows, removed_n=removed)
+    force, _ = within_friction(contacts.vectors(*FORCES), -away, limit.friction, attraction)
+    return _rows("particle-particle", first, second, point, force, -away, overlap)
 
 
 def _floor(particles: _Particles, force_n: Floats) -> ContactRows:
@@ -228,7 +222,6 @@ def _rows(
         normal_force_n=np.asarray(np.einsum("ij,ij->i", force_n, normal)),
         tangential_force_n=tangential_force(force_n, normal),
         overlap_m=overlap_m,
-        removed_n=np.zeros(len(a_id)),
         normal=normal,
     )
 
@@ -239,70 +232,3 @@ def _joined(groups: list[ContactRows]) -> ContactRows:
     rows = ContactRows(*parts)
     order = np.lexsort((rows.b_id, rows.a_id, rows.kind))
     return ContactRows(*(getattr(rows, name)[order] for name in names))
-
-
-# --- corrections ---------------------------------------------------------------------------------
-
-
-_ROUNDING = 1e-6
-"""A force above the limit by this fraction is rounded, not cut."""
-
-_COUNTS = (
-    *("particle_contacts", "cut", "strong_contacts", "strong_cut"),
-    *("workpiece_contacts", "merged"),
-)
-
-
-class Corrections(Document):
-    """``corrections.json``: sums over all network frames.
-
-    Attributes
-    ----------
-    friction : float
-        Coefficient of friction between particles.
-    particle_contacts, cut : int
-        Contacts between particles, and those with a tangential force above the limit of friction.
-    strong_contacts, strong_cut : int
-        The same of contacts whose normal force is above the mean of their frame.
-    workpiece_contacts, merged : int
-        Contacts on the workpiece, and those that became part of another one; the sum of both was
-        written.
-    removed_fraction : float
-        What was cut off, over the sum of the tangential forces between particles as written.
-    """
-
-    remedy = "make it with: ./run dragchain tables"
-
-    friction: float
-    particle_contacts: int
-    cut: int
-    strong_contacts: int
-    strong_cut: int
-    workpiece_contacts: int
-    merged: int
-    removed_fraction: float
-
-    @classmethod
-    def of(cls, friction: float, sums: Floats) -> Self:
-        """The document of the sums of `count_corrections`."""
-        counts = dict(zip(_COUNTS, sums[:6].astype(int).tolist(), strict=True))
-        fraction = float(sums[6] / sums[7]) if sums[7] else 0.0
-        return cls(friction=friction, **counts, removed_fraction=fraction)
-
-
-def count_corrections(rows: ContactRows, merged: int) -> Floats:
-    """The counts of one frame as `Corrections` has them, and tangential force removed and written.
-
-    Returns
-    -------
-    (8,) ndarray
-        Sums of frames are those of a run.
-    """
-    between, on_workpiece = (
-        rows.kind == KINDS.index(f"particle-{body}") for body in ("particle", "workpiece")
-    )
-    left, removed = rows.tangential_force_n[between], rows.removed_n[between]
-    cut, normal = removed > _ROUNDING * left, rows.normal_force_n[between]
-    strong = normal > normal.mean() if len(normal) else cut
-    counts = [len(cut), cut.sum(), strong.sum(), (cut & strong).sum(), on_workpiece.sum(), merged]
-    return np.array([*counts, removed.sum(), (removed + left).sum()], dtype=np.float64)

@@ -45,9 +45,8 @@ class WallContacts:
         The particle and the facet of the body.
     point_m : (N, 3) ndarray
         Contact point.
-    force_n, evaluated_n : (N, 3) ndarray
-        Force on the particle as applied, and as the engine evaluated it for output, its
-        tangential part within the limit of friction.
+    force_n : (N, 3) ndarray
+        Force on the particle as applied.
     normal : (N, 3) ndarray
         Unit vector from the contact point to the particle's centre, the mean of several merged
         contacts; zero where the particle received no force, because no centre is written then.
@@ -68,7 +67,6 @@ class WallContacts:
     facet_id: Ints
     point_m: Floats
     force_n: Floats
-    evaluated_n: Floats
     normal: Floats
     surface_m_s: Floats
     overlap_m: Floats
@@ -108,8 +106,6 @@ class WorkpieceFrames:
         Row in `step` of each contact on the workpiece.
     unplaced_n, unplaced_at : (K, 3) and (K,) ndarray
         Forces applied to particles for which no contact was written, and their rows in `step`.
-    merged : int
-        Contacts on the workpiece that were made part of another one of their particle.
     """
 
     step: Ints
@@ -119,7 +115,6 @@ class WorkpieceFrames:
     workpiece_at: Ints
     unplaced_n: Floats
     unplaced_at: Ints
-    merged: int = 0
 
 
 def tangential_force(force_n: Floats, normal: Floats) -> Floats:
@@ -182,7 +177,6 @@ def join_workpiece_frames(
             f"step {particles[twice[0] // above].step}: workpiece_particles contains a particle "
             "more than once"
         )
-    written = int(np.count_nonzero(_on(touching) == meshes.workpiece))
     touching = _within_friction(touching, pushed, friction, meshes.bowl, above)
     if merge:
         touching = _merged(touching, pushed)
@@ -199,7 +193,6 @@ def join_workpiece_frames(
         touching.ids("particle_id")[facing] // above,
         pushed.vectors(*FORCES)[unplaced],
         known[unplaced] // above,
-        written - int(np.count_nonzero(facing)),
     )
 
 
@@ -314,7 +307,6 @@ def _place(contacts: Frame, particles: Frame, above: int) -> WallContacts:
         facet_id=contacts.ids("facet_id"),
         point_m=points,
         force_n=force,
-        evaluated_n=evaluated,
         normal=contacts.vectors(*_NORMAL),
         surface_m_s=surface,
         overlap_m=np.asarray(contacts.columns["overlap_m"], dtype=np.float64),

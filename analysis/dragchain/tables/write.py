@@ -42,13 +42,7 @@ from dragchain.tables.columns import (
     WORKPIECE_FORCE,
 )
 from dragchain.tables.impacts import find_impacts
-from dragchain.tables.network_contacts import (
-    KINDS,
-    ContactRows,
-    Corrections,
-    contact_rows,
-    count_corrections,
-)
+from dragchain.tables.network_contacts import KINDS, ContactRows, contact_rows
 from dragchain.tables.parquet import Rows, category, table_writer
 from dragchain.tables.run_folder import ON_WORKPIECE, Run
 from dragchain.tables.workpiece_contacts import WallContacts, WorkpieceFrames
@@ -204,7 +198,7 @@ def _write_workpiece_contacts(run: Run, file: Path) -> None:
         tables = [stack.enter_context(table_writer(path, names)) for path in files]
         for frames in run.workpiece_frames():
             force, place = samples.at(frames.step)
-            used = closure.add(frames, force, counted_mask(frames.step, run.case))
+            used = closure.add(frames, force)
             for table, (contacts, at) in zip(tables, _contacts(bodies, frames), strict=False):
                 rows = workpiece_contact_rows(frames.step[at], contacts, place[at], run.case)
                 table.write({**rows, "in_statistics": rows["in_statistics"] & used[at]})
@@ -311,19 +305,15 @@ def _write_particles(run: Run, file: Path) -> None:
 def _write_contacts(run: Run, file: Path) -> None:
     bowl_radius = run.case.bowl.radius_m
     particles, pairs = run.frames("particles"), run.workpiece_pairs()
-    friction, corrected = friction_with(run.case, "particle"), np.zeros(8)
-    bodies = Bodies(run.case)
+    friction, bodies = friction_with(run.case, "particle"), Bodies(run.case)
     with table_writer(file, _with_classes(CONTACTS, "contacts", run.case)) as table:
         for frame in run.frames("contacts"):
             workpiece = _frame_at(pairs, frame.step, "workpiece_contacts").join()
             beside = _frame_at(particles, frame.step, "particles")
             touching = workpiece.workpiece, workpiece.bowl
             rows = contact_rows(beside, frame, *touching, bowl_radius, friction)
-            corrected += count_corrections(rows, workpiece.merged)
             rows = bodies.network(rows) if bodies else rows
             table.write(_contact_columns(frame.step, rows, run.case))
-    of_main = run.case.contact_moduli["particle"].friction
-    Corrections.of(of_main, corrected).write(run.file("corrections.json"))
 
 
 class _Stepped(Protocol):

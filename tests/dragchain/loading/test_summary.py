@@ -324,7 +324,7 @@ def test_a_particle_that_moves_with_the_workpiece_does_not_slip(
     surface = velocity + np.cross(spin, point - centre)
     contacts = WallContacts(
         particle_id=np.array([1]), facet_id=np.array([0]), point_m=point[None],
-        force_n=np.array([[-1.0, 0, 0]]), evaluated_n=np.zeros((1, 3)),
+        force_n=np.array([[-1.0, 0, 0]]),
         normal=np.array([[-1.0, 0, 0]]), surface_m_s=surface[None],
         overlap_m=np.zeros(1), attraction_n=np.zeros(1), silent=np.array([False]),
     )  # fmt: skip

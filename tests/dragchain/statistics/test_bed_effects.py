@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from dragchain.errors import SeriesError
-from dragchain.statistics.bed_effects import Factors, Whitened, correlation, fit_effects, same
+from dragchain.statistics.bed_effects import Factors, fit_effects
 
 REFERENCE = {"modulus": 1.0, "step": 0.2}
 SEEDS = range(4)
@@ -106,40 +106,20 @@ def test_too_few_runs_and_effects_that_go_together_are_refused() -> None:
         fit_effects(design, np.zeros(6), list(range(6)))
 
 
-OWN_BEDS = ["a", "b", "a", "c", "b", "a"]
-
-
-def problem() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    rng = np.random.default_rng(3)
-    design = np.column_stack([np.ones(6), np.arange(6.0)])
-    errors = np.diag(rng.uniform(0.1, 1.0, 6))
-    return design, rng.normal(size=6), correlation(same(OWN_BEDS), 0.4) + errors
-
-
-def test_runs_from_one_bed_share_a_part_of_their_variance() -> None:
-    assert same(OWN_BEDS)[0].tolist() == [1, 0, 1, 0, 0, 1]
-    covariance = correlation(same(OWN_BEDS), 0.25)
-    assert np.diag(covariance).tolist() == [1.0] * 6
-    assert (covariance[0, 2], covariance[0, 1]) == (0.25, 0.0)
-
-
-def test_effects_and_what_they_leave() -> None:
-    """Aitken 1936: (X' V^-1 X)^-1 X' V^-1 y, and the sum of squares in the metric of V."""
-    design, values, covariance = problem()
-    model = Whitened.of(design, values, covariance)
-    inverse = np.linalg.inv(covariance)
+def test_effects_are_those_of_generalised_least_squares() -> None:
+    """Aitken 1936: (X' V^-1 X)^-1 X' V^-1 y, V as the fraction of the bed says."""
+    rng, beds = np.random.default_rng(3), ["a", "b", "a", "c", "b", "a", "c", "b"]
+    design = np.column_stack([np.ones(8), np.arange(8.0)])
+    own = dict(zip("abc", rng.normal(size=3), strict=True))
+    values = np.array([own[bed] for bed in beds]) + 0.3 * rng.normal(size=8)
+    fit = fit_effects(design, values, beds)
+    assert 0.0 < fit.bed_fraction < 0.98
+    same = np.array([[one == other for other in beds] for one in beds], dtype=float)
+    inverse = np.linalg.inv((1 - fit.bed_fraction) * np.eye(8) + fit.bed_fraction * same)
     normal = design.T @ inverse @ design
-    effects = np.linalg.solve(normal, design.T @ inverse @ values)
-    left = values - design @ effects
-    assert model.effects == pytest.approx(effects)
-    assert model.covariance == pytest.approx(np.linalg.inv(normal))
-    assert model.square == pytest.approx(left @ inverse @ left)
-    assert model.degrees == 4
-
-
-def test_determinants_of_the_restricted_likelihood() -> None:
-    design, values, covariance = problem()
-    model = Whitened.of(design, values, covariance)
-    normal = design.T @ np.linalg.inv(covariance) @ design
-    expected = 0.5 * (np.linalg.slogdet(covariance)[1] + np.linalg.slogdet(normal)[1])
-    assert model.log_determinants == pytest.approx(expected)
+    assert fit.effects == pytest.approx(np.linalg.solve(normal, design.T @ inverse @ values))
+    left = values - design @ fit.effects
+    variance = left @ inverse @ left / 6
+    assert fit.residual_std == pytest.approx(np.sqrt(variance))
+    assert fit.covariance == pytest.approx(variance * np.linalg.inv(normal))
+    assert fit.degrees == 8 - 2 - 2

@@ -87,7 +87,7 @@ def _rows(kind: list[int], a: list[int], b: list[int], normal: Any, force: Any) 
         point_m=np.arange(len(a), dtype=float)[:, None] * [1.0, 0, 0], force_n=force,
         normal_force_n=along,
         tangential_force_n=np.linalg.norm(force - along[:, None] * normal, axis=1),
-        overlap_m=0.1 * np.arange(1.0, len(a) + 1), removed_n=np.ones(len(a)), normal=normal,
+        overlap_m=0.1 * np.arange(1.0, len(a) + 1), normal=normal,
     )  # fmt: skip
 
 
@@ -112,7 +112,6 @@ def test_contacts_between_the_same_bodies_are_one() -> None:
     assert found.tangential_force_n[0] == pytest.approx(0.5)
     np.testing.assert_allclose(found.point_m[0], [(3 * 0 + 1 * 2) / 4, 0, 0])
     assert found.overlap_m[0] == pytest.approx(0.3)
-    assert found.removed_n.sum() == rows.removed_n.sum()
 
 
 def test_contacts_of_a_body_on_the_workpiece_are_one() -> None:
@@ -122,7 +121,7 @@ def test_contacts_of_a_body_on_the_workpiece_are_one() -> None:
         particle_id=np.array([1, 2, 3, 10]), facet_id=np.array([5, 6, 7, 8]),
         point_m=np.eye(4)[:, :3],
         force_n=np.array([[0, 0, 1.0], [0.5, 0, 3], [0, 0, 0], [0, 0, 2]]),
-        evaluated_n=np.zeros((4, 3)), normal=np.array([up, up, [0, 0, 0], up]),
+        normal=np.array([up, up, [0, 0, 0], up]),
         surface_m_s=np.array([[1.0] * 3, [2.0] * 3, [np.nan] * 3, [4.0] * 3]),
         overlap_m=np.array([1.0, 2, 9, 4]), attraction_n=np.array([0.1, 0.2, 0, 0.4]),
         silent=np.array([False, False, True, False]),

@@ -3,7 +3,7 @@ import pytest
 from made_frames import frame, wall
 
 from dragchain.errors import TableError
-from dragchain.tables.network_contacts import KINDS, Corrections, contact_rows, count_corrections
+from dragchain.tables.network_contacts import KINDS, contact_rows
 from dragdeck.study.contact_law import FrictionLimit
 
 PARTICLES = (
@@ -43,30 +43,11 @@ def test_the_force_between_particles_is_cut_to_the_limit_of_friction() -> None:
     np.testing.assert_allclose(rows.force_n, [[-3, 0, 1.2], [2, 0.48, 0.64]])
     np.testing.assert_allclose(rows.normal_force_n, [3, -2])
     np.testing.assert_allclose(rows.tangential_force_n, [1.2, 0.8])
-    np.testing.assert_allclose(rows.removed_n, [2.8, 0.2])
 
 
 def test_the_applied_force_of_a_wall_is_not_cut() -> None:
     rows = rows_of([[7, 1, 2, 0.8, 1, 5, 0, 6, 0, 0, 0]], friction=0.1)
     np.testing.assert_array_equal(rows.force_n, [[5, 0, 6]])
-    assert rows.removed_n.tolist() == [0]
-
-
-def test_corrections_count_what_was_cut() -> None:
-    """Normal forces 3 and 1: the mean is 2; the first is above it and cut, the second neither."""
-    particles = [[1, 0, 0, 5, 2, *CALM], [2, 2.9, 0, 5, 1, *CALM], [3, 5.8, 0, 5, 2, *CALM]]
-    contacts = [[1, 2, -3, 0, 4, 0.1], [2, 3, -1, 0, 0.5, 0.1]]
-    on_rod = wall([[2, 0, 1]], [[1, 0, 5]], [[1, 0, 0]])
-    rows = rows_of(particles, contacts, workpiece=on_rod, friction=0.5)
-    found = Corrections.of(0.5, 2 * count_corrections(rows, 3))
-    assert (found.particle_contacts, found.cut) == (4, 2)
-    assert (found.strong_contacts, found.strong_cut) == (2, 2)
-    assert found.removed_fraction == pytest.approx(2.5 / 4.5)
-    assert (found.workpiece_contacts, found.merged) == (2, 6)
-
-
-def test_a_frame_without_contacts_corrects_nothing() -> None:
-    assert Corrections.of(0.5, count_corrections(rows_of([]), 0)).removed_fraction == 0
 
 
 def test_a_contact_seen_from_the_other_particle_is_the_same() -> None:

@@ -30,7 +30,6 @@ def test_a_single_contact_takes_the_applied_force() -> None:
     contacts = frame(CONTACTS, [[2, 0, 0, 9, 5, 1.9, 0.4, 0, 1e-6]])
     workpiece = joined_of(particles, contacts).workpiece
     np.testing.assert_array_equal(workpiece.force_n, [[2.0, 0.5, 0]])
-    np.testing.assert_array_equal(workpiece.evaluated_n, [[1.9, 0.4, 0]])
     np.testing.assert_array_equal(workpiece.normal, [[1, 0, 0]])
     assert workpiece.normal_force_n().tolist() == [2.0]
     assert workpiece.tangential_force_n().tolist() == [0.5]
@@ -50,7 +49,6 @@ def test_evaluated_forces_are_within_the_limit_of_friction_before_they_are_share
     particles = frame(PARTICLES, [[5, 1, 1, 0, 1, 3.0, 2.0, 0]])
     rows = [[1, 0, 0, 2, 5, 0.9, 1.5, 0, 1e-6], [0, 1, 0, 1, 5, 2.0, 4.0, 0, 1e-6]]
     workpiece = joined_of(particles, frame(CONTACTS, rows), friction=0.5).workpiece
-    np.testing.assert_allclose(workpiece.evaluated_n, [[2.0, 1.0, 0], [0.75, 1.5, 0]])
     np.testing.assert_allclose(workpiece.force_n, [[2.125, 0.75, 0], [0.875, 1.25, 0]])
 
 
@@ -63,9 +61,8 @@ def test_a_particle_over_a_convex_edge_has_one_contact() -> None:
     particles = frame(PARTICLES, [[5, -0.05, 0, 0.99, 1, -0.3, 0, 7.5]])
     joined = joined_of(particles, frame(CONTACTS, EDGE))
     workpiece = joined.workpiece
-    assert (joined.merged, workpiece.facet_id.tolist()) == (1, [7])
+    assert workpiece.facet_id.tolist() == [7]
     np.testing.assert_array_equal(workpiece.force_n, [[-0.3, 0, 7.5]])
-    np.testing.assert_allclose(workpiece.evaluated_n, [[-0.2, 0, 7.0]])
     assert workpiece.overlap_m.tolist() == [0.01]
     np.testing.assert_array_equal(workpiece.point_m, [EDGE[0][:3]])
     mean = 0.01**1.5 * np.array([0, 0, 1]) + 0.00874**1.5 * np.array([-0.05, 0, 0.99]) / 0.99126
@@ -78,7 +75,7 @@ def test_three_contacts_of_a_corner_are_one_and_a_far_one_stays() -> None:
     far = [0.94, 0, 0.99, 3, 5, -2.0, 0, 0, 0.01]
     particles = frame(PARTICLES, [[5, -0.05, 0, 0.99, 1, -2.2, 0, 8.0]])
     joined = joined_of(particles, frame(CONTACTS, [far, EDGE[1], corner, EDGE[0]]))
-    assert (joined.merged, joined.workpiece.facet_id.tolist()) == (2, [3, 7])
+    assert joined.workpiece.facet_id.tolist() == [3, 7]
     np.testing.assert_allclose(joined.workpiece.force_n, [[-2.0, 0, 0], [-0.2, 0, 8.0]], atol=1e-12)
 
 
@@ -87,15 +84,15 @@ def test_contacts_with_different_bodies_or_particles_are_not_merged() -> None:
     rows = [[*EDGE[0], 0], [*EDGE[1], 1]]
     particles = [[5, -0.05, 0, 0.99, 1, -0.3, 0, 7.5], [6, -0.05, 0, 0.99, 1, 0, 0, 1.0]]
     joined = joined_of(frame(PARTICLES, particles[:1]), frame(names, rows))
-    assert (joined.merged, len(joined.workpiece), len(joined.bowl)) == (0, 1, 1)
+    assert (len(joined.workpiece), len(joined.bowl)) == (1, 1)
     other = [*EDGE[1][:4], 6, *EDGE[1][5:]]
     joined = joined_of(frame(PARTICLES, particles), frame(CONTACTS, [EDGE[0], other]))
-    assert (joined.merged, joined.workpiece.particle_id.tolist()) == (0, [5, 6])
+    assert joined.workpiece.particle_id.tolist() == [5, 6]
 
 
 def test_silent_contacts_are_not_merged() -> None:
     joined = joined_of(frame(PARTICLES, []), frame(CONTACTS, EDGE))
-    assert (joined.merged, joined.workpiece.silent.tolist()) == (0, [True, True])
+    assert joined.workpiece.silent.tolist() == [True, True]
 
 
 def test_rows_come_back_sorted_whatever_their_order() -> None:
@@ -152,7 +149,6 @@ def test_a_batch_has_the_contacts_of_each_of_its_frames() -> None:
         np.testing.assert_array_equal(getattr(joined.workpiece, name), np.concatenate(parts))
     assert joined.workpiece_at.tolist() == [0, 1, 1, 3]
     assert (joined.unplaced_at.tolist(), joined.unplaced_n[:, 0].tolist()) == ([0, 2, 3], [1, 2, 1])
-    assert joined.merged == sum(one.merged for one in alone) == 2
 
 
 def test_frames_that_do_not_belong_together_are_refused() -> None:

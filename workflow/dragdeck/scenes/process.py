@@ -460,7 +460,6 @@ PROCESS = SceneType(
         "particles.parquet",
         "contacts.parquet",
         "closure.json",
-        "corrections.json",
     ),
     network=("network.parquet", "chains.parquet"),
     loading=("facets.parquet", "contact_events.parquet", "loading.json", "workpiece.vtp"),
