@@ -93,8 +93,6 @@ COMMANDS = (
             "and writes report.html and summary.csv, .parquet and .xlsx to the folder.",
             "report.study_report:write_study_report", (
         OUT_DIR, RUN_DIRS,
-        Argument("--advice", type=Path, metavar="FILE",
-                  help="advice.json of ./run dragdeck advise, to compare costs with it"),
         Argument("--preview", type=Path, metavar="FILE",
                   help="picture of the set-up: results/STUDY/set_up.png"),
         Argument("--signal", type=Path, metavar="FILE",

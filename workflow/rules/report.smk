@@ -38,13 +38,12 @@ rule write_report:
         page=shown(WORK.of_study("report", "report.html"), "report", "Report"),
     params:
         runs=lambda wildcards: WORK.every_folder("process"),
-        advice=WORK.advice_option,
         signal=WORK.signal_option,
         state=PROJECT.state(CASES),
         source=source_hash("dragchain.report.study_report"),
     shell:
-        "dragchain report --out $(dirname {output.csv}) {params.runs} {params.advice}"
-        " {params.signal} --preview {input.set_up} > {log} 2>&1"
+        "dragchain report --out $(dirname {output.csv}) {params.runs} {params.signal}"
+        " --preview {input.set_up} > {log} 2>&1"
         " && echo {params.state} > {output.complete}"
 
 
@@ -72,12 +71,11 @@ onerror:
     wanted = any(job.rule.name == "write_report" for job in workflow.dag.needrun_jobs())
     if wanted and not INTERRUPTED:
         runs = " ".join(folder for name in SCENES for folder in WORK.every_folder(name))
-        advice = f"--advice {WORK.advice}" if Path(WORK.advice).is_file() else ""
         picture = f"results/{STUDY}/set_up.png"
         preview = f"--preview {picture}" if Path(picture).is_file() else ""
         measured = WORK.signal_option()
         shell(
             "rm -f results/{STUDY}/report/{{complete,report.html,summary.*}};"
-            " dragchain report --out results/{STUDY}/report {runs} {advice} {preview} {measured} || true"
+            " dragchain report --out results/{STUDY}/report {runs} {preview} {measured} || true"
         )
         tell_numbers()

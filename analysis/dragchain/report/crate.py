@@ -1,6 +1,5 @@
 """A study's results as an RO-Crate (https://w3id.org/ro/crate/1.1), to archive and to cite."""
 
-import math
 import mimetypes
 import os
 import platform
@@ -12,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 from dragchain.errors import ExportError
-from dragchain.report.cases import read_study_runs
 from dragdeck.files import file_checksum, write_text
 from dragdeck.records.case import CaseOfRun, load_case
 from dragdeck.records.run import changed_in_words, read_accepted
@@ -167,32 +165,11 @@ class _Crate:
             "startTime": record.started,
             "instrument": [self._software(*version) for version in versions.items()],
             "object": self.add(inputs),
-            "result": [*self.add(results), *self._measured(folder, case)],
+            "result": self.add(results),
         }
         if changed := changed_in_words(case.changed_scripts):
             about["description"] = changed
         self._mention(f"#{case.scene}-{case.run}", about)
-
-    def _measured(self, folder: Path, case: CaseOfRun) -> list[Any]:
-        """The quantities of a process run, as its report states them."""
-        if case.scene != "process":
-            return []
-        found = []
-        for one in read_study_runs(folder).values.standings:
-            about: dict[str, object] = {
-                "@type": "PropertyValue",
-                "name": one.quantity.label,
-                "propertyID": one.quantity.name,
-                "unitText": one.quantity.unit or "1",
-                "value": one.shown.value,
-                "description": f"{one.rests_on}; {one.reason}" if one.reason else one.rests_on,
-            }
-            if one.shown.known:
-                about |= {"minValue": one.shown.ci95_low, "maxValue": one.shown.ci95_high}
-                about["measurementTechnique"] = "simulation; ends of the 95 % confidence interval"
-            if math.isfinite(one.shown.value):
-                found.append(self._named(f"#{case.run}-{one.quantity.name}", about))
-        return found
 
     def close(self) -> None:
         """Add the versions and the list of what was left out, and write the metadata."""

@@ -11,13 +11,8 @@ import pyarrow as pa
 
 from dragchain.quantities.basis import Standing
 from dragchain.report.cases import ReportedCase
-from dragchain.tables.columns import descriptions, unit_end, unit_of
+from dragchain.tables.columns import descriptions, unit_of
 from dragdeck.records.case import AssumptionOfRun
-
-_WORDS = {
-    "ci95 low": "95 % CI lower end", "ci95 high": "95 % CI upper end", "youngs": "Young's",
-    "std": "standard deviation", "timestep": "time step", "poissons": "Poisson's",
-}  # fmt: skip
 
 
 def definitions(table: pd.DataFrame, name: str = "summary") -> pd.DataFrame:
@@ -33,25 +28,13 @@ def definitions(table: pd.DataFrame, name: str = "summary") -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        N rows ``heading``, ``column``, ``unit`` (``1`` for plain numbers) and ``meaning``. The
-        heading is the column in words, and ends with its unit.
+        N rows ``column``, ``unit`` (``1`` for plain numbers) and ``meaning``.
     """
-    rows = []
-    for field in pa.Schema.from_pandas(table, preserve_index=False):
-        unit = unit_of(field)
-        rows.append(
-            (_heading(field.name, unit), field.name, unit, descriptions(field.name).get(name, ""))
-        )
-    return pd.DataFrame(rows, columns=["heading", "column", "unit", "meaning"], dtype=object)
-
-
-def _heading(column: str, unit: str) -> str:
-    """A column's name in words, with its unit in brackets."""
-    end = unit_end(column)
-    text = column.removesuffix(f"_{end}").replace("_", " ")
-    for word, shown in _WORDS.items():
-        text = f" {text} ".replace(f" {word} ", f" {shown} ").strip()
-    return f"{text[:1].upper()}{text[1:]}" + (f" ({unit})" if end else "")
+    rows = [
+        (field.name, unit_of(field), descriptions(field.name).get(name, ""))
+        for field in pa.Schema.from_pandas(table, preserve_index=False)
+    ]
+    return pd.DataFrame(rows, columns=["column", "unit", "meaning"], dtype=object)
 
 
 def overview(cases: Sequence[ReportedCase]) -> pd.DataFrame:
@@ -105,19 +88,17 @@ def summary_workbook(
     cases : sequence of ReportedCase
         The cases for the overview.
     """
-    about = definitions(table)
     assumed = [
         {"run": run, "field": one.field, "value": json.dumps(one.value), "reason": one.why}
         for run, found in assumptions.items()
         for one in found
     ]
-    summary = table.set_axis(about["heading"], axis=1)
     assumption_sheet = pd.DataFrame(assumed, columns=["run", "field", "value", "reason"])
     return workbook(
         {
             "Overview": overview(cases),
-            "Summary": summary,
-            "Definitions": about,
+            "Summary": table,
+            "Definitions": definitions(table),
             "Assumptions": assumption_sheet,
         }
     )
@@ -125,27 +106,11 @@ def summary_workbook(
 
 def workbook(sheets: Mapping[str, pd.DataFrame]) -> bytes:
     """Tables as the sheets of an XLSX file; text stays text, whatever it starts with."""
-    from xlsxwriter import Workbook
-
     content = BytesIO()
-    with Workbook(content, _OPTIONS) as book:
-        bold = book.add_format({"bold": True, "text_wrap": True, "valign": "top"})
-        formats = {code: book.add_format({"num_format": code}) for code in _NUMBERS.values()}
+    options = {"options": {"strings_to_formulas": False, "strings_to_urls": False}}
+    with pd.ExcelWriter(content, engine="xlsxwriter", engine_kwargs=options) as book:
         for name, table in sheets.items():
-            sheet = book.add_worksheet(name)
-            for column, (heading, values) in enumerate(table.items()):
-                sheet.write_string(0, column, str(heading), bold)
-                for row, value in enumerate(values.tolist(), start=1):
-                    if not isinstance(value, float) or value == 0.0:
-                        sheet.write(row, column, value)
-                    elif math.isfinite(value):
-                        size = next(least for least in _NUMBERS if abs(value) >= least)
-                        sheet.write(row, column, value, formats[_NUMBERS[size]])
-            sheet.freeze_panes(1, 0)
-            sheet.autofit(300)
+            finite = table.replace([math.inf, -math.inf], None)
+            finite.to_excel(book, sheet_name=name, index=False, freeze_panes=(1, 0))
+            book.sheets[name].autofit(300)
     return content.getvalue()
-
-
-_OPTIONS = {"in_memory": True, "strings_to_formulas": False, "strings_to_urls": False}
-_NUMBERS = {1000.0: "#,##0", 10.0: "0.0", 0.01: "0.000", 0.0: "0.00E+00"}
-"""Formats of numbers from these sizes on."""

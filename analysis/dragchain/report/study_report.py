@@ -19,19 +19,18 @@ from dragchain.report.cases import (
     read_reported,
     read_study_runs,
 )
-from dragchain.report.cost_check import CostRow, answers, cost_rows, prediction_for, read_advice
 from dragchain.report.findings import Findings
 from dragchain.report.page import NETWORK_PAGE, data_uri, file_uri, render_page, write_bundle
 from dragchain.report.removal import UM_PER_H, RemovalOfCase, removal_of, touch_rows, touches_per_s
 from dragchain.report.spreadsheet import summary_workbook
 from dragchain.report.summary import summary
+from dragchain.report.tolerance import answers
 from dragchain.run.case import upstream_folders
 from dragchain.run.workpiece import read_surface
 from dragchain.statistics.correlated import RELIABLE_TIMES
 from dragchain.statistics.noisy_map import LARGEST_ERROR
 from dragdeck.errors import DragdeckError
 from dragdeck.files import write_bytes
-from dragdeck.records.advice import OptionEntry
 from dragdeck.records.case import AssumptionOfRun, load_case
 from dragdeck.records.run import FIGURES, RunRecord, causes, figures_of
 
@@ -177,16 +176,10 @@ class RunSection:
     assumptions: list[AssumptionOfRun]
     pictures: dict[str, str]
     network: Path | None
-    costs: list[CostRow]
-    cost_source: str | None
 
 
 def write_study_report(
-    out_dir: Path,
-    run_dirs: Sequence[Path],
-    advice: Path | None = None,
-    preview: Path | None = None,
-    signal: Path | None = None,
+    out_dir: Path, run_dirs: Sequence[Path], preview: Path | None = None, signal: Path | None = None
 ) -> None:
     """Write ``summary.csv``, ``.parquet`` and ``.xlsx``, and ``report.html``, on process runs.
 
@@ -200,8 +193,6 @@ def write_study_report(
         Folders of process runs, ``results/<study>/<scene>/<run id>``. The filling and the drop
         test that a run names are looked up beside it; their folders may be given too, to say why
         a run that starts from one of them is not there.
-    advice : Path, optional
-        ``advice.json`` of the study.
     preview : Path, optional
         Picture of the set-up of its first case, PNG.
     signal : Path, optional
@@ -216,11 +207,8 @@ def write_study_report(
         and lists it.
     TableError
         If no process run is given.
-    DocumentError
-        If the advice cannot be used.
     """
-    options = read_advice(advice) if advice is not None else []
-    sections, missing = _read(_with_upstream(run_dirs), options)
+    sections, missing = _read(_with_upstream(run_dirs))
     if sections:
         studies = [section.study for section in sections]
         table = summary(studies)
@@ -260,15 +248,13 @@ def _with_upstream(run_dirs: Sequence[Path]) -> list[Path]:
     return sorted(dict.fromkeys(folders), key=lambda folder: scene_of(folder) == "process")
 
 
-def _read(
-    run_dirs: Sequence[Path], options: Sequence[OptionEntry]
-) -> tuple[list[RunSection], list[MissingRun]]:
+def _read(run_dirs: Sequence[Path]) -> tuple[list[RunSection], list[MissingRun]]:
     """What the page shows of the process runs, and the runs without a result."""
     sections, missing = [], []
     for folder in run_dirs:
         try:
             if scene_of(folder) == "process":
-                sections.append(_section(read_study_runs(folder), options))
+                sections.append(_section(read_study_runs(folder)))
             else:
                 read_reported(folder, Findings)
         except DragdeckError as error:
@@ -276,18 +262,14 @@ def _read(
     return sections, missing
 
 
-def _section(study: StudyRuns, options: Sequence[OptionEntry]) -> RunSection:
+def _section(study: StudyRuns) -> RunSection:
     process = study.process
-    expected = prediction_for(process.case, options)
-    records = {str(run.case.scene): run.record for run in study.runs}
     network = process.folder / NETWORK_PAGE
     return RunSection(
         study=study,
         assumptions=_assumptions(study),
         pictures=dict(picture for run in study.runs for picture in _pictures(run)),
         network=network if network.is_file() else None,
-        costs=list(cost_rows(expected, records)) if expected else [],
-        cost_source=expected.source if expected else None,
     )
 
 
@@ -337,7 +319,6 @@ def _render(
         captions=FIGURES,
         runs=runs,
         checks=[(run, check) for run in runs for check in run.record.checks],
-        costs=[(one, row) for one in sections for row in one.costs],
         compared=[(one, row) for one in cases for row in one.values.against],
         signals=[(one, data_uri(one.picture()) if one.differences else None) for one in signals],
         overview=_overview(cases) if len(cases) > 1 else None,

@@ -102,9 +102,6 @@ def test_rocrate_reads_it(project: Path) -> None:
         "in.liggghts", "columns.json", "case.json", "workpiece.stl"
     }  # fmt: skip
     assert {one.id for one in action["result"]} >= {f"{RUNS[2]}/run.json"}
-    drag = found.get("#p-1-drag_mean")
-    assert drag in action["result"]
-    assert (drag["value"], drag["unitText"], drag["minValue"]) == (-2.5, "N", -2.6)
     software = {(one["name"], one["version"]) for one in action["instrument"]}
     assert software == {("LIGGGHTS", "Engine 3.8"), ("dragdeck", "0.1.0")}
     write_crate(OUT, RUNS, REPORT)
