@@ -50,11 +50,7 @@ COMMANDS = (
     Command("journal", "draw the figures of a run for a publication",
             "Draw the figures of a process run for a journal, as SVG, PDF and PNG in "
             "RUN_DIR/figures/journal. It reads the tables and findings.json of the run.",
-            "report.journal:write_journal_figures", (
-        RUN_DIR,
-        Argument("--paper-colours", action="store_true",
-                  help="show forces from green to red, as in Uhlmann et al. (2015) (default: "
-                  "colours for every kind of colour vision)"))),
+            "report.journal:write_journal_figures", (RUN_DIR,)),
     Command("export", "export a run to ParaView or OVITO",
             "Export the frames of a run to ParaView, whose files OVITO reads too. It reads the "
             "tables of the run and writes VTP files for each frame with a PVD time series.",

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import groupby
 from pathlib import Path
-from typing import Any, Literal, SupportsIndex
+from typing import Literal
 
 import pandas as pd
 import pyarrow.parquet as pq
@@ -231,26 +231,6 @@ class FinishedRun(RunData):
         return f"<{self.case.scene} run {self.name}: {', '.join(made) or 'no tables'}>"
 
 
-class Runs(tuple[FinishedRun, ...]):
-    """The runs of a study by their number; names are the business of `Study.run`."""
-
-    def __getitem__(self, key: SupportsIndex | slice) -> Any:
-        """The run of that number from 0, or several of them.
-
-        Raises
-        ------
-        UnknownNameError
-            If there is no such number, or it is a name.
-        """
-        try:
-            return super().__getitem__(key)
-        except (IndexError, TypeError):
-            problem = f"there is no run {key!r}: {len(self)} run(s), numbered from 0"
-            remedy = "name the case: study.run(NAME)"
-            known = [run.name for run in self]
-            raise UnknownNameError(problem, str(key), known, remedy=remedy) from None
-
-
 @dataclass(frozen=True, repr=False)
 class Study:
     """The finished process runs of a study.
@@ -259,12 +239,12 @@ class Study:
     ----------
     folder : Path
         ``results/<study>``.
-    runs : Runs
+    runs : tuple of FinishedRun
         Sorted by name of the case. With several workpieces, each is a separate run.
     """
 
     folder: Path
-    runs: Runs
+    runs: tuple[FinishedRun, ...]
 
     @property
     def name(self) -> str:
@@ -354,7 +334,7 @@ def load(study: Path | str) -> Study:
     homes = [home / "results" for home in (Path.cwd(), *Path.cwd().parents)]
     for folder in (*(home / study for home in homes), Path(study)):
         if (folder / "case.json").is_file():
-            return Study(folder.resolve().parents[1], Runs([FinishedRun.open(folder)]))
+            return Study(folder.resolve().parents[1], (FinishedRun.open(folder),))
         if (folder / "process").is_dir():
             return _finished(folder)
     known = sorted({file.parent.name for home in homes for file in home.glob("*/process")})
@@ -374,7 +354,7 @@ def _finished(folder: Path) -> Study:
     if others := _of_other_settings(folder.resolve(), [run.case.run for run in runs]):
         text = f"runs of other settings than those of the study now: {', '.join(others)}"
         warnings.warn(f"{folder}: {text}", stacklevel=3)
-    return Study(folder, Runs(runs))
+    return Study(folder, tuple(runs))
 
 
 def _of_other_settings(folder: Path, runs: Sequence[str]) -> list[str]:

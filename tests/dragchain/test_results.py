@@ -217,10 +217,3 @@ def test_tables_carry_study_run_units_and_basis(project: Path) -> None:
     assert run.table("network", ["step"]).attrs["units"] == {"step": "1"}
     assert study.summary.attrs["units"]["drag_mean_n"] == "N"
     assert study.summary.attrs["basis"][run.case.run] == about["basis"]
-
-
-@pytest.mark.parametrize("number", [5, -9, "deep"])
-def test_a_run_that_is_not_there_is_named(project: Path, number: Any) -> None:
-    with pytest.raises(UnknownNameError, match=r"(?s)no run .*3 run\(s\).*study\.run"):
-        load("small").runs[number]
-    assert len(load("small").runs[:2]) == 2

@@ -73,7 +73,7 @@ def known(value: float) -> Estimate:
 
 
 def process_findings() -> ProcessFindings:
-    numbers = dict.fromkeys(Chains.model_fields, 0.25) | {"dominant_frames": 31}
+    numbers = dict.fromkeys(Chains.model_fields, 0.25)
     no_columns = EstimateColumns.of([])
     return ProcessFindings(
         run="workpiece-1", process_time_zero_s=0.1, confidence=0.95, workpiece_frames=31,

@@ -13,7 +13,6 @@ from paths import SMALL_STUDY
 from snakemake_calls import copy_of_project, jobs, succeed
 
 from dragchain import load_case
-from dragchain.figures.style import PAPER_COLOURS, force_map
 from dragchain.report.journal import write_journal_figures
 from dragchain.run.kinematics import axis_speed, drag_phase
 from dragdeck.records.case import CaseOfRun
@@ -125,8 +124,7 @@ def test_the_report_compares_wake_and_fresh_bed(workpieces: list[Path], project:
 
 def test_figures_for_a_publication_in_three_formats(project: Path, workpieces: list[Path]) -> None:
     assert "draw_for_journal" in jobs(project, "figures", "--config", "study=small")
-    files = write_journal_figures(workpieces[1], paper_colours=True)
-    assert force_map().name != PAPER_COLOURS.name
+    files = write_journal_figures(workpieces[1])
     assert matplotlib.rcParams["svg.fonttype"] != "none"
     names = {file.stem for file in files}
     assert len(names) == 7

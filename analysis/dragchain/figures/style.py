@@ -4,6 +4,7 @@ import json
 import re
 from collections.abc import Mapping
 from contextlib import AbstractContextManager
+from functools import cache
 from importlib import resources
 from io import BytesIO
 from pathlib import Path
@@ -54,17 +55,6 @@ STYLE: dict[RcKeyType, Any] = {
     "legend.frameon": False,
     "legend.fontsize": 8,
 }
-FORCE_COLOURS = LinearSegmentedColormap.from_list(
-    "forces", matplotlib.colormaps["magma_r"](np.linspace(0.0, 0.8, 256))
-)
-"""From light to dark, told apart with any kind of colour vision.
-
-It ends before black, in which a cylinder shows neither its shape nor what is drawn on it.
-"""
-
-PAPER_COLOURS = LinearSegmentedColormap.from_list("paper", ["#1a9850", "#d9c514", "#c8102e"])
-"""Green over yellow to red, as in Uhlmann et al. (2015)."""
-
 WIDTH_IN = 7.6
 HALF_IN, WIDE_IN = 5.6, 9.5
 """Widths of figures: `HALF_IN` where two stand side by side on a page."""
@@ -72,10 +62,14 @@ HALF_IN, WIDE_IN = 5.6, 9.5
 _DPI = 150
 
 
+@cache
 def force_map() -> Colormap:
-    """The colour map of forces and loads: the paper's where matplotlib's default is set to it."""
-    paper = matplotlib.rcParams["image.cmap"] == PAPER_COLOURS.name
-    return PAPER_COLOURS if paper else FORCE_COLOURS
+    """The colour map of forces and loads, from light to dark, told apart with any colour vision.
+
+    It ends before black, in which a cylinder shows neither its shape nor what is drawn on it.
+    """
+    part = matplotlib.colormaps["magma_r"](np.linspace(0.0, 0.8, 256))
+    return LinearSegmentedColormap.from_list("forces", part)
 
 
 def top_of_scale(values: Floats, areas: Floats) -> float:

@@ -66,17 +66,17 @@ class ContactType(Part):
 
 
 class Profile(Part):
-    """Normal force times sliding distance per metre of path in bins of depth (m) or azimuth (rad).
+    """Normal force times sliding distance per metre of path in bins of depth.
 
     Attributes
     ----------
-    edges : tuple of float
-        Edges of the bins.
+    edges_m : tuple of float
+        Edges of the bins, m.
     force_slide : EstimateColumns
         N m per m of path in each bin.
     """
 
-    edges: tuple[float, ...]
+    edges_m: tuple[float, ...]
     force_slide: EstimateColumns
 
 
@@ -87,15 +87,14 @@ class LoadClosure(Part):
     ----------
     workpiece_relative_error : float
         Of the impulse on the workpiece, summed over the facets and from the total force.
-    facets_relative_error, events_relative_error : float
-        The largest of an amount, summed over facets or events and over contacts.
+    facets_relative_error : float
+        The largest of an amount, summed over facets and over contacts.
     point_off_facet_max_m : float
         Largest distance of a contact point from its facet, m.
     """
 
     workpiece_relative_error: float
     facets_relative_error: float
-    events_relative_error: float
     point_off_facet_max_m: float
 
 
@@ -120,8 +119,7 @@ class Loading(Totals, Document):
         Limits between the types of contact events.
     types : mapping of ContactType
         By type: impact, sliding, rolling, resting.
-    profiles : mapping of Profile
-        By depth and azimuth.
+    by_depth : Profile
     closure : LoadClosure
         Check of the sums.
     """
@@ -139,5 +137,5 @@ class Loading(Totals, Document):
     impact_seen_fraction: float
     limits: Thresholds
     types: Mapping[str, ContactType]
-    profiles: Mapping[str, Profile]
+    by_depth: Profile
     closure: LoadClosure

@@ -75,7 +75,7 @@ def workpiece_figure(
         _view(axes, mesh, name, scale, case)
     if bins is not None:
         _unrolled(panels[2], bins, scale, case)
-    _profile(panels[-1], loading.profiles["depth"])
+    _profile(panels[-1], loading.by_depth)
     panels[0].set(ylabel="depth (mm)", ylim=_depths(case)[::-1])
     _bar(figure, panels, scale, _LABEL)
     head(figure, _title(loading, case))
@@ -228,7 +228,7 @@ def _unrolled(axes: Axes, bins: _Bins, scale: Normalize, case: CaseOfRun) -> Non
 
 def _profile(axes: Axes, profile: Profile) -> None:
     """Draw force times sliding distance against depth with its interval."""
-    depth_bars(axes, profile.edges, profile.force_slide, 1e-3)
+    depth_bars(axes, profile.edges_m, profile.force_slide, 1e-3)
     axes.set(xlim=(0.0, None), title="by depth, incl. end face\n(bars: 95 % CI)")
     axes.set_xlabel("force times sliding\ndistance per path and\ndepth (N m/(m mm))")
 

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from dragchain.arrays import Floats, Ints
-from dragchain.drag import circumference, parts, within_angle
+from dragchain.drag import within_angle
 from dragchain.loading.contact_events import AMOUNTS, LIMITS, TYPES, surfaces
 from dragchain.loading.document import ContactType, LoadClosure, Loading, Profile, Quantiles, Totals
 from dragchain.loading.samples import WORKPIECE, Sampled
@@ -18,7 +18,7 @@ from dragchain.statistics.correlated import estimates
 from dragchain.statistics.estimate import CONFIDENCE, EstimateColumns
 from dragdeck.records.case import CaseOfRun
 
-DEPTH_BINS, AZIMUTH_BINS = 20, 24
+DEPTH_BINS = 20
 
 _KNOWN = (*AMOUNTS, "normal_work_j", "workpiece_work_j")
 """Amounts of which totals are known."""
@@ -70,8 +70,8 @@ def summarise_loading(
         limits=LIMITS,
         **dict(_totals(sampled, events)),
         types=_types(sampled, events, event),
-        profiles=_profiles(sampled),
-        closure=_closure(sampled, facets, events, off_facet_m),
+        by_depth=_profile(sampled),
+        closure=_closure(sampled, facets, off_facet_m),
     )
 
 
@@ -146,35 +146,23 @@ def event_quantiles(values: pd.Series) -> Quantiles:
     )
 
 
-def _profiles(sampled: Sampled) -> dict[str, Profile]:
-    """Force times sliding distance by depth and by azimuth, per metre of path."""
+def _profile(sampled: Sampled) -> Profile:
+    """Force times sliding distance by depth, per metre of path."""
     rows = sampled.rows
-    depth, azimuth = rows["depth_m"].to_numpy(), rows["azimuth_rad"].to_numpy(np.float64)
+    depth = rows["depth_m"].to_numpy()
     levels = np.linspace(depth.min(), depth.max(), DEPTH_BINS + 1)
     level = np.clip(np.searchsorted(levels, depth, side="right") - 1, 0, DEPTH_BINS - 1)
-    return {
-        "depth": _profile(sampled, levels, (level, level)),
-        "azimuth": _profile(sampled, circumference(AZIMUTH_BINS), parts(azimuth, AZIMUTH_BINS)),
-    }
-
-
-def _profile(sampled: Sampled, edges: Floats, halves: tuple[Ints, Ints]) -> Profile:
-    """A profile over equal bins, with the bin that each half of a contact belongs to."""
-    frame, weight = (sampled.rows[name].to_numpy() for name in ("frame", "force_slide_n_m"))
-    sums = np.zeros((sampled.frames, len(edges) - 1))
-    for half in halves:
-        np.add.at(sums, (frame, half), 0.5 * weight)
-    scale = sampled.path_m / sampled.frames * (edges[1] - edges[0])
+    sums = np.zeros((sampled.frames, DEPTH_BINS))
+    np.add.at(sums, (rows["frame"].to_numpy(), level), rows["force_slide_n_m"].to_numpy())
+    scale = sampled.path_m / sampled.frames * (levels[1] - levels[0])
     profile = estimates(sums, lambda means: means / scale)
-    return Profile(edges=tuple(edges.tolist()), force_slide=EstimateColumns.of(profile))
+    return Profile(edges_m=tuple(levels.tolist()), force_slide=EstimateColumns.of(profile))
 
 
 # --- closure ---------------------------------------------------------------------------------
 
 
-def _closure(
-    sampled: Sampled, facets: pd.DataFrame, events: pd.DataFrame, off_facet_m: float
-) -> LoadClosure:
+def _closure(sampled: Sampled, facets: pd.DataFrame, off_facet_m: float) -> LoadClosure:
     whole = {name: float(sampled.rows[name].sum()) for name in AMOUNTS}
     placed = facets[list(WORKPIECE)].to_numpy().sum(axis=0)
     missing = sampled.workpiece_impulse_n_s - placed
@@ -183,7 +171,6 @@ def _closure(
             np.linalg.norm(missing) / np.linalg.norm(sampled.workpiece_impulse_n_s)
         ),
         facets_relative_error=_largest_error(facets, whole),
-        events_relative_error=_largest_error(events, whole),
         point_off_facet_max_m=off_facet_m,
     )
 

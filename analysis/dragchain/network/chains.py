@@ -31,12 +31,6 @@ chain."""
 LEAST_PARTICLES = 3
 """Fewer particles are no chain (Peters et al. 2005)."""
 
-STRESS_FACTOR = 1.0
-"""Least major principal stress of a chain's particles, as a multiple of the frame's mean."""
-
-THRESHOLD = 1.0
-"""Least normal force of a workpiece path's contacts, as a multiple of the frame's mean."""
-
 
 @dataclass(frozen=True)
 class WidestPath:
@@ -116,27 +110,21 @@ def major_stress(stress: Floats) -> tuple[Floats, Floats]:
     return values[:, -1], vectors[:, :, -1]
 
 
-def peters_rows(
-    frame: NetworkFrame,
-    alpha_rad: float = ALPHA_RAD,
-    stress_factor: float = STRESS_FACTOR,
-    major: tuple[Floats, Floats] | None = None,
-) -> ChainRows:
+def peters_rows(frame: NetworkFrame, major: tuple[Floats, Floats] | None = None) -> ChainRows:
     """The quasi-linear force chains, with the contacts between their particles.
 
-    A particle is highly stressed when its major compressive principal stress is above
-    `stress_factor` times the mean of all particles (1 in the paper). Two highly stressed particles
-    in contact are linked when the line of their centres is within `alpha_rad` of the principal
-    axis of both; at least `LEAST_PARTICLES` linked particles are a chain (Peters et al. 2005).
-    Ours is the rule for more than one candidate at the same end of a particle: candidates are
-    taken by falling normal force (of equal ones the first of the frame), each end of an axis holds
+    A particle is highly stressed when its major compressive principal stress is above the mean of
+    all particles. Two highly stressed particles in contact are linked when the line of their
+    centres is within `ALPHA_RAD` of the principal axis of both; at least `LEAST_PARTICLES` linked
+    particles are a chain (Peters et al. 2005). Ours is the rule for more than one candidate at the
+    same end of a particle: candidates are taken by falling normal force (of equal ones the first of the frame), each end of an axis holds
     one link, and no link closes a ring, so that every chain is a path and no particle is in two
     chains. A chain starts at its higher end, and the chains come by the height of their starts.
     `major` is what `major_stress` returns for the frame, if it is known already.
     """
     stress, axis = major_stress(particle_stress(frame)) if major is None else major
-    high = stress > stress_factor * stress.mean() if stress.size else stress > 0.0
-    candidates, end = _candidates(frame, alpha_rad, high, axis)
+    high = stress > stress.mean() if stress.size else stress > 0.0
+    candidates, end = _candidates(frame, high, axis)
     near, by = kernels.link_particles(
         frame.particle_id.size, frame.a[candidates], frame.b[candidates], end[0], end[1]
     )
@@ -147,7 +135,7 @@ def peters_rows(
 
 
 def _candidates(
-    frame: NetworkFrame, alpha_rad: float, high: NDArray[np.bool_], axis: Floats
+    frame: NetworkFrame, high: NDArray[np.bool_], axis: Floats
 ) -> tuple[Ints, NDArray[np.bool_]]:
     """The linkable contacts by falling force, and at which end of either axis they link."""
     inner = np.flatnonzero(frame.between_particles())
@@ -158,7 +146,7 @@ def _candidates(
     cosine = np.stack(
         [np.einsum("ci,ci->c", axis[first], line), -np.einsum("ci,ci->c", axis[second], line)]
     )
-    aligned = np.flatnonzero((np.abs(cosine) >= np.cos(alpha_rad)).all(axis=0))
+    aligned = np.flatnonzero((np.abs(cosine) >= np.cos(ALPHA_RAD)).all(axis=0))
     aligned = aligned[np.argsort(-frame.normal_force[inner[aligned]], kind="stable")]
     return inner[aligned], cosine[:, aligned] > 0
 
@@ -166,19 +154,18 @@ def _candidates(
 # --- paths from the workpiece to the bowl ----------------------------------------------------
 
 
-def widest_paths(frame: NetworkFrame, threshold: float = THRESHOLD) -> list[WidestPath]:
+def widest_paths(frame: NetworkFrame) -> list[WidestPath]:
     """Return one path for each strong workpiece contact, by falling force of that contact.
 
-    Contacts whose normal force is above `threshold` times the mean of all the frame's contacts are
-    strong. A path leads from the workpiece contact through strong contacts between particles to a
-    strong contact with floor or side. Of all such paths the widest counts: the one whose weakest
+    Contacts whose normal force is above the mean of all the frame's contacts are strong. A path
+    leads from the workpiece contact through strong contacts between particles to a strong contact with floor or side. Of all such paths the widest counts: the one whose weakest
     contact (its bottleneck, workpiece and bowl contacts included) is strongest; among several the
     one with the fewest contacts, then the one with the largest sum of forces, then the one that is
     found first from the workpiece on, level by level, where contacts are taken in the order of the
     frame. The widest path of a graph runs along its maximum spanning tree (Hu 1961, Oper. Res. 9,
     898-900); the tie rule is ours.
     """
-    rows = path_rows(frame, threshold)
+    rows = path_rows(frame)
     pairs = zip(
         rows.particle_lists(), split_chains(rows.contacts, rows.contact_starts), strict=True
     )
@@ -191,10 +178,10 @@ def _end(frame: NetworkFrame, contacts: list[int]) -> int | None:
     return int(frame.other[contacts[-1]]) if len(contacts) > 1 else None
 
 
-def path_rows(frame: NetworkFrame, threshold: float = THRESHOLD) -> ChainRows:
+def path_rows(frame: NetworkFrame) -> ChainRows:
     """The paths of `widest_paths`; one that leads nowhere has the workpiece contact alone."""
     force = frame.normal_force
-    strong = np.flatnonzero(force > threshold * frame.mean_force_n())
+    strong = np.flatnonzero(force > frame.mean_force_n())
     workpieces = strong[frame.other[strong] == WORKPIECE]
     workpieces = workpieces[np.argsort(-force[workpieces], kind="stable")]
     links = strong[frame.other[strong] != WORKPIECE]

@@ -43,34 +43,24 @@ class Chains(Part):
     ----------
     widest_paths_per_frame : float
         Paths from workpiece to bowl per frame.
-    workpiece_contacts_without_path_per_frame : float
-        Contacts above the mean force from which no path leads to the bowl.
     widest_paths_to_side_fraction : float
         Fraction of the paths that end at the side wall.
-    dominant_frames : int
-        Frames with a dominant path.
-    dominant_bottleneck_mean_n, dominant_bottleneck_max_n : float
-        Bottleneck force of the dominant paths, N.
+    dominant_bottleneck_max_n : float
+        Largest bottleneck force of the dominant paths, N.
     dominant_particles_mean : float
         Mean number of particles of the dominant paths.
-    dominant_altitude_mean_m, dominant_altitude_std_m : float
+    dominant_altitude_mean_m : float
         Height of the dominant paths above the floor, m.
-    dominant_azimuth_mean_rad, dominant_azimuth_resultant : float
-        Circular mean of their direction from that of the motion, rad, and its resultant length
-        (1: all equal).
+    dominant_azimuth_mean_rad : float
+        Circular mean of their direction from that of the motion, rad.
     """
 
     widest_paths_per_frame: float
-    workpiece_contacts_without_path_per_frame: float
     widest_paths_to_side_fraction: Real
-    dominant_frames: int
-    dominant_bottleneck_mean_n: Real
     dominant_bottleneck_max_n: Real
     dominant_particles_mean: Real
     dominant_altitude_mean_m: Real
-    dominant_altitude_std_m: Real
     dominant_azimuth_mean_rad: Real
-    dominant_azimuth_resultant: Real
 
 
 class AheadBehind(Part):

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from matplotlib.typing import RcKeyType
 
-from dragchain.figures.style import PAPER_COLOURS, drawing, true_minus
+from dragchain.figures.style import drawing, true_minus
 from dragchain.loading.write import compute_loading, figure_of
 from dragchain.report.findings import FILE, ProcessFindings
 from dragchain.report.run_data import RunData
@@ -34,7 +34,7 @@ _PRINT: dict[RcKeyType, Any] = {
 """Text of one size that stays text."""
 
 
-def write_journal_figures(run_dir: Path, paper_colours: bool = False) -> list[Path]:
+def write_journal_figures(run_dir: Path) -> list[Path]:
     """Draw the figures of a process run into ``figures/journal/``.
 
     They have no headings, whose content belongs into the caption; several panels have letters.
@@ -45,9 +45,6 @@ def write_journal_figures(run_dir: Path, paper_colours: bool = False) -> list[Pa
     ----------
     run_dir : Path
         The folder of a process run, with its tables, chains and figures made.
-    paper_colours : bool
-        Forces from green to red, as in Uhlmann et al. (2015), instead of the map that is told
-        apart with any kind of colour vision.
 
     Returns
     -------
@@ -64,9 +61,6 @@ def write_journal_figures(run_dir: Path, paper_colours: bool = False) -> list[Pa
     written = []
     with drawing():
         matplotlib.rcParams.update(_PRINT)
-        if paper_colours:
-            matplotlib.colormaps.register(PAPER_COLOURS, force=True)
-            matplotlib.rcParams["image.cmap"] = PAPER_COLOURS.name
         figures = {draw.__name__: draw(run, findings) for draw in DRAW_PROCESS}
         figures["workpiece"] = figure_of(compute_loading(run_dir))
         for name, figure in figures.items():

@@ -266,16 +266,11 @@ def _chains(chains: pd.DataFrame, frames: int) -> Chains:
     mean_azimuth = azimuth.mean() if len(azimuth) else np.nan
     return Chains(
         widest_paths_per_frame=len(whole) / frames,
-        workpiece_contacts_without_path_per_frame=(len(paths) - len(whole)) / frames,
         widest_paths_to_side_fraction=(whole["end_kind"] == "side").mean(),
-        dominant_frames=len(dominant),
-        dominant_bottleneck_mean_n=dominant["bottleneck_n"].mean(),
         dominant_bottleneck_max_n=dominant["bottleneck_n"].max(),
         dominant_particles_mean=dominant["n_particles"].mean(),
         dominant_altitude_mean_m=dominant["altitude_m"].mean(),
-        dominant_altitude_std_m=dominant["altitude_m"].std(),
         dominant_azimuth_mean_rad=np.angle(mean_azimuth),
-        dominant_azimuth_resultant=np.abs(mean_azimuth),
     )
 
 

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from dragchain.arrays import Floats, Ints
 from dragchain.errors import SeriesError
-from dragchain.statistics.estimate import CONFIDENCE, Estimate, student_quantile
+from dragchain.statistics.estimate import Estimate, student_quantile
 
 MIN_SAMPLES = 8
 """Fewer samples carry no autocorrelation worth estimating."""
@@ -53,8 +53,6 @@ class MeanEstimate:
         Standard error of the mean, in the unit of the series.
     ci95_low, ci95_high : float
         Confidence interval of the mean.
-    confidence : float
-        Confidence level of the interval.
     reliable : bool
         Whether the series is at least 10 autocorrelation times long and not
         constant. If not, the interval is probably too narrow.
@@ -68,7 +66,6 @@ class MeanEstimate:
     se: float
     ci95_low: float
     ci95_high: float
-    confidence: float
     reliable: bool
 
     @property
@@ -87,7 +84,7 @@ class MeanEstimate:
         return Estimate(value, value - half, value + half, reliable=reliable)
 
 
-def estimate_mean(series: ArrayLike, *, confidence: float = CONFIDENCE) -> MeanEstimate:
+def estimate_mean(series: ArrayLike) -> MeanEstimate:
     """Estimate the mean of a correlated series and its confidence interval.
 
     The standard error is ``std / sqrt(n)`` with ``n = N / (2 tau)`` (Sokal 1997,
@@ -101,8 +98,6 @@ def estimate_mean(series: ArrayLike, *, confidence: float = CONFIDENCE) -> MeanE
     ----------
     series : (N,) array_like
         Samples at equal intervals, at least 8.
-    confidence : float
-        Level of the interval, between 0 and 1.
 
     Returns
     -------
@@ -112,21 +107,18 @@ def estimate_mean(series: ArrayLike, *, confidence: float = CONFIDENCE) -> MeanE
     Raises
     ------
     SeriesError
-        If there are too few samples, one is not finite, or `confidence` is not
-        between 0 and 1.
+        If there are too few samples, or one is not finite.
     """
     samples = _checked(series)
-    if not 0.0 < confidence < 1.0:
-        raise SeriesError(f"the confidence must lie between 0 and 1, but is {confidence}")
     count = len(samples)
     mean, std = float(samples.mean()), float(samples.std(ddof=1))
     tau, window = _time_and_window(samples)
     effective = count / (2.0 * tau)
     error = std / np.sqrt(effective)
     slow, slow_degrees = slow_error(samples)
-    half = student_quantile(max(count / (2 * window + 1), 1.0), confidence) * error
+    half = student_quantile(max(count / (2 * window + 1), 1.0)) * error
     if slow**2 > _SLOWER * error**2:
-        half = max(half, student_quantile(slow_degrees, confidence) * slow)
+        half = max(half, student_quantile(slow_degrees) * slow)
     return MeanEstimate(
         mean=mean,
         std=std,
@@ -136,7 +128,6 @@ def estimate_mean(series: ArrayLike, *, confidence: float = CONFIDENCE) -> MeanE
         se=float(error),
         ci95_low=float(mean - half),
         ci95_high=float(mean + half),
-        confidence=confidence,
         reliable=bool(np.ptp(samples) > 0.0 and count >= RELIABLE_TIMES * tau),
     )
 
@@ -244,9 +235,7 @@ The sum then comes from a few dozen events, and its distribution is too skew for
 """
 
 
-def estimates(
-    sums: Floats, statistic: Callable[[Floats], Floats], *, confidence: float = CONFIDENCE
-) -> list[Estimate]:
+def estimates(sums: Floats, statistic: Callable[[Floats], Floats]) -> list[Estimate]:
     """Return statistics of mean frame sums with their intervals.
 
     The ends of an interval are the values of the statistic where the means are moved as far as
@@ -260,8 +249,6 @@ def estimates(
         Sums of each frame, in the order of time.
     statistic
         Function of (..., k) mean sums that returns (..., m) numbers.
-    confidence : float
-        Level of the intervals, between 0 and 1.
 
     Raises
     ------
@@ -279,8 +266,7 @@ def estimates(
         values = statistic(means)
         series = centred @ _slopes(sums, means, statistic)
         mean_estimates = [
-            estimate_mean(column, confidence=confidence) if np.isfinite(column).all() else None
-            for column in series.T
+            estimate_mean(column) if np.isfinite(column).all() else None for column in series.T
         ]
         reach = [mean.ci95_high - mean.mean if mean else np.nan for mean in mean_estimates]
         shares = np.nan_to_num(centred.T @ series / np.sum(series**2, axis=0))

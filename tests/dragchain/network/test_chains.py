@@ -174,12 +174,12 @@ def joined(frame: NetworkFrame, contact: int) -> set[int]:
     return {int(frame.a[contact]), int(frame.b[contact])}
 
 
-@given(frames, st.sampled_from([0.3, 1.0, 2.0]))
+@given(frames)
 @settings(max_examples=30)
-def test_a_path_is_the_shortest_of_the_widest(frame: NetworkFrame, threshold: float) -> None:
+def test_a_path_is_the_shortest_of_the_widest(frame: NetworkFrame) -> None:
     """Against the search of scipy, where a link is shorter the stronger it is."""
     force, bowl, long = frame.normal_force, frame.particle_id.size, 1e6
-    strong = force > threshold * frame.mean_force_n()
+    strong = force > frame.mean_force_n()
 
     def distance(start: int, least: float) -> float:
         used = np.flatnonzero(strong & (frame.other != WORKPIECE) & (force >= least))
@@ -189,7 +189,7 @@ def test_a_path_is_the_shortest_of_the_widest(frame: NetworkFrame, threshold: fl
         graph = csgraph_from_dense(np.minimum(lengths, lengths.T), null_value=np.inf)
         return float(dijkstra(graph, indices=start)[bowl])
 
-    paths = widest_paths(frame, threshold)
+    paths = widest_paths(frame)
     assert len(paths) == (strong & (frame.other == WORKPIECE)).sum()
     for path in paths:
         (first, *links), start = path.contacts, path.particles[0]
@@ -207,17 +207,15 @@ def test_a_path_is_the_shortest_of_the_widest(frame: NetworkFrame, threshold: fl
         assert frame.a[links[-1]] == path.particles[-1] and frame.other[links[-1]] == path.end
 
 
-@given(frames, st.sampled_from([30.0, 45.0, 60.0]), st.sampled_from([0.3, 1.0, 2.0]))
+@given(frames)
 @settings(max_examples=30)
-def test_peters_chains_go_along_the_axes_of_stressed_particles(
-    frame: NetworkFrame, angle_deg: float, factor: float
-) -> None:
+def test_peters_chains_go_along_the_axes_of_stressed_particles(frame: NetworkFrame) -> None:
     tensor = particle_stress(frame)
     np.testing.assert_allclose(tensor, tensor.transpose(0, 2, 1))
     stress, axis = major_stress(tensor)
-    chains = peters_rows(frame, math.radians(angle_deg), factor)
+    chains = peters_rows(frame)
     assert len(set(chains.particles.tolist())) == len(chains.particles)
-    assert (stress[chains.particles] > factor * stress.mean()).all()
+    assert (stress[chains.particles] > stress.mean()).all()
     links = split_chains(chains.contacts, chains.contact_starts)
     for particles, contacts in zip(chains.particle_lists(), links, strict=True):
         assert len(particles) >= 3
@@ -225,7 +223,7 @@ def test_peters_chains_go_along_the_axes_of_stressed_particles(
             assert set(pair) == joined(frame, contact)
             line = np.subtract(*frame.centre[list(pair)])
             cosines = axis[list(pair)] @ line / np.linalg.norm(line)
-            assert (np.abs(cosines) > math.cos(math.radians(angle_deg)) - 1e-9).all()
+            assert (np.abs(cosines) > math.sqrt(0.5) - 1e-9).all()
 
 
 @given(st.builds(random_frame, st.integers(0, 2**32 - 1), edge=st.integers(2, 5)))
