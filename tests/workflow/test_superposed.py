@@ -316,7 +316,7 @@ def test_a_reversal_reverses_the_torque(runs: Runs) -> None:
     found = compute_loading(folder)
     contacts = pd.read_parquet(folder / "tables/workpiece_contacts.parquet", columns=["step"])
     sampled = force[force["step"].isin(contacts["step"])]
-    interval = found.sampled.interval_s
+    interval = found.summary.sample_interval_s
     impulse = found.facets[[f"body_{axis}_impulse_n_s" for axis in "xyz"]].to_numpy().sum(axis=0)
     whole = sampled[[f"body_{axis}_n" for axis in "xyz"]].to_numpy().sum(axis=0) * interval
     np.testing.assert_allclose(impulse, whole, atol=0.02 * np.linalg.norm(whole))
@@ -353,7 +353,7 @@ def test_contacts_lie_on_an_inclined_workpiece_that_spins(runs: Runs) -> None:
     torque = sampled[[f"torque_{axis}_n_m" for axis in "xyz"]].to_numpy()
     power = -(sampled["drag_n"] * axis_speed(case) + (torque * turning).sum(axis=1))
     work = found.summary.totals["workpiece_work_j"]
-    assert work == pytest.approx(power.sum() * found.sampled.interval_s, rel=0.05)
+    assert work == pytest.approx(power.sum() * found.summary.sample_interval_s, rel=0.05)
 
 
 # --- a particle on a spinning plate --------------------------------------------------------------

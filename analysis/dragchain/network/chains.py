@@ -117,9 +117,10 @@ def peters_rows(frame: NetworkFrame, major: tuple[Floats, Floats] | None = None)
     all particles. Two highly stressed particles in contact are linked when the line of their
     centres is within `ALPHA_RAD` of the principal axis of both; at least `LEAST_PARTICLES` linked
     particles are a chain (Peters et al. 2005). Ours is the rule for more than one candidate at the
-    same end of a particle: candidates are taken by falling normal force (of equal ones the first of the frame), each end of an axis holds
-    one link, and no link closes a ring, so that every chain is a path and no particle is in two
-    chains. A chain starts at its higher end, and the chains come by the height of their starts.
+    same end of a particle: candidates are taken by falling normal force (of equal ones the first
+    of the frame), each end of an axis holds one link, and no link closes a ring, so that every
+    chain is a path and no particle is in two chains. A chain starts at its higher end, and the
+    chains come by the height of their starts.
     `major` is what `major_stress` returns for the frame, if it is known already.
     """
     stress, axis = major_stress(particle_stress(frame)) if major is None else major
@@ -158,8 +159,9 @@ def widest_paths(frame: NetworkFrame) -> list[WidestPath]:
     """Return one path for each strong workpiece contact, by falling force of that contact.
 
     Contacts whose normal force is above the mean of all the frame's contacts are strong. A path
-    leads from the workpiece contact through strong contacts between particles to a strong contact with floor or side. Of all such paths the widest counts: the one whose weakest
-    contact (its bottleneck, workpiece and bowl contacts included) is strongest; among several the
+    leads from the workpiece contact through strong contacts between particles to a strong contact
+    with floor or side. Of all such paths the widest counts: the one whose weakest contact (its
+    bottleneck, workpiece and bowl contacts included) is strongest; among several the
     one with the fewest contacts, then the one with the largest sum of forces, then the one that is
     found first from the workpiece on, level by level, where contacts are taken in the order of the
     frame. The widest path of a graph runs along its maximum spanning tree (Hu 1961, Oper. Res. 9,

@@ -4,13 +4,10 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from io import BytesIO
-from itertools import chain
 
 import pandas as pd
 import pyarrow as pa
 
-from dragchain.quantities.basis import Standing
-from dragchain.report.cases import ReportedCase
 from dragchain.tables.columns import descriptions, unit_of
 from dragdeck.records.case import AssumptionOfRun
 
@@ -37,47 +34,10 @@ def definitions(table: pd.DataFrame, name: str = "summary") -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["column", "unit", "meaning"], dtype=object)
 
 
-def overview(cases: Sequence[ReportedCase]) -> pd.DataFrame:
-    """The main quantities of all cases, one row per line of the set-up and per quantity.
-
-    Parameters
-    ----------
-    cases : sequence of ReportedCase
-        C cases.
-
-    Returns
-    -------
-    DataFrame
-        ``quantity``, ``unit`` and five columns per case: value of the process, the ends of its
-        95 % confidence interval, value of the run, and what the first one rests on.
-    """
-    standings = [{one.quantity: one for one in case.values.standings} for case in cases]
-    known = dict.fromkeys(quantity for every in standings for quantity in every)
-    rows: list[list[object]] = []
-    for line, (name, _) in enumerate(cases[0].set_up):
-        texts = [[case.set_up[line][1], *[None] * 4] for case in cases]
-        rows.append([name, None, *chain.from_iterable(texts)])
-    for quantity in known:
-        cells = [_cells(every.get(quantity)) for every in standings]
-        rows.append([quantity.label, quantity.unit or "1", *chain.from_iterable(cells)])
-    heads = ("process", "95 % CI low", "95 % CI high", "run", "basis")
-    columns = [f"{case.name}: {head}" for case in cases for head in heads]
-    return pd.DataFrame(rows, columns=["quantity", "unit", *columns], dtype=object)
-
-
-def _cells(one: Standing | None) -> list[object]:
-    if one is None:
-        return [None] * 5
-    value = [one.value.value, one.value.ci95_low, one.value.ci95_high] if one.value else [None] * 3
-    return [*value, one.run.value, f"{one.rests_on}; {one.reason}" if one.reason else one.rests_on]
-
-
 def summary_workbook(
-    table: pd.DataFrame,
-    assumptions: Mapping[str, Sequence[AssumptionOfRun]],
-    cases: Sequence[ReportedCase],
+    table: pd.DataFrame, assumptions: Mapping[str, Sequence[AssumptionOfRun]]
 ) -> bytes:
-    """The summary as an XLSX file: sheets Overview, Summary, Definitions and Assumptions.
+    """The summary as an XLSX file: sheets Summary, Definitions and Assumptions.
 
     Parameters
     ----------
@@ -85,8 +45,6 @@ def summary_workbook(
         The summary, one row per run.
     assumptions : mapping of str to sequence of AssumptionOfRun
         The assumptions of each run, by its name.
-    cases : sequence of ReportedCase
-        The cases for the overview.
     """
     assumed = [
         {"run": run, "field": one.field, "value": json.dumps(one.value), "reason": one.why}
@@ -95,12 +53,7 @@ def summary_workbook(
     ]
     assumption_sheet = pd.DataFrame(assumed, columns=["run", "field", "value", "reason"])
     return workbook(
-        {
-            "Overview": overview(cases),
-            "Summary": table,
-            "Definitions": definitions(table),
-            "Assumptions": assumption_sheet,
-        }
+        {"Summary": table, "Definitions": definitions(table), "Assumptions": assumption_sheet}
     )
 
 

@@ -216,7 +216,7 @@ def write_study_report(
         removed = [(one, *found) for one in cases if (found := _removed(one))]
         signals = _signals(cases, signal)
         picture = file_uri(preview) if preview else None
-        page = _render(sections, cases, table, missing, picture, removed, signals)
+        page = _render(sections, cases, missing, picture, removed, signals)
         earlier = {file.resolve() for name in _OF_CASES for file in out_dir.glob(name)}
         for file in earlier - {section.network for section in sections}:
             file.unlink()
@@ -228,7 +228,7 @@ def write_study_report(
         write_bundle(
             out_dir,
             tables={"summary": table, **maps} | _tables(signals),
-            files={"summary.xlsx": summary_workbook(table, assumed, cases)},
+            files={"summary.xlsx": summary_workbook(table, assumed)},
             pages={"report": page},
         )
     elif not any(run.scene == "process" for run in missing):
@@ -298,7 +298,6 @@ def _pictures(run: ReportedRun[Findings]) -> Iterator[tuple[str, str]]:
 def _render(
     sections: Sequence[RunSection],
     cases: Sequence[ReportedCase],
-    table: pd.DataFrame,
     missing: Sequence[MissingRun],
     preview: str | None,
     removed: Sequence[tuple[ReportedCase, RemovalOfCase, str]],
@@ -322,7 +321,6 @@ def _render(
         compared=[(one, row) for one in cases for row in one.values.against],
         signals=[(one, data_uri(one.picture()) if one.differences else None) for one in signals],
         overview=_overview(cases) if len(cases) > 1 else None,
-        columns={str(name): table[name].tolist() for name in table},
         shown=_SHOWN,
         reliable_times=RELIABLE_TIMES,
         asked=[(one, answer) for one in cases for answer in answers(one)],

@@ -1,16 +1,13 @@
 import math
 from io import BytesIO
-from pathlib import Path
 from zipfile import ZipFile
 
 import numpy as np
 import openpyxl
 import pandas as pd
 import pytest
-from report_files import PICTURES, case_json, make_run, process_findings, write_quantities
 
-from dragchain.report.cases import cases_of, read_study_runs
-from dragchain.report.spreadsheet import definitions, summary_workbook, workbook
+from dragchain.report.spreadsheet import definitions, workbook
 
 FORMULAE = ["=1+1", "+1", "-1", "@SUM(A1)", "{=1}", "https://example.org", "=cmd|' /C calc'!A0"]
 
@@ -54,19 +51,3 @@ def test_cells_keep_their_values_and_types() -> None:
 def test_definitions_have_units_and_meanings(column: str, unit: str) -> None:
     (row,) = definitions(pd.DataFrame({column: [1.0]})).itertuples(index=False)
     assert (row.column, row.unit) == (column, unit) and row.meaning
-
-
-def test_the_overview_has_a_row_per_quantity(tmp_path: Path) -> None:
-    case = case_json("process", "workpiece-1")
-    folder = make_run(tmp_path, case, process_findings(), PICTURES)
-    write_quantities(folder, corrected=0.8)
-    book = read(summary_workbook(pd.DataFrame({"a": [1]}), {}, cases_of([read_study_runs(folder)])))
-    rows = {row[0].value: row for row in book["Overview"].iter_rows()}
-    assert [cell.value for cell in rows["quantity"]][2:] == [
-        f"10 mm <workpiece>: {head}"
-        for head in ("process", "95 % CI low", "95 % CI high", "run", "basis")
-    ]
-    assert "diameter 10 mm" in str(rows["Workpiece"][2].value)
-    drag = rows["mean drag"]
-    assert [round(cell.value, 6) for cell in drag[2:6]] == [-2.0, -2.2, -1.8, -2.5]
-    assert drag[6].value == "from 3 windows at the physical Young's modulus"
