@@ -26,7 +26,6 @@ from dragchain.report.findings import (
     Chains,
     DepthProfile,
     DropFindings,
-    DropImpacts,
     DropRestitution,
     FillingFindings,
     Findings,
@@ -93,7 +92,6 @@ FILLING = FillingFindings(
 DROP = DropFindings(
     run="drop-1",
     restitution=DropRestitution(mean=0.71, lowest=0.7, highest=0.72, impacts=3, input=0.68),
-    impacts=DropImpacts.model_validate(dict.fromkeys(DropImpacts.model_fields, ())),
 )
 
 

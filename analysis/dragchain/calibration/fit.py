@@ -224,7 +224,8 @@ def fit(observed: Observed, emulator: Emulator, contact: Emulator, known: DropTe
     )  # fmt: skip
     least, degrees = 2.0 * float(best.cost), flights + peaks - 1
     inflation = math.sqrt(max(1.0, least / degrees)) if degrees else 1.0
-    std = math.sqrt(np.linalg.inv(best.jac.T @ best.jac)[0, 0])
+    slopes = np.asarray(best.jac)
+    std = math.sqrt(np.linalg.inv(slopes.T @ slopes)[0, 0])
     value = Estimate.around(float(best.x[0]), NORMAL_QUANTILE * inflation * std)
     if not low < value.ci95_low < value.ci95_high < high:
         raise RecordError(

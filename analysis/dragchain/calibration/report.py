@@ -194,7 +194,7 @@ def calibrate_restitution(case: Case, folder: Path, templates: jinja2.Environmen
 
 def _put_restitution(result: CalibrationFile) -> str:
     return (
-        f"set pairs.{result.known.pair}.restitution: {result.put.value:g}\n"
+        f"set pairs.{result.known.pair}.restitution: {result.put:g}\n"
         f"  95 % CI {result.fit.ci95_low:.4f} to {result.fit.ci95_high:.4f}\n"
         f"  effective restitution {result.effective:.4f}; measured {result.measured.value:.4f}"
     )

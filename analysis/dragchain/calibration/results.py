@@ -1,7 +1,6 @@
 """The files of a calibration: record, result and tables."""
 
 import math
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,23 +12,8 @@ from dragchain.calibration.measured_impacts import Measured
 from dragchain.calibration.simulated_drops import Drops
 from dragchain.errors import TableError
 from dragchain.statistics.estimate import Estimate
-from dragdeck.documents import Document, Part
+from dragdeck.documents import Document
 from dragdeck.files import write_text
-
-
-class Put(Part):
-    """The value to set in a field of the study.
-
-    Attributes
-    ----------
-    field : str
-        Dotted name of the field.
-    value : float
-        Value for the study.
-    """
-
-    field: str
-    value: float
 
 
 class CalibrationFile(Document):
@@ -49,8 +33,8 @@ class CalibrationFile(Document):
         Fitted input value minus measured restitution.
     known : DropTest
         The study and its drop test.
-    put : Put
-        The value to set in the study.
+    put : float
+        The value to set in the study as the restitution of the pair.
     peaks_compared : bool
         Whether peak forces were fitted too.
     record : Measured
@@ -62,7 +46,7 @@ class CalibrationFile(Document):
     fit: Fit
     fit_full: Fit
     known: DropTest
-    put: Put
+    put: float
     measured: Estimate
     effective: float
     peaks_compared: bool
@@ -89,7 +73,7 @@ def result(fit: RecordFit) -> CalibrationFile:
     measured, known = put_at_full.mapped(drops.reference.rebound), drops.known
     return CalibrationFile(
         known=known,
-        put=Put(field=f"pairs.{known.pair}.restitution", value=_rounded(fit.fit)),
+        put=_rounded(fit.fit),
         measured=measured,
         effective=drops.production.rebound(deck),
         fit=fit.fit,
@@ -152,28 +136,8 @@ def impact_table(fit: RecordFit) -> pd.DataFrame:
     )
 
 
-@dataclass(frozen=True)
-class Confirmed:
-    """Rebound of the production drops at the fitted value.
-
-    Attributes
-    ----------
-    restitution : float
-        In their deck.
-    drops : int
-    effective, se, std : float
-        Mean rebound, its standard error, and the standard deviation of a drop.
-    """
-
-    restitution: float
-    drops: int
-    effective: float
-    se: float
-    std: float
-
-
-def confirmed(drops: Drops) -> Confirmed:
-    """What the confirming drops say.
+def confirmed(drops: Drops) -> dict[str, float]:
+    """Rebound of the production drops at the fitted value: mean, standard error and deviation.
 
     Raises
     ------
@@ -185,5 +149,10 @@ def confirmed(drops: Drops) -> Confirmed:
         raise TableError("the confirming drop tests are missing; run `./run calibrate`")
     rebound = np.array([run.effective for run in runs])
     std = float(rebound.std(ddof=1))
-    restitution, mean = runs[0].drop.restitution, float(rebound.mean())
-    return Confirmed(restitution, len(runs), mean, std / math.sqrt(len(runs)), std)
+    return {
+        "restitution": runs[0].drop.restitution,
+        "drops": len(runs),
+        "effective": float(rebound.mean()),
+        "se": std / math.sqrt(len(runs)),
+        "std": std,
+    }

@@ -25,8 +25,8 @@ from pydantic import JsonValue
 from dragchain.arrays import Floats
 from dragchain.drag import circumference
 from dragchain.errors import SeriesError, TableError
-from dragchain.figures.panels import head, new_panels
-from dragchain.figures.style import MARKERS, SERIES, WIDE_IN, force_map
+from dragchain.figures.panels import new_panels
+from dragchain.figures.style import WIDE_IN, force_map
 from dragchain.quantities.along import MAP_AZIMUTHS, MAP_DEPTHS
 from dragchain.quantities.basis import Standing
 from dragchain.quantities.registry import REPORTED, Quantity
@@ -324,43 +324,6 @@ def _mark_certain(axes: Axes, changes: Sequence[Floats]) -> None:
             axes.plot(middle, (level + 0.5) / MAP_DEPTHS, ".", color="black")
 
 
-def draw_response(
-    cases: Sequence[ComparedCase],
-    factors: Mapping[str, Sequence[JsonValue]],
-    quantities: Sequence[Quantity],
-) -> Figure:
-    """Quantities against the first factor, a line for each combination of the others."""
-    (across, places), *others = factors.items()
-    labels = [
-        ", ".join(f"{name.rpartition('.')[2]} {levels[k]}" for name, levels in others)
-        for k in range(len(cases))
-    ]
-    figure, panels = new_panels(3.4, len(quantities), WIDE_IN)
-    for axes, quantity in zip(panels, quantities, strict=True):
-        for number, label in enumerate(dict.fromkeys(labels)):
-            here = [k for k, other in enumerate(labels) if other == label]
-            means = [_mean(cases[k], quantity, corrected=False) for k in here]
-            value, low, high = np.array(
-                [(mean.value, mean.ci95_low, mean.ci95_high) for mean in means]
-            ).T
-            reach = np.nan_to_num([value - low, high - value])
-            style: dict[str, Any] = {
-                "color": SERIES[number % len(SERIES)],
-                "marker": MARKERS[number % len(MARKERS)],
-            }
-            axes.errorbar([_place(places[k]) for k in here], value, reach, label=label, **style)
-        unit = f" ({quantity.unit})" if quantity.unit else ""
-        axes.set(xlabel=across, ylabel=f"{quantity.label}{unit}")
-        axes.set_xticks(list(dict.fromkeys(map(_place, places))))
-    panels[0].legend()
-    head(figure, "bars: 95 % confidence interval of each case")
-    return figure
-
-
-def _place(level: JsonValue) -> float | str:
-    return level if isinstance(level, int | float) else str(level)
-
-
 # --- the report ----------------------------------------------------------------------------------
 
 
@@ -438,19 +401,13 @@ def write_comparison(out_dir: Path, folders: Sequence[Path]) -> None:
     )
     linked = _write_networks(out_dir, cases)
 
-    def draw() -> dict[str, Figure]:
-        figures = {"maps": draw_maps(cases)}
-        if effects:
-            figures["response"] = draw_response(cases, factors, measured[:2])
-        return figures
-
     tables = {"differences": _table(rows, "difference", "relative")}
     if effects:
         tables["effects"] = _table(effects, "effect")
     write_report(
         out_dir,
         "compare/compare.html.j2",
-        draw=draw,
+        draw=lambda: {"maps": draw_maps(cases)},
         tables=tables,
         name="comparison",
         filters={"relative": _relative, "joined": f" {TIMES} ".join},

@@ -63,38 +63,21 @@ LIMITS = Thresholds()
 """The limits of every run."""
 
 
-@dataclass(frozen=True)
-class Surfaces:
-    """Particle and workpiece in contact.
+def contact_time_s(case: CaseOfRun) -> float:
+    """Time for which a mean particle that meets the workpiece at its speed touches it, s.
 
-    Attributes
-    ----------
-    friction : float
-        Coefficient of friction between the two.
-    contact_time_s : float
-        Time for which a mean particle that meets the workpiece at the workpiece's speed touches it.
-    """
-
-    friction: float
-    contact_time_s: float
-
-
-def surfaces(case: CaseOfRun) -> Surfaces:
-    """Return friction and contact time of particle and workpiece from the inputs of ``case.json``.
-
-    The time is that of an elastic impact on a plane; see `hertz_contact_time`.
+    It is that of an elastic impact on a plane; see `hertz_contact_time`.
 
     Raises
     ------
     TableError
-        If ``case.json`` does not give their constants.
+        If ``case.json`` does not give its constants.
     """
     if "workpiece" not in case.contact_moduli:
         raise TableError(f"{case.run}: case.json has no contact_moduli.workpiece; render it again")
     contact, radius = case.contact_moduli["workpiece"], case.media.radius_mean_m
     mass = sphere_mass(radius, case.media.density_kg_m3)
-    time_s = hertz_contact_time(mass, radius, contact.modulus_pa, drag_surface_speed(case))
-    return Surfaces(contact.friction, float(time_s))
+    return float(hertz_contact_time(mass, radius, contact.modulus_pa, drag_surface_speed(case)))
 
 
 def find_events(rows: pd.DataFrame, frames: int, interval_s: float) -> tuple[pd.DataFrame, Ints]:
@@ -219,7 +202,7 @@ def event_types(
     the first sample or ends after the last is no impact; if but one sample of it
     is seen, it passes for rolling.
     """
-    longest = max(limits.impact_times * surfaces(case).contact_time_s, interval_s)
+    longest = max(limits.impact_times * contact_time_s(case), interval_s)
     speed = drag_surface_speed(case)
     sliding, rolling = events["slid_m"] / events["duration_s"], events["rolling_m_s"]
     short = events["complete"] & (events["duration_s"] <= longest * (1 + 1e-9))

@@ -109,8 +109,6 @@ class Loading(Totals, Document):
         Number of samples in the statistics, and time between two, s.
     time_s, path_m : float
         Time and path length of the statistics, s and m.
-    friction_coefficient : float
-        Of particle and workpiece.
     contact_time_s : float
         Hertz contact time of an impact at the speed of the workpiece, s.
     impact_seen_fraction : float
@@ -132,7 +130,6 @@ class Loading(Totals, Document):
     sample_interval_s: float
     time_s: float
     path_m: float
-    friction_coefficient: float
     contact_time_s: float
     impact_seen_fraction: float
     limits: Thresholds

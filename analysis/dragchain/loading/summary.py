@@ -11,7 +11,7 @@ import pandas as pd
 
 from dragchain.arrays import Floats, Ints
 from dragchain.drag import within_angle
-from dragchain.loading.contact_events import AMOUNTS, LIMITS, TYPES, surfaces
+from dragchain.loading.contact_events import AMOUNTS, LIMITS, TYPES, contact_time_s
 from dragchain.loading.document import ContactType, LoadClosure, Loading, Profile, Quantiles, Totals
 from dragchain.loading.samples import WORKPIECE, Sampled
 from dragchain.statistics.correlated import estimates
@@ -55,8 +55,7 @@ def summarise_loading(
     off_facet_m : float
         Largest distance of a contact point from its facet.
     """
-    contact = surfaces(case)
-    interval_s = sampled.interval_s
+    contact_s, interval_s = contact_time_s(case), sampled.interval_s
     return Loading(
         run=case.run,
         confidence=CONFIDENCE,
@@ -64,9 +63,8 @@ def summarise_loading(
         sample_interval_s=interval_s,
         time_s=sampled.frames * interval_s,
         path_m=sampled.path_m,
-        friction_coefficient=contact.friction,
-        contact_time_s=contact.contact_time_s,
-        impact_seen_fraction=min(1.0, contact.contact_time_s / interval_s),
+        contact_time_s=contact_s,
+        impact_seen_fraction=min(1.0, contact_s / interval_s),
         limits=LIMITS,
         **dict(_totals(sampled, events)),
         types=_types(sampled, events, event),

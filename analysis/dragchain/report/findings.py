@@ -229,19 +229,8 @@ class DropRestitution(Restitution):
     input: float | None
 
 
-class DropImpacts(Part):
-    """The impacts of a drop test in order of time; see ``impacts.parquet``."""
-
-    start_time_s: tuple[float, ...]
-    duration_s: tuple[float, ...]
-    peak_force_n: tuple[float, ...]
-    restitution: tuple[float, ...]
-    time_since_first_s: tuple[float, ...]
-
-
 class DropFindings(Findings):
     """The findings of a drop test."""
 
     scene: Literal["drop_test"] = "drop_test"
     restitution: DropRestitution
-    impacts: DropImpacts

@@ -31,7 +31,6 @@ from dragchain.report.findings import (
     Chains,
     DepthProfile,
     DropFindings,
-    DropImpacts,
     DropRestitution,
     FillingFindings,
     Findings,
@@ -304,10 +303,7 @@ def _filling(run: RunData) -> FillingFindings:
 
 
 def _drop(run: RunData) -> DropFindings:
-    impacts = run.table("impacts")
     ratio = dict(effective_restitution(run.folder))
     return DropFindings(
-        run=run.case.run,
-        restitution=DropRestitution(**ratio, input=run.case.restitution),
-        impacts=DropImpacts(**{name: impacts[name].tolist() for name in DropImpacts.model_fields}),
+        run=run.case.run, restitution=DropRestitution(**ratio, input=run.case.restitution)
     )

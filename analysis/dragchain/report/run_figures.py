@@ -26,7 +26,7 @@ from dragchain.figures.panels import (
     row_names,
 )
 from dragchain.figures.style import BLUE, COLOURS, HALF_IN, RED, drawing, save
-from dragchain.report.findings import DropFindings, DropImpacts, FillingFindings, ProcessFindings
+from dragchain.report.findings import DropFindings, FillingFindings, ProcessFindings
 from dragchain.report.run_data import RunData, write_findings
 from dragchain.run.kinematics import process_time
 from dragchain.run.reference import ReferenceDrag, reference_drags
@@ -259,15 +259,15 @@ def drop_test(run: RunData, found: DropFindings) -> Figure:
         np.concatenate([np.asarray(block[name], dtype=np.float64) for block in blocks])
         for name in ("time_s", "vz_m_s", "force_n")
     )
-    impacts, ratio = found.impacts, found.restitution
-    figure, panels = new_panels(3.2, len(impacts.start_time_s), HALF_IN, sharey=True)
+    impacts, ratio = run.table("impacts"), found.restitution
+    figure, panels = new_panels(3.2, len(impacts), HALF_IN, sharey=True)
     limit = 1.1 * float(np.abs(speed_m_s).max())
-    for number, axes in enumerate(panels):
-        start, duration = impacts.start_time_s[number], impacts.duration_s[number]
+    for axes, impact in zip(panels, impacts.itertuples(), strict=True):
+        start, duration = impact.start_time_s, impact.duration_s
         near = (time_s >= start - 0.3 * duration) & (time_s <= start + 1.3 * duration)
         time_us = (time_s[near] - start) * 1e6
         axes.plot(time_us, force_n[near], color=BLUE)
-        axes.set(xlabel="time (µs)", title=_impact_words(number, impacts))
+        axes.set(xlabel="time (µs)", title=_impact_words(impact))
         right = _speed_axes(axes, limit)
         right.plot(time_us, speed_m_s[near], color=RED, linewidth=1.0)
         right.tick_params(labelright=axes is panels[-1], colors=RED)
@@ -281,11 +281,10 @@ def drop_test(run: RunData, found: DropFindings) -> Figure:
     return figure
 
 
-def _impact_words(number: int, impacts: DropImpacts) -> str:
+def _impact_words(impact: Any) -> str:
     return (
-        f"impact {number + 1}, e = {impacts.restitution[number]:.3f}\n"
-        f"peak {impacts.peak_force_n[number]:.2f} N\n"
-        f"after {impacts.time_since_first_s[number] * 1e3:.1f} ms"
+        f"impact {impact.impact}, e = {impact.restitution:.3f}\n"
+        f"peak {impact.peak_force_n:.2f} N\nafter {impact.time_since_first_s * 1e3:.1f} ms"
     )
 
 

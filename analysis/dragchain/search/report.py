@@ -98,11 +98,10 @@ def rows_of(findings: SearchFindings) -> list[SearchRow]:
     rows = []
     for k, point in enumerate(findings.points):
         measures = range(0 if point.refused else findings.means.shape[1])
-        objective, *limits = [findings.estimate(k, measure) for measure in measures] or [None]
-        verdicts = [] if point.refused else findings.verdict(k)
-        rows.append(
-            SearchRow(k + 1, point, objective, tuple(limits), verdicts, k in findings.as_good)
-        )
+        values = [findings.estimate(k, measure) for measure in measures]
+        objective, limits = (values[0] if values else None), tuple(values[1:])
+        verdicts = findings.verdict(k) if values else []
+        rows.append(SearchRow(k + 1, point, objective, limits, verdicts, k in findings.as_good))
     return rows
 
 

@@ -103,7 +103,7 @@ def fit_effects(design: Floats, values: Floats, beds: Sequence[Hashable]) -> Eff
         def loss(fraction: float) -> float:
             solution = _solved(design, values, same_bed, fraction)
             square = max(solution.square, 1e-300)
-            return solution.log_determinants + 0.5 * (runs - number) * math.log(square)
+            return float(solution.log_determinants + 0.5 * (runs - number) * math.log(square))
 
         optimum = minimize_scalar(loss, bounds=(0.0, _LARGEST_FRACTION), method="bounded")
         bed_fraction = float(optimum.x) if optimum.fun < loss(0.0) else 0.0

@@ -156,8 +156,8 @@ class Closure:
 def _errors(frames: WorkpieceFrames, workpiece_force_n: Floats) -> Floats:
     """The `_COLUMNS` of F frames, (F, 4); NaN where the force on the workpiece was not written."""
     count = len(frames.step)
-    applied = sums(frames.workpiece_at, frames.workpiece.force_n, count)
-    applied += sums(frames.unplaced_at, frames.unplaced_n, count)
+    placed = sums(frames.workpiece_at, frames.workpiece.force_n, count)
+    applied = placed + sums(frames.unplaced_at, frames.unplaced_n, count)
     gap = _lengths(applied + workpiece_force_n)
     relative = gap / np.maximum(_lengths(workpiece_force_n), _FLOOR_N)
     return np.column_stack([frames.step, gap, relative, frames.opening])

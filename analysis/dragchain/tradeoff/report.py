@@ -262,7 +262,6 @@ def write_tradeoff(
         filters=FILTERS,
         tradeoff=tradeoff,
         record=record,
-        costs=priced,
         main=[tradeoff.comparisons[name] for name in main],
         choices={name: [choose(tradeoff, name, one) for one in TOLERANCES] for name in main},
         soft=by_modulus(tradeoff),

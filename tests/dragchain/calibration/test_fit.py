@@ -224,6 +224,6 @@ def test_the_bias_table_is_the_rebound_of_the_drops(sweep: Drops) -> None:
 
 def test_the_result_names_the_field_and_the_value(sweep: Drops) -> None:
     got = result(calibrate(record(0.68), sweep))
-    assert got.put.field == "pairs.a-b.restitution"
-    assert got.put.value == pytest.approx((0.68 - BIAS) / (1 - BIAS), abs=1e-3)
+    assert got.known.pair == "a-b"
+    assert got.put == pytest.approx((0.68 - BIAS) / (1 - BIAS), abs=1e-3)
     assert got.correction == pytest.approx(-BIAS * (1 - 0.68) / (1 - BIAS), abs=1e-3)

@@ -146,9 +146,9 @@ def test_a_known_restitution_is_recovered(measured_case: Case, project: Project)
     values = (result.fit.restitution, result.fit_full.restitution)
     confirming = run(list(confirmation(case.study, *values))[::2], "confirm")
     checked = confirmed(confirming)
-    assert checked.effective == pytest.approx(result.measured.value, abs=4 * checked.std)
+    assert checked["effective"] == pytest.approx(result.measured.value, abs=4 * checked["std"])
     write_calibration_report(folder, FittedRecord(record, got, confirming), None)
     page = (folder / "report.html").read_text(encoding="utf-8")
-    assert f"<b>{result.put.value:.4g}</b>" in page
+    assert f"<b>{result.put:.4g}</b>" in page
     assert page.count("data:image/") == 1
     assert "http" not in page

@@ -167,7 +167,7 @@ def test_page_and_linked_networks(tmp_path: Path) -> None:
     write_comparison(tmp_path / "out", study(tmp_path))
     text = (tmp_path / "out/comparison.html").read_text(encoding="utf-8")
     page = stands_alone(text, beside=["networks.html"])
-    assert len(page.images) == 2
+    assert len(page.images) == 1
     assert "deep-1_fast-1" in page.words
     linked = (tmp_path / "out/networks.html").read_text(encoding="utf-8")
     assert linked.count("<iframe") == 4
