@@ -35,9 +35,6 @@ from dragdeck.study.drive import Orientations
 
 View = Literal["xy", "xz"]
 
-_PICTURE_TIME_S = 4.5
-"""Process time, counted from the start of the drag, at which the paper shows the network."""
-
 _PIXELS_PER_MM = 10
 _SIDES = 18
 _MARGIN_M = 0.004
@@ -94,33 +91,15 @@ def cylinder_radii(normal_force_n: Floats, radius_mean_m: float) -> Floats:
     return np.asarray(np.clip(normal_force_n, 0.0, None) / largest * radius_mean_m)
 
 
-def picture_step(steps: Floats, process_time_s: Floats, wanted_s: float = _PICTURE_TIME_S) -> int:
-    """The step nearest to `wanted_s`, or the last one if the frames do not reach that far.
-
-    Parameters
-    ----------
-    steps, process_time_s : (N,) array
-        The counted network frames; N is at least 1.
-    wanted_s
-        Time since the drag began.
-    """
-    period = np.diff(process_time_s).max(initial=0.0)
-    inside = process_time_s[0] - period <= wanted_s <= process_time_s[-1] + period
-    row = int(np.abs(process_time_s - wanted_s).argmin()) if inside else -1
-    return int(steps[row])
-
-
 def load_scene(run_dir: Path, case: CaseOfRun) -> NetworkScene:
-    """Read what the picture of a process run shows at the frame of `picture_step`.
+    """Read what the picture of a process run shows: the last network frame in its statistics.
 
     Raises
     ------
     TableError
         If a table is missing or holds no counted network frame.
     """
-    network = read_table(run_dir / "tables" / "network.parquet", ["step", "time_s"])
-    times = process_time(network["time_s"].to_numpy(np.float64), case)
-    step = picture_step(network["step"].to_numpy(np.float64), times)
+    step = int(read_table(run_dir / "tables" / "network.parquet", ["step"])["step"].iloc[-1])
     frame = next(network_frames(run_dir, (step, step)), None)
     if frame is None:
         raise TableError(f"particles.parquet lacks step {step}, which network.parquet has")

@@ -262,8 +262,8 @@ def drop_test(run: RunData, found: DropFindings) -> Figure:
     impacts, ratio = run.table("impacts"), found.restitution
     figure, panels = new_panels(3.2, len(impacts), HALF_IN, sharey=True)
     limit = 1.1 * float(np.abs(speed_m_s).max())
-    for axes, impact in zip(panels, impacts.itertuples(), strict=True):
-        start, duration = impact.start_time_s, impact.duration_s
+    for axes, impact in zip(panels, impacts.to_dict("records"), strict=True):
+        start, duration = impact["start_time_s"], impact["duration_s"]
         near = (time_s >= start - 0.3 * duration) & (time_s <= start + 1.3 * duration)
         time_us = (time_s[near] - start) * 1e6
         axes.plot(time_us, force_n[near], color=BLUE)
@@ -281,10 +281,10 @@ def drop_test(run: RunData, found: DropFindings) -> Figure:
     return figure
 
 
-def _impact_words(impact: Any) -> str:
+def _impact_words(impact: Mapping[Any, Any]) -> str:
     return (
-        f"impact {impact.impact}, e = {impact.restitution:.3f}\n"
-        f"peak {impact.peak_force_n:.2f} N\nafter {impact.time_since_first_s * 1e3:.1f} ms"
+        f"impact {impact['impact']}, e = {impact['restitution']:.3f}\n"
+        f"peak {impact['peak_force_n']:.2f} N\nafter {impact['time_since_first_s'] * 1e3:.1f} ms"
     )
 
 

@@ -164,14 +164,6 @@ def test_the_largest_force_has_the_mean_particle_radius() -> None:
     assert scene.cylinder_radii(np.array([]), R).size == 0
 
 
-@pytest.mark.parametrize(
-    ("wanted", "expected"), [(4.6, 3), (4.4, 2), (3.0, 1), (5.4, 3), (9.0, 3), (1.0, 3)]
-)
-def test_picture_is_of_the_nearest_frame_or_the_last(wanted: float, expected: int) -> None:
-    times = np.array([3.6, 4.2, 4.8])
-    assert scene.picture_step(np.array([1.0, 2.0, 3.0]), times, wanted) == expected
-
-
 def test_times_of_a_faster_run_are_those_of_the_process(process: Path) -> None:
     """A workpiece 5 times as fast takes a fifth of the time; its own speed is that of the run."""
     case = load_case(process)
