@@ -234,9 +234,6 @@ _OFF_FACET = 1e-5
 _BLOCK_ROWS = 100_000
 """Contacts that are held against their facets at once."""
 
-LEAST_EVENTS = 25
-"""With fewer contact events, the interval of a facet's load is too narrow."""
-
 _UNCERTAIN = ("normal_impulse_n_s", "force_slide_n_m", "friction_work_j")
 """Sums of a facet that come with a standard error."""
 

@@ -16,7 +16,6 @@ from dragdeck.records.case import CaseOfRun, load_case
 from dragdeck.records.run import changed_in_words, read_accepted
 from dragdeck.shipped import SHIPPED
 
-METADATA = "ro-crate-metadata.json"
 LEFT_OUT = "left_out.csv"
 PACKAGES = "python-packages.txt"
 

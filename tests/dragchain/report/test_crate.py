@@ -47,7 +47,7 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def listed(folder: Path) -> dict[str, Any]:
     """The entities of a crate by their identity."""
-    graph = json.loads((folder / crate.METADATA).read_text())["@graph"]
+    graph = json.loads((folder / "ro-crate-metadata.json").read_text())["@graph"]
     return {entity["@id"]: entity for entity in graph}
 
 
@@ -110,7 +110,7 @@ def test_rocrate_reads_it(project: Path) -> None:
 
 def test_a_crate_replaces_an_earlier_one_and_nothing_else(project: Path) -> None:
     write_crate(OUT, RUNS, REPORT, [STUDY])
-    (OUT / crate.METADATA).unlink()  # as Snakemake does
+    (OUT / "ro-crate-metadata.json").unlink()  # as Snakemake does
     write_crate(OUT, RUNS[:2], REPORT)
     assert not (OUT / STUDY).exists() and not (OUT / RUNS[2]).exists()
     with pytest.raises(ExportError, match="not a crate"):
