@@ -124,7 +124,7 @@ SOLID = meshio.Mesh(np.eye(4, 3), [("tetra", [[0, 1, 2, 3]])])
     ("mesh", "unit", "length", "message"),
     [
         ("none.stl", "m", LENGTH_M, "there is no such mesh file"),
-        ("solid.vtu", "m", LENGTH_M, "neither triangles nor quadrilaterals"),
+        ("solid.vtu", "m", LENGTH_M, "cells that are no polygons"),
         ("empty.stl", "m", LENGTH_M, "the mesh has no facets"),
         ("fine.vtu", "m", 0.0, "smoothing length is not positive"),
         ("fine.vtu", "m", float("nan"), "smoothing length is not positive"),
