@@ -115,8 +115,11 @@ def test_every_source_is_cited_and_every_cited_one_known() -> None:
 
 @pytest.mark.parametrize("found", read_scalings(), ids=lambda found: found.study)
 def test_the_scalings_are_those_of_the_studies_and_on_the_page(found: ScalingFile) -> None:
-    statement = said(found).splitlines()[0].removeprefix(f"{found.field}: ").replace(MINUS, "-")
-    assert statement in text_of("evidence/scaling.md")
+    exponent, rest = said(found).removeprefix(f"{found.field}: ").replace(MINUS, "-").split("; ")
+    expected, _ = rest.rsplit(": ", 1)
+    lines = text_of("evidence/scaling.md").splitlines()
+    (line,) = (line for line in lines if f"{found.verdict}: {exponent}, " in line)
+    assert expected in line
     cases = Project(ROOT).cases(found.study)
     scaling = cases[0].study.scaling
     assert scaling is not None and scaling.fit_range is None
