@@ -25,8 +25,9 @@ COMMANDS = (
             "tables.write:write_tables", (RUN_DIR,),
             "./run dragchain tables results/uhlmann2015/process/RUN"),
     Command("chains", "find contact networks and force chains",
-            "Find contact network and force chains in each frame of a process run. It reads the "
-            "tables of the run and writes network.parquet and chains.parquet to RUN_DIR/tables.",
+            "Find contact network, clusters and force chains in each frame of a process run. It "
+            "reads the tables of the run and writes network.parquet, clusters.parquet and "
+            "chains.parquet to RUN_DIR/tables.",
             "network.write:write_chains", (RUN_DIR,)),
     Command("loading", "map the load on the workpiece",
             "Map load, sliding distance and friction work on the workpiece and classify its "

@@ -30,7 +30,7 @@ from dragdeck.scenes.process import PROCESS
 _ON_WORKPIECE = (
     *("workpiece_force", "workpiece_contacts", "sphere_contacts", "facets", "contact_events"),
 )
-_NETWORK = ("particles", "contacts", "network", "chains")
+_NETWORK = ("particles", "contacts", "network", "clusters", "chains")
 _TABLES: Mapping[str, tuple[str, ...]] = {
     "process": (*_ON_WORKPIECE, *_NETWORK, "thermo"),
     "filling": ("particles", "thermo"),
@@ -85,7 +85,7 @@ class FinishedRun(RunData):
         Process only: force on the workpiece, contacts on it, its facets, and contact events.
     sphere_contacts : DataFrame
         Process with clumps only: contacts of their spheres on the workpiece.
-    particles, contacts, network, chains : DataFrame
+    particles, contacts, network, clusters, chains : DataFrame
         Process only: the frames of the contact network. A filling also has ``particles``.
     impacts : DataFrame
         Drop test only: one row per impact.
@@ -106,6 +106,7 @@ class FinishedRun(RunData):
     particles = _table("particles", "particle and frame")
     contacts = _table("contacts", "contact and network frame")
     network = _table("network", "network frame in the statistics")
+    clusters = _table("clusters", "threshold and network frame in the statistics")
     chains = _table("chains", "chain and network frame in the statistics")
     impacts = _table("impacts", "impact of the drop test")
     thermo = _table("thermo", "output of the whole system")

@@ -317,6 +317,7 @@ _READERS: dict[str, tuple[str, ...]] = {
     "tables/network.parquet": ("quantities", "figures", "report"),
     "tables/chains.parquet": ("quantities", "figures", "report"),
     "tables/quantities.json": ("figures", "report"),
+    "tables/clusters.parquet": ("figures", "report"),
     "tables/closure.json": ("figures", "report"),
     "tables/loading.json": ("report",),
     "tables/findings.json": ("report",),

@@ -102,7 +102,7 @@ def test_a_killed_workflow_goes_on(
     assert not problems, problems
 
 
-_OF_NETWORK = r"(chains|network|facets|contact_events|loading|quantities|figures)"
+_OF_NETWORK = r"(chains|network|clusters|facets|contact_events|loading|quantities|figures)"
 
 
 def _unlike_undisturbed(study: Undisturbed, project: Path) -> list[str]:

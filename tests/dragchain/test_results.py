@@ -100,6 +100,7 @@ TABLES = {
     "particles": "particles",
     "contacts": "contacts",
     "network": "network",
+    "clusters": "clusters",
     "chains": "chains",
     "thermo": "thermo",
 }

@@ -1,1 +1,1 @@
-"""The contact network: statistics and force chains."""
+"""The contact network: statistics, force chains and clusters."""

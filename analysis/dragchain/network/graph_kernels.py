@@ -226,3 +226,67 @@ def shortest_path(net, force, start, target, least, search, space):
         node = come[node]
         particles[place] = node
     return particles, edges
+
+
+@njit(nogil=True, cache=True)
+def grow_clusters(a, b, touch, spans, stops, particles):
+    """Join particles contact by contact, and keep count of the clusters (Newman and Ziff 2001).
+
+    Parameters
+    ----------
+    a, b : (M,) ndarray of int64
+        The particles of each contact, in the order in which contacts join; ``b`` is negative where
+        the other body is no particle.
+    touch : (M,) ndarray of uint8
+        Bits of the places that particle ``a`` touches with the contact.
+    spans : (S, 2) ndarray of uint8
+        A cluster spans if it touches one of the places of either column.
+    stops : (K,) ndarray of int64
+        Rising numbers of contacts after which the clusters are counted.
+    particles : int
+        Number of particles.
+
+    Returns
+    -------
+    counts : (K, 4) ndarray of int64
+        Clusters of two particles or more, the particles in them, the particles of the largest, and
+        the sum of the squares of all their sizes.
+    joined : (S,) ndarray of int64
+        The contact with which a cluster spans for the first time, or -1.
+    """
+    leader = np.full(particles, -1, dtype=np.int32)
+    places = np.zeros(particles, dtype=np.uint8)
+    counts = np.zeros((len(stops), 4), dtype=np.int64)
+    joined = np.full(len(spans), -1)
+    clusters = members = largest = squares = np.int64(0)
+    stop = 0
+    for contact in range(len(a) + 1):
+        while stop < len(stops) and stops[stop] == contact:
+            counts[stop] = clusters, members, largest, squares
+            stop += 1
+        if contact == len(a):
+            break
+        root = _root(leader, a[contact])
+        if b[contact] >= 0:
+            other = _root(leader, b[contact])
+            if other == root:
+                continue
+            for tree in (root, other):
+                size = -np.int64(leader[tree])
+                members += size == 1
+                clusters -= size > 1
+                squares -= size**2 * (size > 1)
+            root, below = _join(leader, root, other)
+            places[root] |= places[below]
+            size = -np.int64(leader[root])
+            clusters += 1
+            squares += size**2
+            largest = max(largest, size)
+        else:
+            places[root] |= touch[contact]
+        if places[root]:
+            for span in range(len(spans)):
+                spanned = places[root] & spans[span, 0] and places[root] & spans[span, 1]
+                if spanned and joined[span] < 0:
+                    joined[span] = contact
+    return counts, joined

@@ -1,4 +1,4 @@
-"""The tables of a run's contact network: statistics, and chains by both definitions."""
+"""The tables of a run's contact network: statistics, clusters, and chains by both definitions."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -19,7 +19,7 @@ from dragchain.network.chains import (
     split_chains,
 )
 from dragchain.network.frame import FLOOR, KINDS, SIDE, NetworkFrame, network_frames
-from dragchain.network.statistics import frame_statistics
+from dragchain.network.statistics import cluster_rows, frame_clusters, frame_statistics
 from dragchain.tables.parquet import table_writer, write_parquet
 from dragdeck.records.case import load_case
 from dragdeck.study.drive import wrap_angle
@@ -173,7 +173,7 @@ def _length(points: Floats) -> Floats:
 
 
 def write_chains(run_dir: Path) -> None:
-    """Write the tables ``network`` and ``chains`` of a process run.
+    """Write the tables ``network``, ``clusters`` and ``chains`` of a process run.
 
     They contain the frames of the drag that enter the statistics. At most one frame is in memory.
     If the media have classes, ``classes`` of ``chains`` are those of ``particle_ids``.
@@ -184,11 +184,14 @@ def write_chains(run_dir: Path) -> None:
         If a table is missing, or if the statistics contain no frame of the network.
     """
     network: list[dict[str, float]] = []
+    grown: list[dict[str, NDArray[Any]]] = []
     tables, case = run_dir / "tables", load_case(run_dir)
     names = np.array([class_.name for class_ in case.classes])
     with table_writer(tables / "chains.parquet") as writer:
         for frame in network_frames(run_dir):
-            network.append(frame_statistics(frame))
+            clusters = frame_clusters(frame)
+            network.append(frame_statistics(frame, clusters))
+            grown.append(cluster_rows(frame, clusters))
             chains = chain_table(frame)
             if names.size:
                 each = (names[case.class_of(np.array(ids))] for ids in chains["particle_ids"])
@@ -200,3 +203,5 @@ def write_chains(run_dir: Path) -> None:
                 "increase outputs.network_hz or use a longer path"
             )
     write_parquet(pd.DataFrame(network), tables / "network.parquet")
+    columns = {name: np.concatenate([part[name] for part in grown]) for name in grown[0]}
+    write_parquet(pd.DataFrame(columns), tables / "clusters.parquet")

@@ -56,7 +56,7 @@ def intact(path: Path) -> Iterator[None]:
 
 
 _MADE_BY = {
-    **dict.fromkeys(("network", "chains"), "chains"),
+    **dict.fromkeys(("network", "chains", "clusters"), "chains"),
     **dict.fromkeys(("facets", "contact_events"), "loading"),
 }
 """The command that makes a table of a run, where it is not ``tables``."""

@@ -5,11 +5,33 @@ import numpy as np
 import pandas as pd
 import pytest
 from figure_files import case_json
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from made_run import write_documents
+from networks import random_frame, real_frame
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from dragchain.errors import TableError
-from dragchain.network.frame import NetworkFrame, counted_range, frame_of, network_frames
-from dragchain.network.statistics import frame_statistics, mechanical_coordination_number
+from dragchain.network.chains import dominant_path, widest_paths
+from dragchain.network.frame import (
+    FLOOR,
+    SIDE,
+    WORKPIECE,
+    NetworkFrame,
+    counted_range,
+    frame_of,
+    network_frames,
+)
+from dragchain.network.statistics import (
+    FORCE_FACTORS,
+    SPANS,
+    cluster_rows,
+    find_clusters,
+    frame_clusters,
+    frame_statistics,
+    mechanical_coordination_number,
+)
 from dragchain.network.write import write_chains
 
 CONTACT_COLUMNS = [
@@ -148,6 +170,16 @@ def test_write_chains_writes_counted_frames_only(run_dir: Path) -> None:
     assert list(path["particle_ids"]) == [7, 1] or not path["reaches_bowl"]
     for ids, of_media in zip(chains["particle_ids"], chains["classes"], strict=True):
         assert list(of_media) == ["fine" if one < 5 else "coarse" for one in ids]
+    clusters = pd.read_parquet(run_dir / "tables" / "clusters.parquet")
+    assert clusters["step"].tolist() == [10] * len(FORCE_FACTORS) + [20] * len(FORCE_FACTORS)
+    # above the mean of 3 N: particle 7 with particle 1 and on the workpiece, and particle 4 on the
+    # side
+    at_mean = clusters[(clusters["step"] == 10) & (clusters["force_factor"] == 1.0)].iloc[0]
+    assert at_mean["strong_contacts"] == 3
+    assert at_mean["largest_cluster"] == 2
+    assert not at_mean["workpiece_to_bowl"]
+    assert network["workpiece_to_bowl_n"].tolist() == [2.0, 0.0]
+    assert not np.signbit(network["workpiece_to_bowl_n"]).any()
     assert not list((run_dir / "tables").glob("*.part"))
 
 
@@ -156,3 +188,77 @@ def test_a_stretch_without_frames_is_refused(run_dir: Path) -> None:
     samples([11, 15], [True, True]).to_parquet(tables / "workpiece_force.parquet")
     with pytest.raises(TableError, match="no frame of the contact network"):
         write_chains(run_dir)
+
+
+def frame_with(rows: list[tuple[int, int, float]], particles: int) -> NetworkFrame:
+    """A frame of (particle, other, normal force) rows."""
+    return a_frame(rows, list(range(1, particles + 1)))
+
+
+# 1-2-3-4 with falling force, 5-6, and 7 alone
+CHAIN = [(1, 2, 6.0), (2, 3, 5.0), (3, 4, 3.0), (5, 6, 4.0), (7, FLOOR, 9.0)]
+
+
+def test_sizes_by_hand() -> None:
+    found = find_clusters(frame_with(CHAIN, 7), np.array([0.0, 3.0, 4.0, 5.0, 6.0]))
+    assert found.strong_contacts.tolist() == [5, 4, 3, 2, 1]
+    assert found.clusters.tolist() == [2, 2, 1, 1, 0]
+    assert found.clustered_particles.tolist() == [6, 5, 3, 2, 0]
+    assert found.largest_cluster.tolist() == [4, 3, 3, 2, 0]
+    assert found.squares.tolist() == [20, 13, 9, 4, 0]
+    assert found.mean_cluster_size()[:2].tolist() == [2.0, 2.0]
+    assert np.isnan(found.mean_cluster_size()[2:]).all()
+    assert found.second_moment().tolist() == [4 / 7, 4 / 7, 0.0, 0.0, 0.0]
+
+
+def test_a_frame_without_contacts_has_no_cluster() -> None:
+    frame = frame_with([], 3)
+    rows = cluster_rows(frame, frame_clusters(frame))
+    assert rows["clusters"].tolist() == [0] * len(FORCE_FACTORS)
+    assert not rows["workpiece_to_bowl"].any()
+    assert math.isnan(rows["mean_cluster_size"][0])
+
+
+def flooded(frame: NetworkFrame, least: float) -> tuple[np.ndarray, set[str]]:
+    """Sizes of the clusters above a force, and the ways in which one spans."""
+    strong = frame.normal_force > max(least, 0.0)
+    inner, size = strong & frame.between_particles(), frame.particle_id.size
+    graph = coo_array((np.ones(inner.sum()), (frame.a[inner], frame.b[inner])), (size, size))
+    _, cluster = connected_components(graph, directed=False)
+    x, y = frame.point[:, :2].T
+    on_side, east_west = frame.other == SIDE, np.abs(x) > np.abs(y)
+    workpiece, bowl, east, west, north, south = (
+        set(cluster[frame.a[strong & where]].tolist())
+        for where in (
+            frame.other == WORKPIECE, frame.other < WORKPIECE,
+            on_side & east_west & (x > 0), on_side & east_west & (x < 0),
+            on_side & ~east_west & (y > 0), on_side & ~east_west & (y < 0),
+        )
+    )  # fmt: skip
+    found = {"workpiece_to_bowl": workpiece & bowl, "side_to_side": (east & west) | (north & south)}
+    sizes = np.bincount(cluster)
+    return sizes[sizes > 1], {name for name, spanning in found.items() if spanning}
+
+
+@given(seed=st.integers(0, 2**32 - 1), edge=st.integers(2, 6), levels=st.sampled_from([None, 1, 4]))
+@settings(max_examples=30)
+def test_clusters_are_those_of_a_flood(seed: int, edge: int, levels: int | None) -> None:
+    frame = random_frame(seed, edge=edge, levels=levels)
+    found = frame_clusters(frame)
+    for at, least in enumerate(found.force_n):
+        sizes, spans = flooded(frame, float(least))
+        assert found.clusters[at] == len(sizes)
+        assert found.clustered_particles[at] == sizes.sum()
+        assert found.squares[at] == (sizes**2).sum()
+        assert found.largest_cluster[at] == max(sizes, default=0)
+        assert {name for name in SPANS if found.spans(name)[at]} == spans
+
+
+@pytest.mark.parametrize("frame", [real_frame(), *map(random_frame, range(5))])
+def test_workpiece_and_bowl_part_at_the_bottleneck_of_the_dominant_path(
+    frame: NetworkFrame,
+) -> None:
+    path = dominant_path(frame, widest_paths(frame, 0.0))
+    assert path is not None
+    weakest = frame.normal_force[list(path.contacts)].min()
+    assert frame_clusters(frame).percolation_n["workpiece_to_bowl"] == weakest

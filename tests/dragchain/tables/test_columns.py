@@ -19,7 +19,7 @@ from dragchain.tables.columns import (
 
 TABLES = (
     *("workpiece_force", "workpiece_contacts", "particles", "contacts", "network", "chains"),
-    *("facets", "contact_events", "thermo"),
+    *("clusters", "facets", "contact_events", "thermo"),
 )
 SOME_RUNS_ONLY = {
     *(*BODY, *BODY_IMPULSE, *ORIENTATION, ATTRACTION, "fastest_particle_m_s"),

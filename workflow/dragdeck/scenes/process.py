@@ -461,7 +461,7 @@ PROCESS = SceneType(
         "contacts.parquet",
         "closure.json",
     ),
-    network=("network.parquet", "chains.parquet"),
+    network=("network.parquet", "chains.parquet", "clusters.parquet"),
     loading=("facets.parquet", "contact_events.parquet", "loading.json", "workpiece.vtp"),
     regime="drag",
     impact_speed=fastest_motion,
