@@ -461,11 +461,6 @@ class Workflow:
         """The advice of a study in which a case asks for a tolerance; nothing for another one."""
         return [self.advice] if any(case.requested for case in self.cases) else []
 
-    def advice_option(self, _: object = None) -> str:
-        """How to name the advice on the command line, if there is or will be one."""
-        known = self.needed_advice or (self.project.root / self.advice).is_file()
-        return f"--advice {self.advice}" if known else ""
-
     def licence_option(self, _: object = None) -> str:
         """How to name the licence of the results on the command line, if the study states one."""
         licence = self.cases[0].study.licence

@@ -117,7 +117,7 @@ REFUSED: dict[str, tuple[str | bytes, dict[str, Any], int | None, str]] = {
     "one number or two": ("fx_n\n-1,5\n0,42\n", {"rate_hz": 200}, 2, "decimal comma"),
     "two units": ("time_s;fx_n\nms;N\n0;1\n1;2\n", {}, 1, "has two units"),
     "two units in brackets": ("time_s,fx_n [kN]\n0,1\n", {}, 1, "has two units"),
-    "UTF-16 without its mark": ("time_s\tfx_\u0144\n".encode("utf-16-le"), {}, None, "UTF-8"),
+    "UTF-16 without its mark": ("time_s\tfx_\u0144\n".encode("utf-16-le"), {}, 1, "UTF-8"),
     "commas of thousands": ("time_s;fx_n\n0;1,234\n1;5,678\n", {}, 2, "thousands"),
     "both marks": ("time_s;fx_n\n0,005;1.234,5\n", {}, 2, "line 2 has a decimal point"),
     "a longer row": (HEAD + "0,1\n0.005,2,3\n", {}, 3, "3 values, but the header has 2 names"),

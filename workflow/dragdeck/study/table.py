@@ -313,8 +313,9 @@ def _text(file: Path) -> str:
             with suppress(UnicodeDecodeError):
                 return content.decode("utf-8-sig")
             return content.decode("latin-1")
+        line = content[: content.index(b"\0")].count(b"\n") + 1
         remedy = "export it as text in the encoding UTF-8"
-        raise InputError("not a CSV file: it has bytes of 0", file=file, remedy=remedy)
+        raise InputError("not a CSV file: a byte is 0", file=file, line=line, remedy=remedy)
     except UnicodeDecodeError as error:
         raise InputError(f"not a CSV file: {error}", file=file) from None
     except OSError as error:
