@@ -258,7 +258,7 @@ def test_clusters_are_those_of_a_flood(seed: int, edge: int, levels: int | None)
 def test_workpiece_and_bowl_part_at_the_bottleneck_of_the_dominant_path(
     frame: NetworkFrame,
 ) -> None:
-    path = dominant_path(frame, widest_paths(frame, 0.0))
+    path = dominant_path(frame, widest_paths(frame))
     assert path is not None
     weakest = frame.normal_force[list(path.contacts)].min()
     assert frame_clusters(frame).percolation_n["workpiece_to_bowl"] == weakest
