@@ -4,10 +4,8 @@ import os
 import shutil
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,10 +22,7 @@ from dragdeck.decks.engine_commands import contact_laws
 from dragdeck.decks.render import (
     changed_scripts,
     deck_text,
-    effective,
-    idle,
     of_its_templates,
-    overriding,
     write_run,
     write_workpiece,
 )
@@ -113,8 +108,6 @@ def _check(study: str, fidelity: str | None, verbose: bool) -> None:
     ]
     for varied, cases in check_search(every[0].file).items():
         findings.look_at_bounds(f"search.vary.{varied}", cases)
-    if not findings.errors:
-        findings.errors += idle(findings.overriding - findings.effective, findings.templates)
     findings.show(verbose)
     if findings.errors:
         raise together(findings.errors)
@@ -150,8 +143,6 @@ class _Findings:
     warnings: dict[str, list[str]] = field(default_factory=dict)
     reduced: dict[str, list[str]] = field(default_factory=dict)
     notes: dict[str, list[str]] = field(default_factory=dict)
-    overriding: set[str] = field(default_factory=set)
-    effective: set[str] = field(default_factory=set)
 
     def look(self, kind: SceneType, runs: Mapping[Path, Case]) -> StudyScene:
         """Build the scene of runs that differ in the seed alone."""
@@ -165,8 +156,6 @@ class _Findings:
         except InputError as error:
             self.errors.append(error)
             raise
-        self.overriding |= overriding(scene, self.templates)
-        self.effective |= effective(scene, self.templates)
         for text in dict.fromkeys([*map(str, scene.warnings), *_friction_unknown(used_templates)]):
             names = self.warnings.setdefault(text, [])
             names += [case.name] if case.name not in names else []
@@ -480,7 +469,6 @@ def render(
         _check_processes(case for case in every if kind.run_id(case) == run)
     templates = environment(project.templates, study_templates(case))
     built = _built(kind, case, _bed(kind, packing))
-    _check_overrides(built, every, templates)
     changes = of_its_templates(deck_text(built, templates), built, templates)
     _check_tolerance(case, changes["changed_law"])
     for warning in (*built.warnings, *_friction_unknown(changes)):
@@ -505,22 +493,6 @@ def _check_processes(cases: Iterable[Case]) -> None:
             return
     if errors:
         raise together(errors)
-
-
-def _check_overrides(
-    built: StudyScene, every: Sequence[Case], templates: jinja2.Environment
-) -> None:
-    """Refuse a template that changes neither this script nor any other of the cases."""
-    left = overriding(built, templates)
-    if left:
-        left -= effective(built, templates)
-    for case, kind in product(every, SCENES.values()):
-        if not left:
-            return
-        with suppress(InputError):  # that of another run
-            left -= effective(kind.build(case, None), templates)
-    if left:
-        raise together(idle(left, templates))
 
 
 def _bed(kind: SceneType, packing: Path | None) -> Bed | None:

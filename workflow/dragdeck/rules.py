@@ -270,17 +270,6 @@ class Workflow:
         runs = self.points_by_run("drop_test", self.plan)
         return [f"{run_path(self.study, 'drop_test', run)}/{file}" for run in runs]
 
-    def every_packing(self, file: str) -> list[str]:
-        """One file of every run of the validation that differs from its first by the seed alone."""
-        runs = self.points_by_run("process", self.validation)
-        first = next(iter(runs.values())).study
-        alike = [
-            run
-            for run, case in runs.items()
-            if case.study.model_copy(update={"seed": first.seed}) == first
-        ]
-        return [f"{run_path(self.study, POINTS, run)}/{file}" for run in alike]
-
     def relative(self, file: Path) -> str:
         """Path from the project, where the workflow runs; other paths stay as they are."""
         root = self.project.root
