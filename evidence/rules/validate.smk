@@ -3,7 +3,7 @@
 
 rule write_validation:
     input:
-        measures=lambda wildcards: WORK.every_point("tables/quantities.json", VALIDATION),
+        measures=lambda wildcards: WORK.every_point(POINTS, "tables/quantities.json", VALIDATION),
         templates=WORK.page_templates("validation/validation.html.j2", package="evidence"),
     output:
         page=shown(WORK.of_study("validation", "report.html"), "validation", "Validation"),

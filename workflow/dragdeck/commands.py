@@ -2,7 +2,6 @@
 
 import os
 import shutil
-import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -140,9 +139,9 @@ class _Findings:
 
     templates: jinja2.Environment
     errors: list[InputError] = field(default_factory=list)
-    warnings: dict[str, list[str]] = field(default_factory=dict)
-    reduced: dict[str, list[str]] = field(default_factory=dict)
-    notes: dict[str, list[str]] = field(default_factory=dict)
+    warnings: dict[str, dict[str, None]] = field(default_factory=dict)
+    reduced: dict[str, dict[str, None]] = field(default_factory=dict)
+    notes: dict[str, dict[str, None]] = field(default_factory=dict)
 
     def look(self, kind: SceneType, runs: Mapping[Path, Case]) -> StudyScene:
         """Build the scene of runs that differ in the seed alone."""
@@ -156,18 +155,16 @@ class _Findings:
         except InputError as error:
             self.errors.append(error)
             raise
-        for text in dict.fromkeys([*map(str, scene.warnings), *_friction_unknown(used_templates)]):
-            names = self.warnings.setdefault(text, [])
-            names += [case.name] if case.name not in names else []
+        for text in (*map(str, scene.warnings), *_friction_unknown(used_templates)):
+            self.warnings.setdefault(text, {})[case.name] = None
         notes = [not_corrected(case) if kind.needs_bed else ""]
         notes.append(changed_in_words(used_templates["changed_scripts"]))
         for text in filter(None, notes):
-            names = self.reduced.setdefault(text, [])
-            names += [case.name] if case.name not in names else []
+            self.reduced.setdefault(text, {})[case.name] = None
         lines = [f"time step: {scene.deck.timestep_s:.3g} s"]
         lines += [f"{what}: {text}" for what, text in _expectations(case, kind, scene)]
-        names = [f"{kind.name} {folder.name}" for folder in runs]
-        self.notes.setdefault("\n  ".join(lines), []).extend(names)
+        names = dict.fromkeys(f"{kind.name} {folder.name}" for folder in runs)
+        self.notes.setdefault("\n  ".join(lines), {}).update(names)
         return scene
 
     def look_at_bounds(self, name: str, cases: Sequence[Case]) -> None:
@@ -183,7 +180,7 @@ class _Findings:
             return
         for problem in refused:
             text = f"{problem.field}: {problem.problem}; such a setting is not run, but infeasible"
-            self.warnings[text] = ["search"]
+            self.warnings[text] = {"search": None}
 
     def show(self, verbose: bool) -> None:
         """Print the warnings; and what is expected of every run, if that is asked for."""
@@ -228,8 +225,9 @@ def _friction_unknown(changes: Mapping[str, Sequence[str]]) -> list[str]:
     ]
 
 
-def _first(names: Sequence[str]) -> str:
-    return names[0] + (f" and {len(names) - 1} more" if names[1:] else "")
+def _first(names: Iterable[str]) -> str:
+    first, *others = names
+    return first + (f" and {len(others)} more" if others else "")
 
 
 def _built(kind: SceneType, case: Case, bed: Bed | None) -> StudyScene:
@@ -291,35 +289,23 @@ def _expectations(case: Case, kind: SceneType, scene: StudyScene) -> list[tuple[
     notes = timestep_notes(case, kind, scene)
     if kind.needs_bed:
         notes += [stable_step_note(case), *workpiece_notes(case), modulus_note(case)]
+        notes += dimensionless(case)
     return [*notes, *([] if kind.single_particle else bed_notes(case))]
 
 
 def preview(study: str, fidelity: str | None, case: str | None) -> None:
-    """Draw one case of a study and print its clearances, whether `check` refuses it or not."""
+    """Draw one case of a study, also one that `check` refuses."""
     project = find_project(Path.cwd())
     every = project.cases(study, fidelity)
     chosen = _case_named(every, case)
-    warnings, refused = _judged(chosen)
     try:
         scene = layout(chosen)
     except InputError as error:
-        raise together([*refused, located(error)]) from None
-    particles = ("particles", str(chosen.study.particle_count))
-    numbers = [*workpiece_notes(chosen), particles, *dimensionless(chosen)]
-    title = [f"{study}, case {chosen.name}", *(f"{name}: {text}" for name, text in numbers[:2])]
-    if refused:
-        title.append(textwrap.fill(f"REFUSED: {str(together(refused)).splitlines()[0]}"))
+        raise located(error) from None
     file = project.results(study) / "preview.png"
-    file.parent.mkdir(parents=True, exist_ok=True)
-    write_bytes(file, picture(scene, _swept(scene), "\n".join(title), bool(refused)))
+    write_bytes(file, picture(scene, _swept(scene), f"{study}, case {chosen.name}"))
     print(f"{study}: case {chosen.name}" + (f", one of {len(every)} (--case)" if every[1:] else ""))
-    for name, text in numbers:
-        print(f"  {name}: {text}")
-    for warning in warnings:
-        print(f"warning: {warning}")
     print(file)
-    if refused:
-        raise together(refused)
 
 
 def _swept(scene: CaseLayout, share: float = 1.0) -> list["Trimesh"]:
@@ -348,18 +334,6 @@ def _case_named(cases: list[Case], name: str | None) -> Case:
     if name not in named:
         raise InputError("no such case", field="--case", value=name, limit=choices(name, named))
     return named[name]
-
-
-def _judged(case: Case) -> tuple[list[str], list[InputError]]:
-    """Warnings of the scenes of a case, and why those that cannot be built cannot."""
-    warnings: dict[str, None] = {}
-    errors: list[InputError] = []
-    for kind in SCENES.values():
-        try:
-            warnings.update(dict.fromkeys(map(str, _built(kind, case, None).warnings)))
-        except InputError as error:
-            errors.append(error)
-    return list(warnings), errors
 
 
 def new(study: str, base: str) -> None:

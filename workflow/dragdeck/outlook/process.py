@@ -20,7 +20,7 @@ _RATIOS = {
 
 
 def workpiece_notes(case: Case) -> list[tuple[str, str]]:
-    """What ``check``, ``explain`` and ``preview`` say of a process: a heading and a text each."""
+    """What ``check`` and ``explain`` say of a process: a heading and a text each."""
     bed = expected_bed(case.study)
     gaps = clearances(case, bed.surface_m)
     return [
