@@ -31,12 +31,12 @@ COMMANDS = (
                   "dimensionless numbers")),
             "./run dragdeck check uhlmann2015 --fidelity draft"),
     Command("explain", "explain what the input scripts model",
-            "Explain what the input scripts of a study model, what they leave out, and what both "
-            "cost. It writes nothing.",
+            "Explain what the input scripts of a study model, what they leave out, and what that "
+            "would cost. It writes nothing.",
             "commands:explain", (
         STUDY, FIDELITY,
         Argument("--verbose", action="store_true",
-                  help="print every run, with reasons, costs and expectations"),
+                  help="print every run, with reasons and costs"),
         Argument("scene", nargs="?", metavar="SCENE",
                   help=f"explain one scene only: {SCENE} (default: all three)")),
             "./run dragdeck explain uhlmann2015 process"),

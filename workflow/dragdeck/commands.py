@@ -31,15 +31,9 @@ from dragdeck.engine.reports import say
 from dragdeck.engine.space import check_amount
 from dragdeck.errors import DragdeckError, InputError, choices, together
 from dragdeck.files import write_bytes
-from dragdeck.outlook.explain import expected_cost, explanation, measured_speeds, show
+from dragdeck.outlook.explain import explanation, show
 from dragdeck.outlook.explain import scene_lines as page_of_scene
-from dragdeck.outlook.process import (
-    bed_notes,
-    dimensionless,
-    modulus_note,
-    not_corrected,
-    workpiece_notes,
-)
+from dragdeck.outlook.process import bed_notes, dimensionless, not_corrected, workpiece_notes
 from dragdeck.outlook.runs import expected_runs, plan_in_words, written
 from dragdeck.outlook.timestep import stable_step_cautions, stable_step_note, timestep_notes
 from dragdeck.physics.packing import Bed
@@ -56,7 +50,7 @@ from dragdeck.project import (
 )
 from dragdeck.records.advice import AdviceFile
 from dragdeck.records.run import changed_in_words
-from dragdeck.records.tradeoff import TradeoffRecord, measured_tradeoff, tradeoff_if_measured
+from dragdeck.records.tradeoff import TradeoffRecord, measured_tradeoff
 from dragdeck.scenes.lead import with_leads
 from dragdeck.scenes.process import SCENES
 from dragdeck.scenes.scene import SceneType, StudyScene, read_bed
@@ -161,7 +155,7 @@ class _Findings:
         notes.append(changed_in_words(used_templates["changed_scripts"]))
         for text in filter(None, notes):
             self.reduced.setdefault(text, {})[case.name] = None
-        lines = [f"time step: {scene.deck.timestep_s:.3g} s"]
+        lines = [f"time step: {scene.deck.timestep_s:.3g} s, about {scene.steps:,} steps"]
         lines += [f"{what}: {text}" for what, text in _expectations(case, kind, scene)]
         names = dict.fromkeys(f"{kind.name} {folder.name}" for folder in runs)
         self.notes.setdefault("\n  ".join(lines), {}).update(names)
@@ -251,25 +245,21 @@ def _built(kind: SceneType, case: Case, bed: Bed | None) -> StudyScene:
 
 
 def explain(study: str, fidelity: str | None, scene: str | None, verbose: bool) -> None:
-    """Show what the input scripts of a study model, leave out and cost."""
+    """Show what the input scripts of a study model and leave out, and what that would cost."""
     project = find_project(Path.cwd())
     every = project.cases(study, fidelity)
     templates = environment(project.templates, study_templates(every[0]))
     for kind in [_scene_type(scene)] if scene else SCENES.values():
-        speeds = measured_speeds(project.results(study) / kind.name)
         cases = list(by_run(every, kind).values())
         for case in cases if verbose else cases[:1]:
             scripted = _as_scripted(_built(kind, case, None), templates)
-            cost = expected_cost(kind, scripted, speeds)
-            if not verbose:
+            if verbose:
+                show([explanation(scripted, measured_tradeoff())])
+            else:
                 width = min(100, shutil.get_terminal_size().columns)
-                reduced_text = not_corrected(case) if kind.needs_bed else ""
-                print(*page_of_scene(scripted, cost, len(cases), width, reduced_text), sep="\n")
-                continue
-            notes = _expectations(case, kind, scripted)
-            show([explanation(scripted, cost, notes, tradeoff_if_measured())])
+                print(*page_of_scene(scripted, len(cases), width), sep="\n")
     if not verbose:
-        print("For every run, with reasons, costs and expectations: --verbose")
+        print("For every run, with reasons and costs: --verbose")
 
 
 def _as_scripted(scene: StudyScene, templates: jinja2.Environment) -> StudyScene:
@@ -288,8 +278,7 @@ def _expectations(case: Case, kind: SceneType, scene: StudyScene) -> list[tuple[
     """What is known of a scene's time step and bed before it is run."""
     notes = timestep_notes(case, kind, scene)
     if kind.needs_bed:
-        notes += [stable_step_note(case), *workpiece_notes(case), modulus_note(case)]
-        notes += dimensionless(case)
+        notes += [stable_step_note(case), *workpiece_notes(case), *dimensionless(case)]
     return [*notes, *([] if kind.single_particle else bed_notes(case))]
 
 
