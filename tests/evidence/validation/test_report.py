@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from changed import changed
+from pages import stands_alone
 from tradeoff_files import VALUES, measures
 
 from dragchain.quantities.document import MEASURED_FILE, RunQuantities
@@ -13,7 +14,13 @@ from dragchain.run.case import study_of
 from dragchain.tradeoff.compare import read_plan_runs
 from dragdeck.records.case import load_case
 from dragdeck.study.reference import Drag, Reference
-from evidence.validation.report import Effect, Validation, packing_table, validation_of
+from evidence.validation.report import (
+    Effect,
+    Validation,
+    packing_table,
+    validation_of,
+    write_validation,
+)
 
 PUBLISHED = Reference(
     source="a paper",
@@ -98,3 +105,11 @@ def test_a_packing_has_its_own_values_with_their_intervals(folders: list[Path]) 
     low, high = (table[f"drag_mean_ci95_{end}"] for end in ("low", "high"))
     assert ((low < table["drag_mean"]) & (table["drag_mean"] < high)).all()
     assert (table["bed_height"] == 1.0).all()
+
+
+def test_the_page_stands_alone(tiny_run: Path, folders: list[Path], tmp_path: Path) -> None:
+    case = load_case(tiny_run)
+    study = changed(study_of(case), reference=PUBLISHED)
+    changed(case, study=study).write(folders[0] / "case.json")
+    write_validation(tmp_path / "report", folders, "./run validate")
+    assert stands_alone((tmp_path / "report/report.html").read_text()).images
