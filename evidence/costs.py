@@ -25,7 +25,7 @@ from dragdeck.decks.templates import environment
 from dragdeck.documents import Part
 from dragdeck.engine.batch import Batch
 from dragdeck.engine.reports import Report, say
-from dragdeck.errors import InputError, choices
+from dragdeck.errors import InputError
 from dragdeck.project import by_run, find_project, study_templates
 from dragdeck.records.run import RunRecord
 from dragdeck.records.tradeoff import CostEntry, CostsFile, Machine
@@ -69,24 +69,13 @@ class Option(Variation):
         return named_values
 
 
-def options(only: Sequence[str] = ()) -> Mapping[str, tuple[Option, Settings]]:
-    """The options of the design by name, the reference first; of the others those of `only`.
-
-    Raises
-    ------
-    InputError
-        There is no such option.
-    """
-    design = Design[Option].read(DESIGN)
-    known = {name: option for block in design.points for name, option in block.named().items()}
-    for name in only:
-        if name not in known:
-            limit = choices(name, known)
-            raise InputError("no such option", field="--only", value=name, limit=limit)
-    chosen = {name: option for name, option in known.items() if name in only or not only}
+def options(design: Path = DESIGN) -> Mapping[str, tuple[Option, Settings]]:
+    """The options of a design by name, the reference first."""
+    known = Design[Option].read(design)
     return {
-        name: (option, {**design.base, **values})
-        for name, (option, values) in {**design.reference.named(), **chosen}.items()
+        name: (option, {**known.base, **values})
+        for block in (known.reference, *known.points)
+        for name, (option, values) in block.named().items()
     }
 
 
@@ -243,7 +232,7 @@ def time_options(
     *,
     rounds: int = 3,
     seconds: float = SECONDS,
-    only: Sequence[str] = (),
+    design: Path = DESIGN,
 ) -> None:
     """Run all options of the design and write their costs.
 
@@ -260,23 +249,22 @@ def time_options(
     rounds : int
     seconds : float
         Process time of every drag, s.
-    only : sequence of str
-        Names of options; none: all.
+    design : Path
+        The options.
 
     Raises
     ------
     InputError
-        The result is there already, there is no such option, or nothing to time.
+        The result is there already, or there is nothing to time.
     EngineError, RejectedRunError
         A packing or a run of the standard case failed, or a run was interrupted.
     """
     if out.exists():
         remedy = "move it away, or give another --out"
         raise InputError("this measurement is there already", file=out, remedy=remedy)
-    for name, value in (("--rounds", rounds), ("--seconds", seconds)):
-        if not value > 0:
-            raise InputError("nothing to time", field=name, value=value, limit="greater than 0")
-    load, chosen = os.getloadavg()[0], options(only)
+    if rounds < 1:
+        raise InputError("nothing to time", field="--rounds", value=rounds, limit="at least 1")
+    load, chosen = os.getloadavg()[0], options(design)
     if load > _QUIET:
         report(f"warning: the machine is busy (load average {load:.2f}); CPU times will scatter")
     cases = option_cases(
@@ -340,10 +328,8 @@ def _own(chosen: Mapping[str, tuple[Option, Settings]], name: str, first: str) -
     return {field: value for field, value in chosen[name][1].items() if base.get(field) != value}
 
 
-def measure_costs(
-    study: str, fidelity: str | None, out: Path, rounds: int, seconds: float, only: Sequence[str]
-) -> None:
+def measure_costs(study: str, fidelity: str | None, out: Path, rounds: int) -> None:
     """Time the options of a study by its name; see `time_options`."""
     project = find_project(Path.cwd())
     case = project.cases(study, fidelity)[0]
-    time_options(case, project.templates, out, say, rounds=rounds, seconds=seconds, only=only)
+    time_options(case, project.templates, out, say, rounds=rounds)

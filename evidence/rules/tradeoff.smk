@@ -25,8 +25,8 @@ rule measure_costs:
 
 rule write_tradeoff:
     input:
-        measures=lambda wildcards: WORK.every_point("tables/quantities.json"),
-        drops=lambda wildcards: WORK.every_drop_point("tables/impacts.parquet"),
+        measures=lambda wildcards: WORK.every_point(POINTS, "tables/quantities.json"),
+        drops=lambda wildcards: WORK.every_point("drop_test", "tables/impacts.parquet"),
         costs=lambda wildcards: (
             [WORK.of_tradeoff("costs.json")] if WORK.points_of(PLAN).cost_rounds else []
         ),
@@ -37,8 +37,8 @@ rule write_tradeoff:
         runs=multiext(WORK.of_tradeoff(""), "runs.csv", "runs.parquet"),
         errors=multiext(WORK.of_tradeoff(""), "errors.csv", "errors.parquet"),
     params:
-        reference=lambda wildcards: WORK.every_point("")[0],
-        drops=lambda wildcards: WORK.every_drop_point(""),
+        reference=lambda wildcards: WORK.every_point(POINTS, "")[0],
+        drops=lambda wildcards: WORK.every_point("drop_test", ""),
         costs=lambda wildcards, input: f"--costs {input.costs}" if input.costs else "",
         plan=Path(PLAN).stem,
         command=f"./run tradeoff --config study={STUDY} plan={PLAN}",

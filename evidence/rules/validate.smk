@@ -3,11 +3,8 @@
 
 rule write_validation:
     input:
-        measures=lambda wildcards: WORK.every_point("tables/quantities.json", VALIDATION),
-        loads=lambda wildcards: WORK.every_packing("tables/loading.json"),
-        templates=WORK.page_templates(
-            "validation/validation.html.j2", "validation/load.html.j2", package="evidence"
-        ),
+        measures=lambda wildcards: WORK.every_point(POINTS, "tables/quantities.json", VALIDATION),
+        templates=WORK.page_templates("validation/validation.html.j2", package="evidence"),
     output:
         page=shown(WORK.of_study("validation", "report.html"), "validation", "Validation"),
         found=WORK.of_study("validation", "validation.json"),

@@ -12,9 +12,8 @@ from matplotlib.figure import Figure
 
 from dragchain.arrays import Floats
 from dragchain.figures.panels import head, key, legend_below, new_panels, row_names
-from dragchain.figures.style import BLUE, GREEN, GREY, INK, ORANGE, RED
+from dragchain.figures.style import GREEN, GREY, INK, ORANGE, RED
 from dragchain.report.campaign import write_report
-from dragdeck.records.stability import RestitutionErrors
 from evidence.stability.judge import (
     CLASSES,
     ENERGY,
@@ -24,9 +23,7 @@ from evidence.stability.judge import (
     REFUSED,
     RULE,
     STABLE,
-    TOLERANCE,
     conditions,
-    head_on_impacts,
     judge_points,
     summarise_map,
 )
@@ -65,7 +62,7 @@ def write_stability(out_dir: Path, runs: Sequence[PointRun]) -> None:
     write_report(
         out_dir,
         "stability/stability.html.j2",
-        draw=lambda: draw_map(points, found_conditions, summary.restitution_error),
+        draw=lambda: draw_map(points, found_conditions),
         tables={"points": points, "conditions": found_conditions},
         documents={"stability": summary},
         package="evidence",
@@ -123,24 +120,13 @@ _TITLES = {
 }
 
 
-def draw_map(
-    points: pd.DataFrame, conditions: pd.DataFrame, errors: RestitutionErrors
-) -> dict[str, Figure]:
-    """All figures by name.
-
-    Parameters
-    ----------
-    points, conditions : DataFrame
-        One row per point, and per condition.
-    errors : RestitutionErrors
-    """
+def draw_map(points: pd.DataFrame, conditions: pd.DataFrame) -> dict[str, Figure]:
+    """The map of each regime by name; a row per point, and per condition."""
     tested = points[~points["reference"]]
     drawn = {}
     for regime in (name for name in REGIMES if (points["regime"] == name).any()):
         finished, rows = (table[table["regime"] == regime] for table in (tested, conditions))
         drawn[f"map_{regime}"] = draw_regime(finished, rows, _TITLES[regime])
-    if errors.steps_per_contact:
-        drawn["restitution_error"] = _errors(head_on_impacts(points), errors)
     return drawn
 
 
@@ -187,27 +173,3 @@ def _mark(axes: Axes, line: int, at: float, steps: Floats, style: str) -> None:
     if math.isfinite(at) and steps[0] <= at <= steps[-1]:
         x = float(np.interp(math.log(at), np.log(steps), np.arange(len(steps))))
         axes.plot([x, x], [line - 0.44, line + 0.44], style, color=INK, lw=1.6)
-
-
-def _errors(impacts: pd.DataFrame, table: RestitutionErrors) -> Figure:
-    figure, (axes,) = new_panels(3.6)
-    broken = impacts[impacts["restitution_error"].notna()]
-    error, shades = (
-        broken["restitution_error"].abs().clip(lower=1e-6),
-        broken["setting_restitution"],
-    )
-    dots = axes.scatter(broken["steps_per_contact"], error, 16, shades, vmin=0.0, vmax=1.0)
-    for label, values, colour in (
-        ("largest, any restitution", table.worst, RED),
-        ("largest, e ≥ 0.5", table.ordinary_worst, BLUE),
-        ("median", table.median, INK),
-    ):
-        axes.plot(table.steps_per_contact, values, color=colour, label=label)
-    axes.axhline(TOLERANCE, color=GREY, ls="--", lw=1, label="tolerance")
-    axes.set(xscale="log", yscale="log", ylim=(5e-6, 10))
-    axes.set_xlabel("time steps per contact (elastic Hertz contact time / time step)")
-    axes.set_ylabel("largest error of restitution per run")
-    axes.set_title("Single impacts: error of restitution relative to the reference step")
-    axes.legend(loc="upper right")
-    figure.colorbar(dots, label="input restitution")
-    return figure

@@ -1,1 +1,1 @@
-"""A study against what its source says: forces, load, and the source's statements."""
+"""A study beside the publication that it reproduces."""

@@ -1,51 +1,127 @@
-"""The report on a validation: its document, tables, figures and page."""
+"""A study beside the publication that it reproduces: packings, other settings, changed inputs.
 
-import json
-from collections.abc import Mapping, Sequence
+The runs are the points of a plan. Each is measured by `dragchain.quantities`, and settings are
+compared as in a trade-off (`dragchain.tradeoff.compare`).
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
-import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from dragchain.drag import drag_peaks, read_counted
 from dragchain.figures.panels import legend_below, new_panels, row, row_names
-from dragchain.figures.style import BLUE, COLOURS, GREY
+from dragchain.figures.style import BLUE, COLOURS, GREY, ORANGE
+from dragchain.quantities.document import MEASURED_FILE
+from dragchain.quantities.registry import MEASURED, REPORTED
 from dragchain.report.campaign import write_report
-from dragchain.run.kinematics import drag_start_s
-from dragchain.statistics.estimate import Estimate
-from dragdeck.documents import Document
-from evidence.validation.force import (
-    Compared,
-    Effect,
-    Force,
-    LoadingOverPackings,
-    compare_drag,
-    effect_table,
-    force_of_packings,
-    load_of_packings,
-    setting_effects,
+from dragchain.run.case import study_of
+from dragchain.run.reference import reference_drags
+from dragchain.statistics.estimate import Estimate, Real, flattened, mean_of
+from dragchain.tradeoff.compare import (
+    PlanRun,
+    QuantityComparison,
+    Setting,
+    compare_quantity,
+    differing_inputs,
+    read_plan_runs,
 )
-from evidence.validation.runs import MeasuredRun, RunsByBed, read_validation_runs
+from dragdeck.documents import Document, Part
+from dragdeck.records.case import CaseOfRun, load_case
+
+_COMPARED = ("drag_mean", "drag_std")
+"""Quantities on which the effects of settings are stated."""
+
+
+class MeanOfPackings(Part):
+    """The mean of a quantity over the packings, with Student's t interval.
+
+    Nothing is assumed of how well a single packing knows its own value.
+    """
+
+    name: str
+    label: str
+    unit: str
+    mean: Estimate
+
+
+class Compared(Part):
+    """The drag beside a reference figure of the study.
+
+    Attributes
+    ----------
+    label, mean_n, std_n
+        Of the reference.
+    difference : Estimate
+        Relative difference of our mean to it.
+    std_ratio : Estimate or None
+        Our standard deviation over it. Both intervals are those over packings alone: no source
+        says how well it knows its own mean.
+    """
+
+    label: str
+    mean_n: float
+    std_n: float | None
+    difference: Estimate
+    std_ratio: Estimate | None
+
+
+class Effect(Part):
+    """The relative change of a quantity by a setting, or by an input at the same settings.
+
+    Attributes
+    ----------
+    quantity : str
+    youngs_modulus_scale, timestep_fraction, speed_factor : float
+        The settings.
+    runs : int
+    field, value, reference_value : str
+        Inputs that are changed, empty if none are, and what they are with and without the change.
+    change, ci95_low, ci95_high : float
+        Against the same settings without the changed input, or against the reference.
+    """
+
+    quantity: str
+    youngs_modulus_scale: float
+    timestep_fraction: float
+    speed_factor: float
+    runs: int
+    field: str
+    value: str
+    reference_value: str
+    change: float
+    ci95_low: float
+    ci95_high: float
 
 
 class Validation(Document):
-    """The content of ``validation.json``."""
+    """The content of ``validation.json``.
+
+    Attributes
+    ----------
+    run_std, bed_fraction : float
+        Relative standard deviation of the mean drag of a run over `arc_m`, and the fraction of its
+        variance that runs from one packing have in common.
+    """
 
     study: str
     command: str
     measured: str
     versions: Mapping[str, str]
     engine_hours: float
-    force: Force
+    runs: int
+    packings: int
+    arc_m: float
+    run_std: Real
+    bed_fraction: Real
+    means: tuple[MeanOfPackings, ...]
     comparison: tuple[Compared, ...]
-    load: LoadingOverPackings
     effects: tuple[Effect, ...]
 
 
 def write_validation(out_dir: Path, run_dirs: Sequence[Path], command: str) -> None:
-    """Write tables, figures and page of the runs of a validation.
+    """Write tables, figure and page of the runs of a validation.
 
     Parameters
     ----------
@@ -59,144 +135,173 @@ def write_validation(out_dir: Path, run_dirs: Sequence[Path], command: str) -> N
     Raises
     ------
     DocumentError
-        A run has no measures.
+        A run has no ``quantities.json``.
     TableError
-        Fewer than two packings are complete.
+        No run is complete.
     SeriesError
-        There are too few runs to compare settings.
+        The reference is not complete, or there are too few runs to compare settings.
     """
-    runs = read_validation_runs(run_dirs)
-    first, validation = runs.packings[0], validation_of(runs, command)
+    files = [folder / MEASURED_FILE for folder in run_dirs]
+    runs, reference, arc_m = read_plan_runs(files, run_dirs[0])
+    case = load_case(run_dirs[0])
+    found = validation_of(runs, reference, arc_m, case, command)
+    packings = packing_table(runs, reference)
     write_report(
         out_dir,
         "validation/validation.html.j2",
-        draw=lambda: _draw(runs, validation),
-        pictures={"workpiece": (first.folder / "figures" / "workpiece.png").read_bytes()},
-        tables=_tables(validation),
-        documents={"validation": validation},
+        draw=lambda: {
+            "comparison": draw_drags(
+                list(_bars(found, packings)), {of.label: of.mean_n for of in found.comparison}
+            )
+        },
+        tables={
+            "packings": packings,
+            "means": _table(found.means),
+            "comparison": _table(found.comparison),
+            "effects": _table(found.effects),
+        },
+        documents={"validation": found},
         package="evidence",
-        found=json.loads(validation.as_text()),
-        assumptions=first.case.assumptions,
-        varied={row.field for row in validation.effects},
-        runs=runs,
+        found=found,
+        packings=packings.to_dict("records"),
+        assumptions=case.assumptions,
     )
 
 
-def validation_of(runs: RunsByBed, command: str) -> Validation:
+def validation_of(
+    runs: Sequence[PlanRun], reference: Setting, arc_m: float, case: CaseOfRun, command: str
+) -> Validation:
     """All numbers of the page."""
-    first = runs.packings[0]
-    force = force_of_packings(runs.packings)
+    compared = {
+        quantity.name: compare_quantity(quantity, runs, reference)
+        for quantity in MEASURED
+        if quantity.name in _COMPARED
+    }
+    packings, every = _at(runs, reference), [run.measures for run in runs]
+    means = {quantity: _mean(packings, quantity.name) for quantity in REPORTED}
+    drag, std = (_mean(packings, name) for name in _COMPARED)
     return Validation(
-        study=first.case.study_name,
+        study=case.study_name,
         command=command,
-        measured=max(run.measures.started for run in runs.all)[:10],
-        versions=first.measures.versions,
-        engine_hours=sum(run.measures.cost.cpu_time_s for run in runs.all) / 3600.0,
-        force=force,
-        comparison=compare_drag(force.together["drag_n"], first.case),
-        load=load_of_packings(runs.packings),
-        effects=tuple(setting_effects(runs)),
+        measured=max(measures.started for measures in every)[:10],
+        versions=every[0].versions,
+        engine_hours=sum(measures.cost.cpu_time_s for measures in every) / 3600.0,
+        runs=len(runs),
+        packings=len(packings),
+        arc_m=arc_m,
+        run_std=compared["drag_mean"].run_std,
+        bed_fraction=compared["drag_mean"].bed_fraction,
+        means=tuple(
+            MeanOfPackings(name=of.name, label=of.label, unit=of.unit, mean=mean)
+            for of, mean in means.items()
+            if mean.known
+        ),
+        comparison=tuple(
+            Compared(
+                **published.model_dump(include={"label", "mean_n", "std_n"}),
+                difference=published.difference(drag),
+                std_ratio=std.over(published.std_n) if published.std_n else None,
+            )
+            for published in reference_drags(study_of(case).reference)
+        ),
+        effects=tuple(
+            effect for of in compared.values() for effect in _effects(of, runs, reference)
+        ),
     )
 
 
-def _tables(validation: Validation) -> dict[str, pd.DataFrame]:
-    """The numbers of the page as tables, by name."""
-    compared = [
-        row.model_dump(exclude={"std_ratio"} if row.std_ratio is None else None)
-        for row in validation.comparison
-    ]
-    return {
-        "packings": pd.json_normalize(
-            [row.model_dump() for row in validation.force.packings], sep="_"
-        ),
-        "effects": effect_table(validation.effects),
-        "load": pd.DataFrame([dict(row) for row in validation.load.rows]),
-        "comparison": pd.json_normalize(compared, sep="_"),
-    }
+def _at(runs: Sequence[PlanRun], setting: Setting) -> list[PlanRun]:
+    """The complete runs at a setting, by the seeds of their packings."""
+    complete = (run for run in runs if run.setting == setting and run.complete)
+    return sorted(complete, key=lambda run: run.measures.study.seed)
 
 
-# --- figures -----------------------------------------------------------------------------------
+def _mean(packings: Sequence[PlanRun], name: str) -> Estimate:
+    known = (run.measures.values_of_run.get(name) for run in packings)
+    return mean_of([estimate.value for estimate in known if estimate is not None])
 
 
-def _draw(runs: RunsByBed, validation: Validation) -> dict[str, Figure]:
-    """The figures of the page, by name."""
-    return {
-        "comparison": _comparison(validation.force, validation.comparison, validation.effects),
-        "traces": _traces(runs.packings, validation.comparison),
-    }
-
-
-def _traces(packings: Sequence[MeasuredRun], compared: Sequence[Compared]) -> Figure:
-    """The drag of every packing over process time, its peaks marked, over the source's band."""
-    height = 0.7 + 1.35 * len(packings)
-    figure, panels = new_panels(height, len(packings), columns=1, sharex=True, sharey=True)
-    for axes, run in zip(panels, packings, strict=True):
-        _bands(axes, compared)
-        _trace(axes, run)
-        axes.set_ylabel("drag force (N)")
-    panels[-1].set_xlabel("process time (s)")
-    return legend_below(figure)
-
-
-def _trace(axes: Axes, run: MeasuredRun) -> None:
-    samples = read_counted(run.folder, ("time_s", "drag_n"))
-    time_s, drag = samples["time_s"].to_numpy(np.float64), samples["drag_n"].to_numpy(np.float64)
-    peaks = drag_peaks(samples, run.case)
-    zero = drag_start_s(run.case)
-    axes.plot(time_s - zero, drag, color=COLOURS["drag"], linewidth=0.5)
-    axes.plot(peaks.time_s - zero, peaks.drag_n, "v", color=COLOURS["peak"], label="peak")
-    axes.axhline(float(drag.mean()), color="black", linewidth=1.0, label="mean of the packing")
-    force = f"{drag.mean():.2f} ± {drag.std(ddof=1):.2f} N"
-    axes.set_title(f"packing {run.seed}: {force}, {len(peaks.index)} peaks")
-
-
-def _bands(axes: Axes, compared: Sequence[Compared]) -> None:
-    for reference in compared:
-        colour = COLOURS[reference.label]
-        axes.axhline(
-            reference.mean_n, color=colour, linestyle="--", label=f"{reference.label} mean"
+def _effects(
+    comparison: QuantityComparison, runs: Sequence[PlanRun], reference: Setting
+) -> Iterator[Effect]:
+    """The effect of every other setting on a quantity, as far as the runs tell it."""
+    for setting in comparison.errors:
+        plain = Setting.of(setting)
+        base = plain if setting.other and _at(runs, plain) else reference
+        error = comparison.between(setting, base)
+        if setting == reference or error is None:
+            continue
+        same, (standard, *_) = _at(runs, setting), _at(runs, base)
+        changed = differing_inputs(same[0].measures, standard.measures)
+        before = standard.measures.study.inputs()
+        yield Effect(
+            quantity=comparison.quantity.name,
+            **setting.parameters(),
+            runs=len(same),
+            field=", ".join(changed),
+            value=", ".join(map(str, changed.values())),
+            reference_value=", ".join(str(before.get(field, "")) for field in changed),
+            change=error.value,
+            ci95_low=error.ci95_low,
+            ci95_high=error.ci95_high,
         )
-        if reference.std_n and reference.label == "experiment":
-            low, high = reference.mean_n - reference.std_n, reference.mean_n + reference.std_n
-            label = "experiment, ± one standard deviation"
-            axes.axhspan(low, high, color=colour, alpha=0.12, linewidth=0, label=label)
 
 
-_Row = tuple[str, Estimate, str]
-"""Name, value and colour of a row of `_rows`."""
+# --- tables and figure -------------------------------------------------------------------------
 
 
-def _comparison(force: Force, compared: Sequence[Compared], effects: Sequence[Effect]) -> Figure:
-    """Mean drags: the source's, each packing's with its own interval, and all together."""
-    together = force.together["drag_n"].mean
-    rows: list[_Row] = [
-        (mean.label, Estimate.around(mean.mean_n, 0.0), COLOURS[mean.label]) for mean in compared
+def packing_table(runs: Sequence[PlanRun], reference: Setting) -> pd.DataFrame:
+    """One row per packing: its run, what it took, and its quantities with their intervals."""
+    rows = [
+        {
+            "run": run.measures.run,
+            "seed": run.measures.study.seed,
+            "arc_m": run.measures.arc_m,
+            **run.measures.cost.model_dump(include={"steps", "cpu_time_s"}),
+            **run.measures.single,
+            **flattened(dict(run.measures.values_of_run)),
+        }
+        for run in _at(runs, reference)
     ]
-    rows += [
-        (f"packing {packing.seed}", packing.drag_n.estimate, BLUE) for packing in force.packings
-    ]
-    rows.append(("all packings", together, "black"))
-    for effect in effects:
-        if effect.quantity == "drag_mean" and not effect.field:
-            changed = _change(effect).mapped(lambda change: together.value * (1.0 + change))
-            rows.append((_fidelity(effect), changed, GREY))
-    return _rows(rows, "mean drag (N); bars: 95 % CI")
+    return pd.DataFrame(rows)
 
 
-def _change(effect: Effect) -> Estimate:
-    return Estimate(effect.change, effect.ci95_low, effect.ci95_high)
+def _table(rows: Sequence[Part]) -> pd.DataFrame:
+    return pd.DataFrame([flattened(dict(part)) for part in rows])
 
 
-def _fidelity(effect: Effect) -> str:
-    name = f"E x {effect.youngs_modulus_scale:g}, {100 * effect.timestep_fraction:g} %"
-    return name if effect.speed_factor == 1.0 else f"{name}, speed x {effect.speed_factor:g}"
+Bar = tuple[str, Estimate, str]
+"""Name, value and colour of a row of `draw_drags`."""
 
 
-def _rows(rows: Sequence[_Row], label: str) -> Figure:
-    """Values with their intervals, one below the other."""
-    figure, (axes,) = new_panels(0.9 + 0.27 * len(rows))
-    for place, (_, estimate, colour) in enumerate(rows):
+def _bars(found: Validation, packings: pd.DataFrame) -> Iterator[Bar]:
+    drag = next(of.mean for of in found.means if of.name == "drag_mean")
+    yield "all packings", drag, COLOURS["drag"]
+    for packing in packings.to_dict("records"):
+        ends = (packing[f"drag_mean{end}"] for end in ("", "_ci95_low", "_ci95_high"))
+        yield f"packing {packing['seed']}", Estimate(*ends), BLUE
+    for effect in found.effects:
+        if effect.quantity == "drag_mean":
+            yield effect_bar(drag.value, effect)
+
+
+def effect_bar(drag_n: float, effect: Any) -> Bar:
+    """The mean drag with an effect, which is named by the changed input, or by the settings."""
+    change = Estimate(effect.change, effect.ci95_low, effect.ci95_high)
+    drag = change.mapped(lambda by: drag_n * (1 + by))
+    if effect.field:
+        return f"{effect.field} {effect.value}", drag, GREY
+    step = f"{100 * effect.timestep_fraction:g} %"
+    return f"E \u00d7 {effect.youngs_modulus_scale:g}, {step}", drag, ORANGE
+
+
+def draw_drags(bars: Sequence[Bar], published: Mapping[str, float]) -> Figure:
+    """Mean drags with their intervals, one below the other, and published ones as lines."""
+    figure, (axes,) = new_panels(1.2 + 0.27 * len(bars))
+    for label, mean_n in published.items():
+        axes.axvline(mean_n, color=COLOURS[label], ls="--", label=f"published {label}")
+    for place, (_, estimate, colour) in enumerate(bars):
         row(axes, place, estimate.value, estimate, colour)
-    row_names(axes, [name for name, *_ in rows])
-    axes.set(xlabel=label)
-    return figure
+    row_names(axes, [name for name, *_ in bars])
+    axes.set_xlabel("mean drag force (N), 95 % CI")
+    return legend_below(figure)

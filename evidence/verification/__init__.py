@@ -1,1 +1,1 @@
-"""Verification of the contact law on the engine: references, checks, figures, report."""
+"""Verification of the contact law on the engine: references, checks, report."""

@@ -3,16 +3,11 @@
 from collections.abc import Hashable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, get_args
+from typing import get_args
 
-import numpy as np
 import pandas as pd
 from markupsafe import Markup
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
-from dragchain.figures.panels import legend_below, new_panels
-from dragchain.figures.style import GREY, MARKERS, SERIES
 from dragchain.report.campaign import write_report
 from dragchain.tables.by_step import read_table
 from dragdeck.decks.templates import environment
@@ -20,21 +15,7 @@ from dragdeck.engine.batch import Batch
 from dragdeck.engine.reports import say
 from dragdeck.errors import RejectedRunError
 from dragdeck.project import find_project, run_path, study_templates
-from evidence.verification.checks import (
-    COULOMB,
-    EXACT,
-    INPUT,
-    INTEGRATED,
-    JUDGED,
-    TOLERANCE,
-    Compared,
-    QuantityCheck,
-    Verdict,
-    check_rows,
-    checks_by_test,
-    published_curve,
-    series_name,
-)
+from evidence.verification.checks import JUDGED, Compared, Verdict, check_rows, checks_by_test
 from evidence.verification.experiment import collide_scene
 from evidence.verification.recording import read_recording
 from evidence.verification.suite import suite_file, suite_of
@@ -101,7 +82,7 @@ def write_verification(out_dir: Path, run_dirs: Sequence[Path]) -> None:
     write_report(
         out_dir,
         "verification/verification.html.j2",
-        draw=lambda: {test: draw_test(test, rows) for test, rows in compared.items()},
+        draw=dict,
         tables={"checks": checks, "verification": summary},
         name="verification",
         package="evidence",
@@ -197,66 +178,3 @@ def in_words(quantity: str) -> str:
         if quantity.endswith(ending):
             return f"{quantity.removesuffix(ending).replace('_', ' ')} ({unit})"
     return quantity.replace("_", " ")
-
-
-# --- figures --------------------------------------------------------------------------------
-
-
-_LINES: Mapping[str, Mapping[str, Any]] = {
-    EXACT: {"label": "line: exact formula"},
-    INTEGRATED: {"label": "line: contact law integrated in small steps"},
-    COULOMB: {"color": "black", "ls": "--", "label": "rigid-body sliding with Coulomb friction"},
-    INPUT: {"color": "black", "ls": ":", "label": "input value"},
-    TOLERANCE: {"color": GREY, "ls": ":", "label": "tolerance"},
-}
-"""How references are drawn, those of no series in its colour."""
-
-_OTHERS: Mapping[str, tuple[str, ...]] = {
-    "oblique_angle": ("experiment (Kharaz et al. 2001)",),
-    "oblique_tangential": ("finite elements (Wu)",),
-}
-"""Series that the paper draws and nobody here models."""
-
-
-def draw_test(test: str, compared: Compared) -> Figure:
-    """The figure of a test: a panel for each quantity, the engine's points over the references."""
-    drawn = [
-        (check.series or series_name(run), check) for run, check in compared if len(check.drawn)
-    ]
-    names = list(dict.fromkeys(name for name, _ in drawn))
-    quantities = list(dict.fromkeys(check.quantity for _, check in drawn))
-    axes_of, count = suite_file().axes, len(quantities)
-    figure, panels = new_panels(3.7, count, 3.7 * max(count, 2))
-    for axes, quantity in zip(panels, quantities, strict=True):
-        shown: set[str] = set()
-        for name, check in drawn:
-            if check.quantity == quantity:
-                _draw_comparison(axes, check, names.index(name), "" if name in shown else name)
-                shown.add(name)
-        materials = list(dict.fromkeys(run.case.series for run, _ in compared))
-        _draw_published(axes, test, materials, quantity)
-        known = {**axes_of.get(test, {}), **axes_of.get(quantity, {})}
-        axes.set(**{"ylabel": in_words(quantity), **known})
-    return legend_below(figure)
-
-
-def _draw_comparison(axes: Axes, check: QuantityCheck, at: int, name: str) -> None:
-    """Draw a reference, and the engine's points if they have a name."""
-    colour = SERIES[at % len(SERIES)]
-    x, reference, engine = np.array(sorted(map(tuple, check.drawn)), dtype=np.float64).T
-    if name:
-        mark, size = (MARKERS[at % len(MARKERS)], 5) if len(x) < 100 else (".", 2)
-        label = f"{name}: LIGGGHTS"
-        axes.plot(x, engine, mark, color=colour, ms=size, mfc="none", label=label)
-    if np.isfinite(reference).any():
-        axes.plot(x, reference, **{"color": colour, "lw": 0.9, **_LINES.get(check.against, {})})
-
-
-def _draw_published(axes: Axes, test: str, series: Sequence[str], quantity: str) -> None:
-    others = _OTHERS.get(test, ())
-    for name, marker in zip((*series, *others), "xx+", strict=False):
-        x, y = published_curve(test, name, quantity)
-        if len(x):
-            shade = "black" if name in others else GREY
-            label = f"published: {name}".replace("_", " ")
-            axes.plot(x, y, marker, color=shade, ms=5, mew=0.9, label=label)

@@ -394,7 +394,6 @@ class SuiteFile(Model):
     materials: dict[str, Substance]
     steps_per_contact: Whole
     notes: dict[str, str]
-    axes: dict[str, dict[str, str | tuple[float, float]]]
     impacts: dict[str, Impacts]
     others: dict[str, Test]
 

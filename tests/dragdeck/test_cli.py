@@ -201,29 +201,6 @@ def test_more_ranks_than_cores_are_refused(
     assert main(["check", "small"]) == 0
 
 
-IDLE = '{% extends "base/base.in.j2" %}{% block end %}{{ super() }}{% endblock %}'
-
-
-@pytest.mark.engine
-def test_a_template_that_changes_nothing_is_refused(
-    case: Case, capsys: pytest.CaptureFixture[str]
-) -> None:
-    file = own_template(case, IDLE, "base.in.j2")
-    assert main(["check", "small"]) == 1
-    assert f"{file}: this template changes no input script" in capsys.readouterr().err
-    assert main(["step", "render", "small", "filling", FILLING.run_id(case)]) == 1
-    assert f"{file}: this template changes no input script" in capsys.readouterr().err
-
-
-def test_a_template_may_change_the_scripts_of_some_runs_only(case: Case, project: Project) -> None:
-    """The block `outputs` of the base is not that of a process, but that of a filling."""
-    text = IDLE.replace("block end", "block outputs").replace(
-        "{% endblock", '{% if deck.scene == "drop_test" %}# mine{% endif %}{% endblock'
-    )
-    own_template(case, text, "base.in.j2")
-    assert main(["step", "render", "small", "filling", FILLING.run_id(case)]) == 0
-
-
 @pytest.mark.engine
 def test_a_contact_law_that_adds_a_force_is_recorded(
     case: Case, project: Project, capsys: pytest.CaptureFixture[str]

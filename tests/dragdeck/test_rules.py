@@ -64,7 +64,7 @@ def test_a_run_of_a_plan_is_named_by_it_unless_the_study_has_it() -> None:
     ours = work("uhlmann2015")
     (run,) = (folder.rpartition("/")[2] for folder in ours.every_folder("process"))
     assert ours.cases_option("process")(SimpleNamespace(study="uhlmann2015", run=run)) == ""
-    point = ours.every_point("tables/quantities.json")[0].split("/")[-3]
+    point = ours.every_point("points", "tables/quantities.json")[0].split("/")[-3]
     named = ours.cases_option("points")(SimpleNamespace(study="uhlmann2015", run=point))
     assert named == "--plan default"
 

@@ -5,7 +5,6 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 DATA = ROOT / "tests" / "data"
 SMALL_STUDY = DATA / "small_study.yaml"
-WINDOWS_RECORD = ROOT / "workflow" / "dragdeck" / "data" / "windows.json"
 SNAKEFILES = (ROOT / "workflow/Snakefile", ROOT / "evidence/Snakefile")
 """The workflow of studies, and that behind the evidence."""
 PROJECT = (

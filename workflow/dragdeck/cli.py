@@ -27,15 +27,16 @@ COMMANDS = (
             "commands:check", (
         STUDY, FIDELITY,
         Argument("--verbose", action="store_true",
-                  help="also print time step, packing and clearances expected for each run")),
+                  help="also print what is expected of each run: time step, packing, clearances, "
+                  "dimensionless numbers")),
             "./run dragdeck check uhlmann2015 --fidelity draft"),
     Command("explain", "explain what the input scripts model",
-            "Explain what the input scripts of a study model, what they leave out, and what both "
-            "cost. It writes nothing.",
+            "Explain what the input scripts of a study model, what they leave out, and what that "
+            "would cost. It writes nothing.",
             "commands:explain", (
         STUDY, FIDELITY,
         Argument("--verbose", action="store_true",
-                  help="print every run, with reasons, costs and expectations"),
+                  help="print every run, with reasons and costs"),
         Argument("scene", nargs="?", metavar="SCENE",
                   help=f"explain one scene only: {SCENE} (default: all three)")),
             "./run dragdeck explain uhlmann2015 process"),
@@ -52,8 +53,8 @@ COMMANDS = (
             "Print the path of results/STUDY/report/report.html and open it if there is a display.",
             "status:open_report", (STUDY,)),
     Command("preview", "draw the set-up of a study",
-            "Draw bowl, packing, workpiece and path of one case, and print its clearances and "
-            "dimensionless numbers. It runs nothing and writes preview.png to results/STUDY.",
+            "Draw bowl, packing, workpiece and path of one case, even one that check refuses. It "
+            "runs nothing and writes preview.png to results/STUDY.",
             "commands:preview", (
         STUDY, FIDELITY,
         Argument("--case", metavar="NAME",

@@ -2,12 +2,9 @@
 
 import os
 import shutil
-import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,10 +21,7 @@ from dragdeck.decks.engine_commands import contact_laws
 from dragdeck.decks.render import (
     changed_scripts,
     deck_text,
-    effective,
-    idle,
     of_its_templates,
-    overriding,
     write_run,
     write_workpiece,
 )
@@ -37,15 +31,9 @@ from dragdeck.engine.reports import say
 from dragdeck.engine.space import check_amount
 from dragdeck.errors import DragdeckError, InputError, choices, together
 from dragdeck.files import write_bytes
-from dragdeck.outlook.explain import expected_cost, explanation, measured_speeds, show
+from dragdeck.outlook.explain import explanation, show
 from dragdeck.outlook.explain import scene_lines as page_of_scene
-from dragdeck.outlook.process import (
-    bed_notes,
-    dimensionless,
-    modulus_note,
-    not_corrected,
-    workpiece_notes,
-)
+from dragdeck.outlook.process import bed_notes, dimensionless, not_corrected, workpiece_notes
 from dragdeck.outlook.runs import expected_runs, plan_in_words, written
 from dragdeck.outlook.timestep import stable_step_cautions, stable_step_note, timestep_notes
 from dragdeck.physics.packing import Bed
@@ -62,7 +50,7 @@ from dragdeck.project import (
 )
 from dragdeck.records.advice import AdviceFile
 from dragdeck.records.run import changed_in_words
-from dragdeck.records.tradeoff import TradeoffRecord, measured_tradeoff, tradeoff_if_measured
+from dragdeck.records.tradeoff import TradeoffRecord, measured_tradeoff
 from dragdeck.scenes.lead import with_leads
 from dragdeck.scenes.process import SCENES
 from dragdeck.scenes.scene import SceneType, StudyScene, read_bed
@@ -113,8 +101,6 @@ def _check(study: str, fidelity: str | None, verbose: bool) -> None:
     ]
     for varied, cases in check_search(every[0].file).items():
         findings.look_at_bounds(f"search.vary.{varied}", cases)
-    if not findings.errors:
-        findings.errors += idle(findings.overriding - findings.effective, findings.templates)
     findings.show(verbose)
     if findings.errors:
         raise together(findings.errors)
@@ -147,11 +133,9 @@ class _Findings:
 
     templates: jinja2.Environment
     errors: list[InputError] = field(default_factory=list)
-    warnings: dict[str, list[str]] = field(default_factory=dict)
-    reduced: dict[str, list[str]] = field(default_factory=dict)
-    notes: dict[str, list[str]] = field(default_factory=dict)
-    overriding: set[str] = field(default_factory=set)
-    effective: set[str] = field(default_factory=set)
+    warnings: dict[str, dict[str, None]] = field(default_factory=dict)
+    reduced: dict[str, dict[str, None]] = field(default_factory=dict)
+    notes: dict[str, dict[str, None]] = field(default_factory=dict)
 
     def look(self, kind: SceneType, runs: Mapping[Path, Case]) -> StudyScene:
         """Build the scene of runs that differ in the seed alone."""
@@ -165,20 +149,16 @@ class _Findings:
         except InputError as error:
             self.errors.append(error)
             raise
-        self.overriding |= overriding(scene, self.templates)
-        self.effective |= effective(scene, self.templates)
-        for text in dict.fromkeys([*map(str, scene.warnings), *_friction_unknown(used_templates)]):
-            names = self.warnings.setdefault(text, [])
-            names += [case.name] if case.name not in names else []
+        for text in (*map(str, scene.warnings), *_friction_unknown(used_templates)):
+            self.warnings.setdefault(text, {})[case.name] = None
         notes = [not_corrected(case) if kind.needs_bed else ""]
         notes.append(changed_in_words(used_templates["changed_scripts"]))
         for text in filter(None, notes):
-            names = self.reduced.setdefault(text, [])
-            names += [case.name] if case.name not in names else []
-        lines = [f"time step: {scene.deck.timestep_s:.3g} s"]
+            self.reduced.setdefault(text, {})[case.name] = None
+        lines = [f"time step: {scene.deck.timestep_s:.3g} s, about {scene.steps:,} steps"]
         lines += [f"{what}: {text}" for what, text in _expectations(case, kind, scene)]
-        names = [f"{kind.name} {folder.name}" for folder in runs]
-        self.notes.setdefault("\n  ".join(lines), []).extend(names)
+        names = dict.fromkeys(f"{kind.name} {folder.name}" for folder in runs)
+        self.notes.setdefault("\n  ".join(lines), {}).update(names)
         return scene
 
     def look_at_bounds(self, name: str, cases: Sequence[Case]) -> None:
@@ -194,7 +174,7 @@ class _Findings:
             return
         for problem in refused:
             text = f"{problem.field}: {problem.problem}; such a setting is not run, but infeasible"
-            self.warnings[text] = ["search"]
+            self.warnings[text] = {"search": None}
 
     def show(self, verbose: bool) -> None:
         """Print the warnings; and what is expected of every run, if that is asked for."""
@@ -239,8 +219,9 @@ def _friction_unknown(changes: Mapping[str, Sequence[str]]) -> list[str]:
     ]
 
 
-def _first(names: Sequence[str]) -> str:
-    return names[0] + (f" and {len(names) - 1} more" if names[1:] else "")
+def _first(names: Iterable[str]) -> str:
+    first, *others = names
+    return first + (f" and {len(others)} more" if others else "")
 
 
 def _built(kind: SceneType, case: Case, bed: Bed | None) -> StudyScene:
@@ -264,25 +245,21 @@ def _built(kind: SceneType, case: Case, bed: Bed | None) -> StudyScene:
 
 
 def explain(study: str, fidelity: str | None, scene: str | None, verbose: bool) -> None:
-    """Show what the input scripts of a study model, leave out and cost."""
+    """Show what the input scripts of a study model and leave out, and what that would cost."""
     project = find_project(Path.cwd())
     every = project.cases(study, fidelity)
     templates = environment(project.templates, study_templates(every[0]))
     for kind in [_scene_type(scene)] if scene else SCENES.values():
-        speeds = measured_speeds(project.results(study) / kind.name)
         cases = list(by_run(every, kind).values())
         for case in cases if verbose else cases[:1]:
             scripted = _as_scripted(_built(kind, case, None), templates)
-            cost = expected_cost(kind, scripted, speeds)
-            if not verbose:
+            if verbose:
+                show([explanation(scripted, measured_tradeoff())])
+            else:
                 width = min(100, shutil.get_terminal_size().columns)
-                reduced_text = not_corrected(case) if kind.needs_bed else ""
-                print(*page_of_scene(scripted, cost, len(cases), width, reduced_text), sep="\n")
-                continue
-            notes = _expectations(case, kind, scripted)
-            show([explanation(scripted, cost, notes, tradeoff_if_measured())])
+                print(*page_of_scene(scripted, len(cases), width), sep="\n")
     if not verbose:
-        print("For every run, with reasons, costs and expectations: --verbose")
+        print("For every run, with reasons and costs: --verbose")
 
 
 def _as_scripted(scene: StudyScene, templates: jinja2.Environment) -> StudyScene:
@@ -301,36 +278,23 @@ def _expectations(case: Case, kind: SceneType, scene: StudyScene) -> list[tuple[
     """What is known of a scene's time step and bed before it is run."""
     notes = timestep_notes(case, kind, scene)
     if kind.needs_bed:
-        notes += [stable_step_note(case), *workpiece_notes(case), modulus_note(case)]
+        notes += [stable_step_note(case), *workpiece_notes(case), *dimensionless(case)]
     return [*notes, *([] if kind.single_particle else bed_notes(case))]
 
 
 def preview(study: str, fidelity: str | None, case: str | None) -> None:
-    """Draw one case of a study and print its clearances, whether `check` refuses it or not."""
+    """Draw one case of a study, also one that `check` refuses."""
     project = find_project(Path.cwd())
     every = project.cases(study, fidelity)
     chosen = _case_named(every, case)
-    warnings, refused = _judged(chosen)
     try:
         scene = layout(chosen)
     except InputError as error:
-        raise together([*refused, located(error)]) from None
-    particles = ("particles", str(chosen.study.particle_count))
-    numbers = [*workpiece_notes(chosen), particles, *dimensionless(chosen)]
-    title = [f"{study}, case {chosen.name}", *(f"{name}: {text}" for name, text in numbers[:2])]
-    if refused:
-        title.append(textwrap.fill(f"REFUSED: {str(together(refused)).splitlines()[0]}"))
+        raise located(error) from None
     file = project.results(study) / "preview.png"
-    file.parent.mkdir(parents=True, exist_ok=True)
-    write_bytes(file, picture(scene, _swept(scene), "\n".join(title), bool(refused)))
+    write_bytes(file, picture(scene, _swept(scene), f"{study}, case {chosen.name}"))
     print(f"{study}: case {chosen.name}" + (f", one of {len(every)} (--case)" if every[1:] else ""))
-    for name, text in numbers:
-        print(f"  {name}: {text}")
-    for warning in warnings:
-        print(f"warning: {warning}")
     print(file)
-    if refused:
-        raise together(refused)
 
 
 def _swept(scene: CaseLayout, share: float = 1.0) -> list["Trimesh"]:
@@ -359,18 +323,6 @@ def _case_named(cases: list[Case], name: str | None) -> Case:
     if name not in named:
         raise InputError("no such case", field="--case", value=name, limit=choices(name, named))
     return named[name]
-
-
-def _judged(case: Case) -> tuple[list[str], list[InputError]]:
-    """Warnings of the scenes of a case, and why those that cannot be built cannot."""
-    warnings: dict[str, None] = {}
-    errors: list[InputError] = []
-    for kind in SCENES.values():
-        try:
-            warnings.update(dict.fromkeys(map(str, _built(kind, case, None).warnings)))
-        except InputError as error:
-            errors.append(error)
-    return list(warnings), errors
 
 
 def new(study: str, base: str) -> None:
@@ -480,7 +432,6 @@ def render(
         _check_processes(case for case in every if kind.run_id(case) == run)
     templates = environment(project.templates, study_templates(case))
     built = _built(kind, case, _bed(kind, packing))
-    _check_overrides(built, every, templates)
     changes = of_its_templates(deck_text(built, templates), built, templates)
     _check_tolerance(case, changes["changed_law"])
     for warning in (*built.warnings, *_friction_unknown(changes)):
@@ -505,22 +456,6 @@ def _check_processes(cases: Iterable[Case]) -> None:
             return
     if errors:
         raise together(errors)
-
-
-def _check_overrides(
-    built: StudyScene, every: Sequence[Case], templates: jinja2.Environment
-) -> None:
-    """Refuse a template that changes neither this script nor any other of the cases."""
-    left = overriding(built, templates)
-    if left:
-        left -= effective(built, templates)
-    for case, kind in product(every, SCENES.values()):
-        if not left:
-            return
-        with suppress(InputError):  # that of another run
-            left -= effective(kind.build(case, None), templates)
-    if left:
-        raise together(idle(left, templates))
 
 
 def _bed(kind: SceneType, packing: Path | None) -> Bed | None:

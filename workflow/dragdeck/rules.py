@@ -260,26 +260,10 @@ class Workflow:
         """The tables of every run of the study's cases."""
         return self.every(place, *(f"tables/{name}" for name in PLACES[place].tables))
 
-    def every_point(self, file: str, plan: str = "") -> list[str]:
-        """One file of every process run of a plan, that of the trade-off if no other is named."""
-        runs = self.points_by_run("process", plan or self.plan)
-        return [f"{run_path(self.study, POINTS, run)}/{file}" for run in runs]
-
-    def every_drop_point(self, file: str) -> list[str]:
-        """One file of every drop test of the trade-off."""
-        runs = self.points_by_run("drop_test", self.plan)
-        return [f"{run_path(self.study, 'drop_test', run)}/{file}" for run in runs]
-
-    def every_packing(self, file: str) -> list[str]:
-        """One file of every run of the validation that differs from its first by the seed alone."""
-        runs = self.points_by_run("process", self.validation)
-        first = next(iter(runs.values())).study
-        alike = [
-            run
-            for run, case in runs.items()
-            if case.study.model_copy(update={"seed": first.seed}) == first
-        ]
-        return [f"{run_path(self.study, POINTS, run)}/{file}" for run in alike]
+    def every_point(self, place: str, file: str, plan: str = "") -> list[str]:
+        """One file of every run of a plan, that of the trade-off if no other is named."""
+        runs = self.points_by_run(PLACES[place].name, plan or self.plan)
+        return [f"{run_path(self.study, place, run)}/{file}" for run in runs]
 
     def relative(self, file: Path) -> str:
         """Path from the project, where the workflow runs; other paths stay as they are."""

@@ -208,30 +208,21 @@ rule extrapolate_process:
         "dragchain step extrapolate $(dirname $(dirname {output})) {params.windows} > {log} 2>&1"
 
 
-for PLACE, SCENE in {**SCENES, POINTS: SCENES["process"]}.items():
-    if SCENE.loading:
-
-        # Load, sliding and friction work on the workpiece, facet by facet.
-        rule:
-            name:
-                f"map_loading_of_{PLACE}"
-            input:
-                (
-                    of_run(PLACE, "tables/quantities.json")
-                    if PLACE == POINTS
-                    else tables_of(PLACE, SCENE.tables)
-                ),
-                record=of_run(PLACE, RECORD[PLACE]),
-            output:
-                tables_of(PLACE, SCENE.loading),
-                shown(
-                    of_run(PLACE, "figures/workpiece.png"),
-                    "workpiece",
-                    PLACE.capitalize(),
-                    "workpiece",
-                    run="{run}",
-                ),
-            params:
-                source=source_hash("dragchain.loading.summary", "dragchain.loading.figure"),
-            shell:
-                "dragchain loading $(dirname {input.record}) > {log} 2>&1"
+# Load, sliding and friction work on the workpiece, facet by facet.
+rule map_loading_of_process:
+    input:
+        tables_of("process", SCENES["process"].tables),
+        record=of_run("process", "run.json"),
+    output:
+        tables_of("process", SCENES["process"].loading),
+        shown(
+            of_run("process", "figures/workpiece.png"),
+            "workpiece",
+            "Process",
+            "workpiece",
+            run="{run}",
+        ),
+    params:
+        source=source_hash("dragchain.loading.summary", "dragchain.loading.figure"),
+    shell:
+        "dragchain loading $(dirname {input.record}) > {log} 2>&1"

@@ -24,7 +24,9 @@ from dragchain.figures.style import (
     top_of_scale,
 )
 from dragchain.scaling.fit import draw_scalings, read_scalings
+from dragchain.statistics.estimate import Estimate
 from evidence.stability.report import draw_regime
+from evidence.validation.report import draw_drags, effect_bar
 
 
 def _panels(width: float, height: float, count: int = 1, **options: bool) -> tuple[Figure, Any]:
@@ -214,36 +216,15 @@ def _draw_tradeoff(tolerance: float = 0.1) -> Figure:
 
 def _draw_validation() -> Figure:
     """Mean drag by packing, setting and changed input, beside measured and published values."""
-    effects = chosen("validation/effects", "quantity == 'drag_mean'")
-    mean, low, high = record_table("validation/force").iloc[0][["mean_value", *_ENDS]]
-    rows = [("all packings, physical E", mean, low, high, COLOURS["drag"])]
+    means = record_table("validation/force").set_index("name").loc["drag_n"]
+    drag = Estimate(*means[["mean_value", "mean_ci95_low", "mean_ci95_high"]])
+    bars = [("all packings, physical E", drag, COLOURS["drag"])]
     for row in record_table("validation/packings").itertuples():
-        ends = row.drag_n_ci95_low, row.drag_n_ci95_high
-        rows.append((f"packing {row.seed}", row.drag_n_mean, *ends, COLOURS["drag"]))
-    for row in effects.itertuples():
-        step = f"{100 * row.timestep_fraction:.0f} %"
-        name, colour = f"E \u00d7 {row.youngs_modulus_scale:g}, {step}", ORANGE
-        if isinstance(row.field, str):
-            words = row.field.removeprefix("motion.").replace(".shape", "").replace("_m", "")
-            name, colour = f"{words.replace('.', ' ')} {1e3 * row.value:g} mm", GREY
-        values = [mean * (1 + x) for x in (row.change, row.ci95_high, row.ci95_low)]
-        rows.append((name, *values, colour))
-    figure, axes = _panels(7.6, 0.26 * len(rows) + 1.1)
-    compared = record_table("validation/comparison").set_index("label")["mean_n"]
-    for label, style in (("experiment", "--"), ("simulation", ":")):
-        source = f"Uhlmann et al. (2015), {label}"
-        axes.axvline(compared[label], color=COLOURS[label], ls=style, label=source)
-    for place, (_, value, low, high, colour) in enumerate(rows):
-        sides = [[value - low], [high - value]]
-        axes.errorbar(value, -place, xerr=sides, fmt="o", color=colour, capsize=2)
-    axes.set_yticks([-place for place in range(len(rows))], [row[0] for row in rows])
-    axes.set_xlabel("mean drag force (N), 95 % CI")
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2)
-    axes.grid(axis="y", visible=False)
-    return figure
-
-
-_ENDS = ("mean_ci95_low", "mean_ci95_high")
+        packing = Estimate(row.drag_n_mean, row.drag_n_ci95_low, row.drag_n_ci95_high)
+        bars.append((f"packing {row.seed}", packing, BLUE))
+    effects = chosen("validation/effects", "quantity == 'drag_mean'").fillna({"field": ""})
+    bars += [effect_bar(drag.value, effect) for effect in effects.itertuples()]
+    return draw_drags(bars, record_table("validation/comparison").set_index("label")["mean_n"])
 
 
 def _draw_verification(smallest: float = 1e-12) -> Figure:

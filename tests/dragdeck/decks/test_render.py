@@ -17,7 +17,6 @@ from dragdeck.decks.templates import commands_digest, environment
 from dragdeck.errors import InputError
 from dragdeck.project import Project, study_templates
 from dragdeck.scenes.process import PROCESS, SCENES, process_scene
-from dragdeck.study.contact_law import Pair
 
 GOLDEN = ROOT / "tests/golden"
 
@@ -158,37 +157,6 @@ def test_contacts_are_written_after_all_that_reads_stored_forces(
     deck = deck_text(turned, environment(project.templates))
     dumps = [line.split()[3] for line in deck.splitlines() if line.startswith("dump ")]
     assert dumps == ["custom", "custom", "local", "local"]
-
-
-def commands(text: str) -> list[str]:
-    return [line for line in text.splitlines() if line and not line.startswith("#")]
-
-
-def with_three_materials(small: dict[str, Any]) -> None:
-    small["materials"]["rubber"] = {**small["materials"]["steel"], "youngs_modulus_pa": 7e9}
-    small["bowl"]["material"] = "rubber"
-    small["pairs"]["ceramic-rubber"] = {"restitution": 0.6, "friction": 0.4}
-
-
-@pytest.mark.parametrize("pair", ["ceramic-ceramic", "ceramic-steel", "ceramic-rubber"])
-@pytest.mark.parametrize("field", Pair.model_fields)
-def test_a_script_changes_with_a_coefficient_if_its_name_does(
-    small: dict[str, Any], project: Project, pair: str, field: str, made: Made
-) -> None:
-    with_three_materials(small)
-    if field == "rolling_damping":
-        small["contact"] = {"rolling_model": "epsd"}
-    before, after = made(), made({f"pairs.{pair}.{field}": 0.123})
-    for name, scene in SCENES.items():
-        body, changed = (
-            [
-                line
-                for line in commands(render(case, project, name))
-                if not line.startswith("variable from")
-            ]
-            for case in (before, after)
-        )
-        assert (body != changed) == (scene.run_id(before) != scene.run_id(after))
 
 
 def test_a_study_may_change_one_block(case: Case, project: Project) -> None:

@@ -1,16 +1,13 @@
 """What a template may do, and what a value may bring into an input script."""
 
 import re
-import signal
-from dataclasses import replace
 
 import pytest
 from made_scenes import BED, own_template, script
 from made_study import Made
-from markupsafe import Markup
 
 from dragdeck.cases.case import Case
-from dragdeck.decks.render import deck_text, effective, idle, overriding
+from dragdeck.decks.render import deck_text
 from dragdeck.decks.templates import comment, environment, quoted, template_files
 from dragdeck.errors import InputError
 from dragdeck.project import Project
@@ -102,26 +99,6 @@ def test_a_template_that_cannot_be_is_refused_and_named(
     assert name in str(caught.value.file)
 
 
-def test_a_template_without_end_is_stopped(case: Case, project: Project) -> None:
-    """Loops within loops: the timer goes off early, so that nobody waits."""
-    loops = "{% for i in range(99999) %}" * 3 + "{% endfor %}" * 3
-    own_template(case, in_block("{{ deck.title }}" + loops))
-    templates = environment(project.templates, case.file.parent / "templates")
-    scene = process_scene(case, BED)
-    scene = replace(scene, deck=replace(scene.deck, title=_Alarm("slow")))
-    with pytest.raises(InputError, match="takes longer than"):
-        deck_text(scene, templates)
-    assert signal.getitimer(signal.ITIMER_VIRTUAL)[0] == 0
-
-
-class _Alarm(Markup):
-    """A text that leaves a moment only once it is inserted."""
-
-    def __html__(self) -> str:
-        signal.setitimer(signal.ITIMER_VIRTUAL, 0.05)
-        return ""
-
-
 def test_a_new_block_within_a_known_one_is_fine(case: Case, project: Project) -> None:
     own_template(case, in_block("{% block mine %}# mine{% endblock %}"))
     assert "# mine" in render(case, project)
@@ -176,18 +153,6 @@ def test_what_a_template_defines_for_its_blocks_is_no_text(case: Case, project: 
     text = "{% set rate %}5{% endset %}\n{% macro mine() %}# {{ rate }}{% endmacro %}\n"
     own_template(case, in_block("{{ mine() }}").replace("\n{% block", f"\n{text}{{% block", 1))
     assert "# 5" in render(case, project)
-
-
-def test_a_template_that_changes_nothing_has_no_effect(case: Case, project: Project) -> None:
-    file = own_template(
-        case, "{% extends 'base/base.in.j2' %}{% block run %}# never{% endblock %}", "base.in.j2"
-    )
-    own_template(case, in_block("# mine"))
-    templates, scene = environment(project.templates, file.parent), process_scene(case, BED)
-    assert overriding(scene, templates) == {"base.in.j2", "process.in.j2"}
-    assert effective(scene, templates) == {"process.in.j2"}
-    (error,) = idle({"base.in.j2"}, templates)
-    assert error.file == file and "changes no input script" in str(error)
 
 
 def test_output_of_a_template_is_its_own(case: Case, project: Project) -> None:

@@ -10,7 +10,7 @@ from made_tradeoff import cost as priced
 from made_tradeoff import made_tradeoff
 
 from dragdeck.cases.case import Case
-from dragdeck.outlook.explain import Cost, expected_cost, explanation, measured_speeds, price_of
+from dragdeck.outlook.explain import expected_cost, explanation, measured_speeds, price_of
 from dragdeck.scenes.filling import FILLING, filling_scene
 from dragdeck.scenes.process import PROCESS, process_scene
 
@@ -52,7 +52,6 @@ def test_a_price_is_quoted_with_engine_and_date() -> None:
     assert price_of("bowl_facets", tradeoff) == said
     assert price_of("bowl_fine", tradeoff).startswith("enabling it costs 1.9x, LIGGGHTS")
     assert "not measured" in price_of("two_ranks", tradeoff)
-    assert "not measured" in price_of("bowl_facets", None)
 
 
 @pytest.mark.parametrize(
@@ -67,7 +66,7 @@ def test_explain_names_what_is_surely_cheaper(
     low = None if high is None else 0.85
     wide = priced("wide facets", 0.9, scene=scene, unit=unit, ci95_low=low, ci95_high=high)
     tradeoff = made_tradeoff(costs=[wide])
-    table = explanation(process_scene(case), Cost(1, 1.0, ""), (), tradeoff)
+    table = explanation(process_scene(case), tradeoff)
     assert ("wide facets" in list(table.columns[1].cells)) == shown
     assert any("not measured" in str(cell) for cell in table.columns[2].cells)
 

@@ -1,7 +1,6 @@
 """A compound carries a part of the particles' weight, and of nothing else."""
 
 import math
-import subprocess
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -13,11 +12,10 @@ import pytest
 from dragchain.run.run_parts import iter_frames
 from dragdeck.cases.bed import expected_surface, tip_pressure
 from dragdeck.cases.case import Case
-from dragdeck.decks.deck import Body, Liquid, data_file
+from dragdeck.decks.deck import Liquid
 from dragdeck.decks.outputs import load_outputs
 from dragdeck.decks.render import deck_text, write_run
 from dragdeck.decks.templates import environment
-from dragdeck.engine.process import find_engine
 from dragdeck.engine.run_folder import run
 from dragdeck.errors import InputError
 from dragdeck.mesh.shapes import cylinder
@@ -161,55 +159,3 @@ def test_the_report_states_the_missing_buoyancy(made: Made) -> None:
     assert told.field == "compound"
     assert f"{expected:+.3g} N" in told.why
     assert not process_scene(made({"compound": None}), bed).case.assumptions
-
-
-BRIDGES = """units si
-atom_style granular
-atom_modify map array
-boundary f f f
-newton off
-communicate single vel yes
-read_data bodies.data
-neighbor 0.001 bin
-fix a all property/global youngsModulus peratomtype 1e8 1e8
-fix b all property/global poissonsRatio peratomtype 0.2 0.2
-fix c all property/global coefficientRestitution peratomtypepair 2 0.5 0.5 0.5 0.5
-fix d all property/global coefficientFriction peratomtypepair 2 0.1 0.1 0.1 0.1
-fix e all property/global surfaceLiquidContentInitial scalar 0.01
-fix f all property/global surfaceTension scalar 0.072
-fix g all property/global fluidViscosity scalar 0.001
-fix h all property/global contactAngle peratomtype 0 0
-fix i all property/global minSeparationDistanceRatio scalar 0.01
-fix j all property/global maxSeparationDistanceRatio scalar 1.1
-pair_style gran model hertz tangential history cohesion washino/capillary/viscous
-pair_coeff * *
-timestep 1e-6
-fix floor all wall/gran model hertz tangential history cohesion washino/capillary/viscous &
-primitive type 2 zplane 0.0 store_force yes
-fix integrate all nve/sphere
-run 0
-dump bodies all custom 1 forces.txt id f_force_floor[3] fx fz
-dump_modify bodies sort id
-run 0
-"""
-
-
-@pytest.mark.engine
-def test_why_there_are_no_liquid_bridges(tmp_path: Path) -> None:
-    """A wall does not attract what touches it, but what it does not touch; slip has no limit."""
-    radius = 0.003
-    bodies = [
-        Body(1, radius, 2500.0, (0.05, 0, radius - 1e-10)),
-        Body(1, radius, 2500.0, (-0.05, 0, radius + 1e-4)),
-        Body(1, radius, 2500.0, (0, 0, 0.05)),
-        Body(1, radius, 2500.0, (2 * radius - 1e-7, 0, 0.05), (0, 0, 1)),
-    ]
-    box = ((-0.1, 0.1), (-0.1, 0.1), (-0.003, 0.1))
-    (tmp_path / "bodies.data").write_text(data_file("bridges", 2, box, bodies))
-    (tmp_path / "in.liggghts").write_text(BRIDGES)
-    call = [find_engine().path, "-in", "in.liggghts", "-screen", "none"]
-    subprocess.run(call, cwd=tmp_path, check=True, stdout=subprocess.DEVNULL)
-    touching, beside, slipping, _ = np.loadtxt(tmp_path / "forces.txt", skiprows=9)
-    assert touching[1] >= 0.0
-    assert beside[1] < -1e-4
-    assert abs(slipping[3]) > 100 * abs(slipping[2])

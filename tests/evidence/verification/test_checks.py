@@ -89,7 +89,7 @@ def test_the_energy_of_flight_counts_the_impacts_before() -> None:
         ("spin_pair", "tangential_m_s", -2.0),
     ],
 )
-def test_a_quantity_is_drawn_against_what_the_paper_has(
+def test_a_quantity_is_a_function_of_what_the_paper_has(
     test: str, quantity: str, expected: float
 ) -> None:
     """A particle of radius 1 m that comes down at 0.2 m/s and spins at -2 rad/s."""

@@ -2,7 +2,6 @@
 
 import hashlib
 import re
-from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -117,29 +116,6 @@ def _check_outputs(scene: AnyScene, text: str, original: str, file: Path) -> Non
 def overriding(scene: AnyScene, templates: jinja2.Environment) -> set[str]:
     """Names of the project's templates in whose place a scene uses a study's own."""
     return {name for name in _used(scene, templates) if replaced(templates, name)}
-
-
-def effective(scene: AnyScene, templates: jinja2.Environment) -> set[str]:
-    """Those of `overriding` without which the deck of the scene would be another one."""
-    whole, names = _rendered(scene, templates), set()
-    for name in overriding(scene, templates):
-        try:
-            changed = _rendered(scene, without(templates, name)) != whole
-        except InputError:  # the others need it
-            changed = True
-        names |= {name} if changed else set()
-    return names
-
-
-def idle(names: Iterable[str], templates: jinja2.Environment) -> Iterator[InputError]:
-    """Why templates of a study that change no deck of it are refused."""
-    for name in sorted(names):
-        yield InputError(
-            "this template changes no input script of the study",
-            file=file_of(templates, name),
-            remedy=f"override a block that the input scripts contain (docs/reference/templates.md "
-            f"lists the blocks of {name}), or remove the file",
-        )
 
 
 def _added_forces(text: str) -> list[str]:

@@ -1,14 +1,12 @@
 """The templates of input scripts: what they may use, and whether a study's own fit the project's.
 
-A template is data: it runs in Jinja's sandbox for a limited time, and each value that it
-inserts passes `quoted`.
+A template is data: it runs in Jinja's sandbox, and each value that it inserts passes `quoted`.
 """
 
 import contextlib
 import hashlib
 import math
 import re
-import signal
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import lru_cache
@@ -37,17 +35,12 @@ _SHIPPED = Path(__file__).parents[1] / "data" / "templates.csv"
 _BASE = "base"
 """Prefix of the project's own templates, which a study's may replace."""
 
-_MOST_SECONDS = 3.0
-"""Limit of the CPU time of rendering a script, far above its need, s."""
-
-
 _FAILURES: Mapping[type[BaseException], tuple[str, str]] = {
     RecursionError: (
         "the template extends or calls itself endlessly",
         'extend "base/<name>" instead',
     ),
     MemoryError: ("the template requires more memory than there is", "make it smaller"),
-    TimeoutError: (f"the template takes longer than {_MOST_SECONDS:g} s", "make it smaller"),
     SecurityError: (
         "is not allowed: ",
         "docs/reference/templates.md lists what a template may use",
@@ -161,7 +154,7 @@ def _inserted(context: Context, value: object) -> Markup:
 
 @contextlib.contextmanager
 def template_errors(template: Path | str) -> Iterator[None]:
-    """Limit the time of templates, and turn what they raise into an error with file and line.
+    """Turn what templates raise into an error with file and line.
 
     Parameters
     ----------
@@ -174,8 +167,7 @@ def template_errors(template: Path | str) -> Iterator[None]:
         Whatever went wrong in the template.
     """
     try:
-        with _timed():
-            yield
+        yield
     except InputError:
         raise
     except Exception as error:
@@ -196,22 +188,6 @@ def _place(error: Exception, template: Path | str) -> tuple[Path | str, str | No
         if frame.f_code.co_filename.endswith(".j2"):
             place = (frame.f_code.co_filename, f"line {line}")
     return place
-
-
-@contextlib.contextmanager
-def _timed() -> Iterator[None]:
-    """Let no template run for ever: rendering would end without a word."""
-
-    def stop(number: int, frame: object) -> None:
-        raise TimeoutError
-
-    before = signal.signal(signal.SIGVTALRM, stop)
-    try:
-        signal.setitimer(signal.ITIMER_VIRTUAL, _MOST_SECONDS, 1.0)
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_VIRTUAL, 0)
-        signal.signal(signal.SIGVTALRM, before)
 
 
 _REFERENCES = (nodes.Extends, nodes.FromImport, nodes.Import, nodes.Include)

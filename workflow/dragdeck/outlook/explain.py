@@ -10,7 +10,6 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from dragdeck.engine.reports import shown_time
 from dragdeck.records.tradeoff import CostEntry, TradeoffRecord
 from dragdeck.scenes.scene import SceneType, StudyScene
 from dragdeck.scenes.workpiece import FACET_STEP_S
@@ -64,19 +63,19 @@ def measured_speeds(results: Path) -> list[tuple[int, float]]:
     return speeds
 
 
-def price_of(name: str, tradeoff: TradeoffRecord | None) -> str:
+def price_of(name: str, tradeoff: TradeoffRecord) -> str:
     """What putting a thing back costs, as measured.
 
     Parameters
     ----------
     name : str
         Name of an entry of the record.
-    tradeoff : TradeoffRecord or None
+    tradeoff : TradeoffRecord
         Its costs give for each variant the ratio of processor times, with a
         95 % interval if there were rounds enough for one.
     """
-    cost = tradeoff.cost(name) if tradeoff else None
-    if tradeoff is None or cost is None:
+    cost = tradeoff.cost(name)
+    if cost is None:
         return "cost of enabling it: not measured"
     return f"enabling it costs {_ratio(cost, tradeoff)}"
 
@@ -98,58 +97,28 @@ def _ratio(cost: CostEntry, tradeoff: TradeoffRecord) -> str:
     return f"{cost.ratio:.3g}x{interval}, LIGGGHTS {engine}, {date}"
 
 
-def scene_lines(
-    scene: StudyScene, cost: Cost, runs: int, width: int, reduced: str = ""
-) -> Iterator[str]:
+def scene_lines(scene: StudyScene, runs: int, width: int) -> Iterator[str]:
     """The lines of one scene on a page that fits a terminal: names without reasons and prices.
 
     Parameters
     ----------
     scene : Scene
         Of the first of its runs.
-    cost : Cost
     runs : int
         How many there are.
     width : int
         Of the page, characters.
-    reduced : str
-        What a reduced modulus means for the results.
     """
-    step = scene.deck.timestep_s
-    rayleigh = f"{100 * step / scene.case.rayleigh_time_s:.3g} % of Rayleigh"
-    each = f"{cost.steps:,} steps of {step:.3g} s ({rayleigh}), {shown_time(cost.wall_time_s)}"
     yield f"{scene.deck.scene} {scene.deck.run}" + (f" and {runs - 1} more" if runs > 1 else "")
-    rows: list[tuple[str, Iterable[str]]] = [
-        ("costs", [f"about {each} (speed {cost.basis})"]),
-        ("models", scene.models),
-    ]
-    rows += [
-        ("leaves out", scene.leaves_out),
-        ("warning", [str(warning) for warning in scene.warnings]),
-    ]
-    rows.append(("modulus", [reduced] if reduced else []))
-    for name, texts in rows:
-        if joined := "; ".join(texts):
-            yield from textwrap.wrap(
-                joined, width, initial_indent=f"  {name:<11}", subsequent_indent=13 * " ",
-                max_lines=2, placeholder=" ...",
-            )  # fmt: skip
+    for name, texts in (("models", scene.models), ("leaves out", scene.leaves_out)):
+        yield from textwrap.wrap(
+            "; ".join(texts), width, initial_indent=f"  {name:<11}", subsequent_indent=13 * " ",
+            max_lines=2, placeholder=" ...",
+        )  # fmt: skip
 
 
-def explanation(
-    scene: StudyScene, cost: Cost, notes: Iterable[tuple[str, str]], tradeoff: TradeoffRecord | None
-) -> Table:
-    """The table of one scene.
-
-    Parameters
-    ----------
-    scene : Scene
-    cost : Cost
-    notes : iterable of (str, str)
-        What its time step means for each pair of bodies.
-    tradeoff : TradeoffRecord or None
-        Measured costs, if there are any.
-    """
+def explanation(scene: StudyScene, tradeoff: TradeoffRecord) -> Table:
+    """The table of one scene, with measured costs of what it leaves out."""
     deck = scene.deck
     table = Table(title=f"{deck.study}: {deck.scene} {deck.run}", title_justify="left")
     table.add_column("")
@@ -162,21 +131,8 @@ def explanation(
         price = f"; {price_of(left.cost, tradeoff)}" if left.cost else ""
         table.add_row("leaves out", what, f"{left.why}{price}")
     table.add_section()
-    rayleigh = scene.case.rayleigh_time_s
-    fraction = deck.timestep_s / rayleigh
-    table.add_row(
-        "costs", "time step", f"{deck.timestep_s:.3g} s, {100 * fraction:.3g} % of Rayleigh"
-    )
-    table.add_row("", "steps", f"about {cost.steps:,}")
-    table.add_row("", "wall time", f"about {shown_time(cost.wall_time_s)} ({cost.source})")
-    for what, text in _cheaper_choices(deck.scene, tradeoff) if tradeoff else ():
+    for what, text in _cheaper_choices(deck.scene, tradeoff):
         table.add_row("cheaper", what, text)
-    table.add_section()
-    for what, text in notes:
-        table.add_row("expects", what, text)
-    for warning in scene.warnings:
-        table.add_section()
-        table.add_row("warning", str(warning), "", style="yellow")
     return table
 
 

@@ -20,7 +20,7 @@ _RATIOS = {
 
 
 def workpiece_notes(case: Case) -> list[tuple[str, str]]:
-    """What ``check``, ``explain`` and ``preview`` say of a process: a heading and a text each."""
+    """What ``check`` says of a process: a heading and a text each."""
     bed = expected_bed(case.study)
     gaps = clearances(case, bed.surface_m)
     return [
@@ -68,7 +68,7 @@ def _speed(case: Case) -> str:
 
 
 def bed_notes(case: Case) -> list[tuple[str, str]]:
-    """What ``check`` and ``explain`` say of a fill and a process: a heading and a text each."""
+    """What ``check`` says of a fill and a process: a heading and a text each."""
     return [("overlap", _overlap(case)), ("ranks", _ranks(case))]
 
 
@@ -99,10 +99,3 @@ def not_corrected(case: Case) -> str:
         "physical modulus, by amounts that differ from scene to scene, and the report does not "
         "correct them: fidelity: {tolerance: 0.1} measures them in this scene"
     )
-
-
-def modulus_note(case: Case) -> tuple[str, str]:
-    """What ``check`` and ``explain`` say of a process: a heading and a text."""
-    windows = case.study.chosen_fidelity().windows
-    measured = "windows at the physical modulus correct the results" if windows else "physical"
-    return "Young's modulus", not_corrected(case) or measured

@@ -159,7 +159,7 @@ def largest_of_case(case: Case, kind: SceneType) -> float:
 
 
 def timestep_notes(case: Case, kind: SceneType, scene: StudyScene) -> list[tuple[str, str]]:
-    """What ``check`` and ``explain`` say of a scene's time step: a heading and a text each."""
+    """What ``check`` says of a scene's time step: a heading and a text each."""
     step = scene.deck.timestep_s
     pairs = [(pair.bodies, str(pair)) for pair in outlook(case, kind, step)]
     fraction, source = safe_fraction(case, kind)
@@ -223,7 +223,7 @@ def stable_step_cautions(case: Case, surely: bool = False) -> Iterator[Caution]:
 
 
 def stable_step_note(case: Case) -> tuple[str, str]:
-    """What ``check`` and ``explain`` say of it: a heading and a text."""
+    """What ``check`` says of it: a heading and a text."""
     fraction, limit = case.study.chosen_fidelity().timestep_fraction, stable_fraction(case)
     verdict = "below" if fraction < limit else "NOT BELOW"
     runs = stable_step_law().runs

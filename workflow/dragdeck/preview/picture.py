@@ -32,13 +32,12 @@ class _Layer(NamedTuple):
     opacity: float
 
 
-def picture(layout: CaseLayout, swept: Sequence["Trimesh"], title: str, refused: bool) -> bytes:
+def picture(layout: CaseLayout, swept: Sequence["Trimesh"], title: str) -> bytes:
     """Draw a layout and the volumes that its workpieces sweep, as PNG; the title is plain text."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11, 10), dpi=110, layout="constrained")
-    colour = COLOURS["refused" if refused else "ink"]
-    figure.suptitle(title, fontsize=12, color=colour, parse_math=False)
+    figure.suptitle(title, fontsize=12, color=COLOURS["ink"], parse_math=False)
     layers = list(_layers(layout, swept))
     for axes, view in zip(figure.subplots(2, 2).flat, _views(layout), strict=True):
         _draw(axes, view, layout, layers)

@@ -12,7 +12,6 @@ from typing import Annotated, Literal
 from pydantic import BeforeValidator, PlainSerializer
 
 from dragdeck.documents import Document, Part
-from dragdeck.errors import DocumentError
 from dragdeck.study.model import Fidelity
 
 _FILE = Path(str(resources.files("dragdeck"))) / "data" / "tradeoff.json"
@@ -192,14 +191,3 @@ def measured_tradeoff(file: Path = _FILE) -> TradeoffRecord:
         It has not been measured, or another version of dragdeck wrote it.
     """
     return TradeoffRecord.read(file)
-
-
-def tradeoff_if_measured(file: Path = _FILE) -> TradeoffRecord | None:
-    """`measured_tradeoff`, or None where it cannot be read.
-
-    For what is only told, not chosen.
-    """
-    try:
-        return measured_tradeoff(file)
-    except DocumentError:
-        return None
