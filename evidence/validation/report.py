@@ -290,9 +290,17 @@ def effect_bar(drag_n: float, effect: Any) -> Bar:
     change = Estimate(effect.change, effect.ci95_low, effect.ci95_high)
     drag = change.mapped(lambda by: drag_n * (1 + by))
     if effect.field:
-        return f"{effect.field} {effect.value}", drag, GREY
+        return _changed_input(effect.field, effect.value), drag, GREY
     step = f"{100 * effect.timestep_fraction:g} %"
     return f"E \u00d7 {effect.youngs_modulus_scale:g}, {step}", drag, ORANGE
+
+
+def _changed_input(field: str, value: str) -> str:
+    """An input as words: ``workpiece radius 4 mm`` of ``workpiece.shape.radius_m`` 0.004."""
+    if not field.endswith("_m") or "," in field:
+        return f"{field} {value}"
+    words = field.removeprefix("motion.").removesuffix("_m").replace(".shape.", " ")
+    return f"{words.replace('.', ' ').replace('_', ' ')} {1e3 * float(value):g} mm"
 
 
 def draw_drags(bars: Sequence[Bar], published: Mapping[str, float]) -> Figure:
