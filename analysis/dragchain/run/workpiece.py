@@ -110,7 +110,17 @@ def _corners(file: Path) -> Floats:
 
 
 def off_facet(point_m: Floats, corners: Floats) -> Floats:
-    """The distance of (N, 3) points from (N, 3, 3) triangles, (N,) in m."""
-    from trimesh.triangles import closest_point
+    """The distance of (N, 3) points from (N, 3, 3) triangles, (N,) in m.
 
-    return np.asarray(np.linalg.norm(point_m - closest_point(corners, point_m), axis=1))
+    That of trimesh is wrong for narrow triangles of the size of facets in m.
+    """
+    edges = np.roll(corners, -1, axis=1) - corners
+    away = point_m[:, None] - corners
+    normal = np.cross(edges[:, 0], edges[:, 1])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    inside = (np.einsum("ijk,ijk->ij", np.cross(edges, away), normal[:, None]) >= 0).all(axis=1)
+    along = np.einsum("ijk,ijk->ij", away, edges) / np.einsum("ijk,ijk->ij", edges, edges)
+    nearest = corners + np.clip(along, 0.0, 1.0)[..., None] * edges
+    from_edges = np.linalg.norm(point_m[:, None] - nearest, axis=2).min(axis=1)
+    from_plane = np.abs(np.einsum("ij,ij->i", away[:, 0], normal))
+    return np.asarray(np.where(inside, from_plane, from_edges))

@@ -295,6 +295,23 @@ def test_a_point_off_a_triangle_by_hand() -> None:
     np.testing.assert_allclose(off, [0.5, 5.0, np.sqrt(0.5), 0.0])
 
 
+def test_points_of_narrow_facets_lie_on_them() -> None:
+    """Facets of a blade are a hundred times as long as wide, and some 10 um across."""
+    chance = np.random.default_rng(2)
+    first, length = chance.uniform(0, 0.03, (500, 3)), chance.uniform(2e-4, 3e-3, 500)
+    ways = chance.normal(size=(2, 500, 3))
+    along, aside = ways / np.linalg.norm(ways, axis=2, keepdims=True)
+    corners = np.stack(
+        [first, first + length[:, None] * along, first + length[:, None] * along + 1e-5 * aside], 1
+    )
+    weights = chance.dirichlet([1, 1, 1], 500)
+    points = (weights[:, :, None] * corners).sum(axis=1)
+    assert off_facet(points, corners).max() < 1e-12
+    normals = np.cross(corners[:, 1] - first, corners[:, 2] - first)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    np.testing.assert_allclose(off_facet(points + 1e-5 * normals, corners), 1e-5, rtol=1e-6)
+
+
 # --- the workpiece's motion -----------------------------------------------------------------------
 
 
