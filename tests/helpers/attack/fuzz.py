@@ -178,10 +178,16 @@ def _try_table(folder: Path, content: bytes) -> None:
         return
     if not known or b'"' in content:  # its callers ask for the names; quotes are left to csv
         return
-    text = content.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
-    lines = [line for line in text.split("\n") if line.strip() and line.lstrip()[0] != "#"]
+    text = content.decode("utf-8-sig", "replace").replace("\r\n", "\n").replace("\r", "\n")
+    lines = text.split("\n")[table.header_line - 1 :]
+    lines = [line for line in lines if line.strip() and line.lstrip()[0] != "#"]
     mark = next((mark for mark in ";\t" if mark in lines[0]), ",")
-    head, *rows = [[cell.strip() for cell in line.split(mark)] for line in lines]
+    _, *rows = [[cell.strip() for cell in line.split(mark)] for line in lines]
+    head = [*table.names]
+    if len(rows) > len(table.rows):  # units below the names
+        del rows[0]
+    if mark != table.separator:  # decimal commas between commas
+        rows = [[f"{a}.{b}" for a, b in zip(row[::2], row[1::2], strict=True)] for row in rows]
     assert all(len(row) == len(head) for row in rows), "an uneven row was taken"
     for name, values in zip(names, found, strict=True):
         wanted = [float(row[head.index(name)].replace(",", ".")) for row in rows]

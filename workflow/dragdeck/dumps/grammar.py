@@ -57,36 +57,59 @@ def frame_steps(at: Cursor) -> Iterator[int]:
         yield step
 
 
+def frame_cells(at: Cursor) -> tuple[int, Cells]:
+    """Step and numbers of the frame that begins at a place, its columns in the layout's order.
+
+    Raises
+    ------
+    WrongRow
+        At the first row of a text that is not so many numbers.
+    DumpError
+        The frame is not whole, or not one of this output.
+    """
+    if not at.layout.binary:
+        step, text, names = _text_frame(at)
+        return step, _ordered(at, cells_of_text(text, at.width), names)
+    step, rows, ranks = _binary_head(at)
+    counts = _counts(at, rows, ranks)
+    data = b"".join(at.take(8 * count, f"{count} numbers of a rank") for count in counts)
+    return step, np.frombuffer(data, "<f8").reshape(-1, at.width).T.astype(np.float64, "C")
+
+
 def frame_columns(at: Cursor) -> tuple[int, Columns]:
     """Step and columns of the frame that begins at a place.
 
     Raises
     ------
     WrongRow
-        At the first row of a text that is not so many numbers, or not finite ones.
+        At the first row that is not so many numbers, or not finite ones; of a foreign dump, not
+        so many words.
     DumpError
         The frame is not whole, or not one of this output.
     """
-    if at.layout.binary:
-        step, rows, ranks = _binary_head(at)
-        counts = _counts(at, rows, ranks)
-        data = b"".join(at.take(8 * count, f"{count} numbers of a rank") for count in counts)
-        cells = np.frombuffer(data, "<f8").reshape(-1, at.width).T.astype(np.float64, "C")
-        return step, _named(at, cells)
-    step, rows, names = _text_head(at)
-    text = b"".join(_row_lines(at, rows))
+    layout = at.layout
+    if not layout.foreign:
+        step, cells = frame_cells(at)
+        return step, named_columns(cells, layout.columns)
+    if layout.binary:
+        step, cells = frame_cells(at)
+        return step, columns_of_numbers(cells, layout.columns)
+    step, text, names = _text_frame(at)
     try:
         cells = cells_of_text(text, at.width)
     except WrongRow:
-        if not at.layout.foreign:
-            raise
         return step, columns_of_words(text, names)
-    return step, _named(at, cells[[names.index(name) for name in at.layout.header]])
+    return step, columns_of_numbers(_ordered(at, cells, names), layout.columns)
 
 
-def _named(at: Cursor, cells: Cells) -> Columns:
-    named = columns_of_numbers if at.layout.foreign else named_columns
-    return named(cells, at.layout.columns)
+def _text_frame(at: Cursor) -> tuple[int, bytes, list[str]]:
+    """Step and rows of a text frame, and the names of its columns in their order."""
+    step, rows, names = _text_head(at)
+    return step, b"".join(_row_lines(at, rows)), names
+
+
+def _ordered(at: Cursor, cells: Cells, names: list[str]) -> Cells:
+    return cells[[names.index(name) for name in at.layout.header]]
 
 
 def binary_names(file: Path, layout: Layout) -> list[str]:

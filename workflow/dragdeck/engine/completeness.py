@@ -11,7 +11,7 @@ import numpy as np
 from dragdeck.arrays import Floats
 from dragdeck.decks.outputs import OutputOfRun
 from dragdeck.dumps.content import Cursor
-from dragdeck.dumps.grammar import WholeFrames, frame_columns, whole_frames
+from dragdeck.dumps.grammar import WholeFrames, frame_cells, whole_frames
 from dragdeck.records.run import RunPart
 
 
@@ -71,8 +71,8 @@ def some_frames(
     for number in np.linspace(0, len(begins) - 1, min(most, len(begins))).astype(int):
         file, begin = begins[number]
         with Cursor(file, output, begin) as at:
-            _, columns = frame_columns(at)
-        yield np.array([*columns.values()]).T
+            _, cells = frame_cells(at)
+        yield cells.T
 
 
 def _gap(steps: set[int], output: OutputOfRun) -> int | None:
