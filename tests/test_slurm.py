@@ -35,6 +35,9 @@ QUEUE = (
 PMIX = "usr/lib/*/pmix2/lib/libpmix.so"  # Debian's libpmix-dev; its Slurm looks for this name
 
 
+_COLUMNS = ("JobId", "JobState", "SubmitTime", "StartTime", "EndTime")
+
+
 class Cluster:
     """The running Slurm, by the record that it keeps of its jobs."""
 
@@ -44,7 +47,8 @@ class Cluster:
     def jobs(self) -> pd.DataFrame:
         """A row a job that ended."""
         lines = self.file.read_text().splitlines() if self.file.is_file() else []
-        table = pd.DataFrame([dict(re.findall(r"(\w+)=(\S*)", line)) for line in lines])
+        rows = [dict(re.findall(r"(\w+)=(\S*)", line)) for line in lines]
+        table = pd.DataFrame(rows, columns=None if rows else [*_COLUMNS])
         for name in ("SubmitTime", "StartTime", "EndTime"):
             table[name] = pd.to_datetime(table[name])
         return table.set_index("JobId")
