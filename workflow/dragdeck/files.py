@@ -20,6 +20,19 @@ def file_checksum(file: Path) -> str:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
+_MARKS = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16", b"\xef\xbb\xbf": "utf-8-sig"}
+
+
+def text_of(content: bytes) -> str:
+    """The text of a file, whatever program wrote it, with plain line ends."""
+    coding = next((name for mark, name in _MARKS.items() if content.startswith(mark)), "utf-8")
+    try:
+        text = content.decode(coding)
+    except UnicodeDecodeError:
+        text = content.decode("latin-1")
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
 def table_rows(file: Path) -> list[dict[str, str]]:
     """The rows of a CSV file of the packages, by the names in its first line."""
     with file.open(encoding="utf-8", newline="") as stream:

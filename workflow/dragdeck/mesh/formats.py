@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dragdeck.errors import InputError
+from dragdeck.files import text_of
 from dragdeck.mesh.surface import Floats, Integers
 
-_MARKS = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16", b"\xef\xbb\xbf": "utf-8-sig"}
 _NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eEdD][+-]?\d+)?|[+-]?(nan|inf(inity)?)", re.I)
 _SPACES = r"\s+\S+" * 3
 _FACET = re.compile(
@@ -37,16 +37,6 @@ class Polygons(NamedTuple):
 
     points: Floats
     cells: Sequence[Integers]
-
-
-def text_of(content: bytes) -> str:
-    """The text of a file, whatever program wrote it, with plain line ends."""
-    coding = next((name for mark, name in _MARKS.items() if content.startswith(mark)), "utf-8")
-    try:
-        text = content.decode(coding)
-    except UnicodeDecodeError:
-        text = content.decode("latin-1")
-    return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 def _numbers(words: Sequence[str], line: int | None = None) -> Floats:
@@ -98,9 +88,11 @@ def stl(content: bytes) -> Polygons:
     count = int.from_bytes(content[80:_STL_HEAD], "little")
     end = _STL_HEAD + _STL_FACET * count
     whole = len(content) >= _STL_HEAD and end <= len(content)
-    if whole and (end == len(content) or not _FACET.search(text_of(content))):
+    if whole and end == len(content):
         return _stl_facets(content, end)
     text = text_of(content)
+    if whole and not _FACET.search(text):
+        return _stl_facets(content, end)
     if not re.match(r"\s*solid", text, re.I):
         raise InputError(
             "neither text nor whole binary STL",
@@ -243,10 +235,12 @@ def ply(content: bytes) -> Polygons:
     except (PlyParseError, ValueError, MemoryError) as error:
         raise InputError("the file is damaged", value=str(error)) from error
     elements: dict[str, Any] = {element.name: element.data for element in read}
-    left = [line for line in content[head.end() :].splitlines() if line.strip()]
-    del left[: sum(map(len, elements.values()))]  # a line for each
-    if rest := len(left) if read.text else len(stream.read()):
-        unit = "lines" if read.text else "bytes"
+    if read.text:  # a line for each element
+        lines = sum(1 for line in content[head.end() :].splitlines() if line.strip())
+        rest, unit = lines - sum(map(len, elements.values())), "lines"
+    else:
+        rest, unit = len(stream.read()), "bytes"
+    if rest > 0:
         raise InputError("more than the header announces", value=f"{rest} {unit}")
     if "tristrips" in elements:
         raise InputError("strips of triangles are not read", remedy="export single triangles")

@@ -7,7 +7,6 @@ programs write a head before the names of the columns, and units below them or i
 import csv
 import re
 from collections.abc import Iterable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from itertools import islice, zip_longest
 from pathlib import Path
@@ -16,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dragdeck.errors import InputError, together
+from dragdeck.files import text_of
 
 Floats = NDArray[np.float64]
 
@@ -40,8 +40,6 @@ _TIMES = ("time", "t", "zeit", "temps", _LABVIEW_TIME)
 
 _COMMENT = "comment"
 """The last column of LabVIEW, which its rows do not have."""
-
-_MARKS_OF_UTF16 = (b"\xff\xfe", b"\xfe\xff")
 
 _COMMA = (
     "if these are decimal commas, export with a decimal point, or with a semicolon or tab between "
@@ -184,7 +182,7 @@ def read_table(file: Path, most: int | None = None) -> Table:
     InputError
         The file cannot be read as text of at most 64 MB, or is no CSV file.
     """
-    texts = re.split("\r\n|\r|\n", _text(file))
+    texts = _text(file).split("\n")
     used = [n for n, text in enumerate(texts) if text.strip() and text.lstrip()[0] != "#"]
     if used and re.fullmatch("sep=.", texts[used[0]].strip(), re.IGNORECASE):  # of Excel
         del used[0]
@@ -306,20 +304,14 @@ def _text(file: Path) -> str:
         if (size := file.stat().st_size) > _MOST_BYTES:
             value, limit = f"{size / 1e6:.0f} MB", f"at most {_MOST_BYTES / 1e6:.0f} MB"
             raise InputError("the file is too large", file=file, value=value, limit=limit)
-        content = file.read_bytes()
-        if content[:2] in _MARKS_OF_UTF16:
-            return content.decode("utf-16")
-        if b"\0" not in content:
-            with suppress(UnicodeDecodeError):
-                return content.decode("utf-8-sig")
-            return content.decode("latin-1")
-        line = content[: content.index(b"\0")].count(b"\n") + 1
-        remedy = "export it as text in the encoding UTF-8"
-        raise InputError("not a CSV file: a byte is 0", file=file, line=line, remedy=remedy)
-    except UnicodeDecodeError as error:
-        raise InputError(f"not a CSV file: {error}", file=file) from None
+        text = text_of(file.read_bytes())
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror}", file=file) from None
+    before, zero, _ = text.partition("\0")
+    if zero:
+        line, remedy = before.count("\n") + 1, "export it as text in the encoding UTF-8"
+        raise InputError("not a CSV file: a byte is 0", file=file, line=line, remedy=remedy)
+    return text
 
 
 def _first(errors: Sequence[InputError]) -> InputError:
