@@ -1,6 +1,7 @@
 """The picture of a workpiece: where particles press and slide on it."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,12 +13,14 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from dragchain.arrays import Floats
+from dragchain.drag import AZIMUTH_BINS, circumference, parts
 from dragchain.figures.panels import depth_bars, head, new_panels
 from dragchain.figures.rendering import Camera, Image, check_rendering, new_plotter, photograph
 from dragchain.figures.style import ABOVE_SCALE, GREY, WIDTH_IN, force_map, top_of_scale
 from dragchain.loading.document import Loading, Profile
-from dragchain.loading.samples import as_polydata, patches
-from dragchain.run.kinematics import motion_of, needed
+from dragchain.loading.samples import Sampled, as_polydata, patches
+from dragchain.loading.summary import DEPTH_BINS
+from dragchain.run.kinematics import motion_of, needed, spins
 from dragchain.run.workpiece import Surface
 from dragdeck.records.case import CaseOfRun
 
@@ -34,24 +37,49 @@ _VIEWS = {
 """Sides of the workpiece: where the eye is in its frame (x, y), and where it then moves to."""
 
 _PIXELS = 900
+_FACETS_PER_BIN = 6
+"""Facets around a cylinder per bin, so that it looks round."""
 _BESIDE_IN, _AROUND_IN, _TALLEST_IN = 1.3, 2.3, 3.5
 """What labels take of the width and height of the figure, and how high its panels are at most."""
 
 
 def workpiece_figure(
-    case: CaseOfRun, surface: Surface, facets: pd.DataFrame, loading: Loading
+    case: CaseOfRun, sampled: Sampled, surface: Surface, facets: pd.DataFrame, loading: Loading
 ) -> Figure:
-    """The four sides of the workpiece by force times sliding distance, beside its depth profile.
+    """The workpiece by force times sliding distance, averaged over areas of a particle's size.
 
-    The load is averaged over areas of a particle's size.
+    A cylinder is shown from ahead, from behind and unrolled; any other workpiece
+    from its four sides. Beside it stands the profile over depth.
 
     Raises
     ------
     RenderError
         If pictures cannot be rendered here.
     """
-    load, title = averaged_load(surface, facets, case), _title(loading, case)
-    return _sides(case, surface, load, _LABEL, title, loading.by_depth)
+    check_rendering()
+    cylinder = needed(case.workpiece, "workpiece").kind == "cylinder"
+    names = ("front", "rear") if cylinder else tuple(_VIEWS)
+    widths = [1.0, 1.0, 2.8, 2.4] if cylinder else [1.0] * 4 + [1.4]
+    bins = _unrolled_bins(sampled, case) if cylinder else None
+    if bins is not None and not spins(case):
+        load, mesh = bins.load_pa.ravel(), _rolled(bins, case)
+        largest = top_of_scale(load, np.ones_like(load))
+    else:
+        shown = averaged_load(surface, facets, case)
+        largest, mesh = top_of_scale(shown, surface.areas), as_polydata(surface)
+        mesh.cell_data[_QUANTITY] = shown
+    scale = Normalize(0.0, largest)
+    height = _height_in(case, widths[0] / sum(widths))
+    figure, panels = new_panels(height, len(widths), sharey=True, width_ratios=widths)
+    for axes, name in zip(panels, names, strict=False):
+        _view(axes, mesh, name, scale, case)
+    if bins is not None:
+        _unrolled(panels[2], bins, scale, case)
+    _profile(panels[-1], loading.by_depth)
+    panels[0].set(ylabel="depth (mm)", ylim=_depths(case)[::-1])
+    _bar(figure, panels, scale, _LABEL)
+    head(figure, _title(loading, case))
+    return figure
 
 
 def surface_figure(
@@ -64,24 +92,13 @@ def surface_figure(
     RenderError
         If pictures cannot be rendered here.
     """
-    return _sides(case, surface, values, label, title)
-
-
-def _sides(
-    case: CaseOfRun, surface: Surface, values: Floats, label: str, title: str,
-    profile: Profile | None = None,
-) -> Figure:  # fmt: skip
     check_rendering()
     mesh = as_polydata(surface)
     mesh.cell_data[_QUANTITY] = values
     scale = Normalize(0.0, top_of_scale(values, surface.areas))
-    widths = [1.0] * len(_VIEWS) + [1.4] * (profile is not None)
-    height = _height_in(case, widths[0] / sum(widths))
-    figure, panels = new_panels(height, len(widths), sharey=True, width_ratios=widths)
-    for axes, name in zip(panels, _VIEWS, strict=False):
+    figure, panels = new_panels(_height_in(case, 1 / len(_VIEWS)), len(_VIEWS), sharey=True)
+    for axes, name in zip(panels, _VIEWS, strict=True):
         _view(axes, mesh, name, scale, case)
-    if profile is not None:
-        _profile(panels[-1], profile)
     panels[0].set(ylabel="depth (mm)", ylim=_depths(case)[::-1])
     _bar(figure, panels, scale, label)
     head(figure, title)
@@ -154,6 +171,59 @@ def averaged_load(surface: Surface, facets: pd.DataFrame, case: CaseOfRun) -> Fl
     load = np.bincount(group, facets[_QUANTITY].to_numpy(np.float64) * area)
     mean: Floats = load[group] / np.bincount(group, area)[group]
     return mean
+
+
+@dataclass(frozen=True)
+class _Bins:
+    """The lateral surface of a cylinder: edges of azimuth and depth, and the load, (D, A) in Pa.
+
+    Azimuths are from the direction of motion.
+    """
+
+    azimuth_rad: Floats
+    depth_m: Floats
+    load_pa: Floats
+
+
+def _unrolled_bins(sampled: Sampled, case: CaseOfRun) -> _Bins:
+    workpiece = needed(case.workpiece, "workpiece")
+    rows = sampled.rows[sampled.rows["workpiece_z_m"] > 1e-3 * workpiece.length_m]
+    azimuths, shallowest = circumference(AZIMUTH_BINS), 1e-3 * _depths(case)[0]
+    depths = np.linspace(shallowest, workpiece.immersion_depth_m, DEPTH_BINS + 1)
+    middles, half = 0.5 * (azimuths[:-1] + azimuths[1:]), 0.5 * rows["force_slide_n_m"]
+    sums = np.zeros((DEPTH_BINS, AZIMUTH_BINS))
+    for part in parts(rows["azimuth_rad"].to_numpy(np.float64), AZIMUTH_BINS):
+        grid = [depths, azimuths]
+        sums += np.histogram2d(rows["depth_m"], middles[part], grid, weights=half)[0]
+    area = workpiece.radius_m * (azimuths[1] - azimuths[0]) * (depths[1] - depths[0])
+    return _Bins(azimuths, depths, sums / (area * sampled.path_m))
+
+
+def _rolled(bins: _Bins, case: CaseOfRun) -> Any:
+    """The lateral surface as a mesh in the frame of the workpiece, its tip in the origin."""
+    import pyvista as pv
+
+    workpiece = needed(case.workpiece, "workpiece")
+    angle = np.linspace(-np.pi, np.pi, _FACETS_PER_BIN * bins.load_pa.shape[1] + 1)
+    angle, height = np.meshgrid(angle, workpiece.immersion_depth_m - bins.depth_m, indexing="ij")
+    x, y = workpiece.radius_m * np.cos(angle), workpiece.radius_m * np.sin(angle)
+    grid = pv.StructuredGrid(x[:, :, None], y[:, :, None], height[:, :, None])
+    load = np.repeat(bins.load_pa, _FACETS_PER_BIN, axis=1)
+    grid.cell_data[_QUANTITY] = load.ravel()
+    return grid.extract_surface(algorithm="dataset_surface")
+
+
+def _unrolled(axes: Axes, bins: _Bins, scale: Normalize, case: CaseOfRun) -> None:
+    """Draw the lateral surface of a cylinder unrolled: azimuth against depth."""
+    workpiece = needed(case.workpiece, "workpiece")
+    azimuth, depth = np.degrees(bins.azimuth_rad), 1e3 * bins.depth_m
+    axes.pcolormesh(azimuth, depth, bins.load_pa, cmap=force_map(), norm=scale)
+    axes.axhline(0.0, color=GREY, linewidth=0.8, linestyle="--")
+    axes.axhline(workpiece.immersion_depth_m * 1e3, color=GREY, linewidth=0.8)
+    axes.set_xticks(np.arange(-180, 181, 90), ["back", "right", "ahead", "left", "back"])
+    axes.grid(False)
+    axes.set_xlabel("azimuth from direction of motion")
+    axes.set_title("lateral surface, unrolled\n(dashed: bed surface at rest)")
 
 
 def _profile(axes: Axes, profile: Profile) -> None:

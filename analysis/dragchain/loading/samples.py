@@ -53,6 +53,9 @@ _KEPT = [
 SPHERES = "sphere_contacts"
 """Table of the contacts of the spheres of clumps, whose amounts add up."""
 
+DRAWN = ["workpiece_z_m", "depth_m", "azimuth_rad", "force_slide_n_m"]
+"""What is left of it for the picture, which needs memory itself."""
+
 
 @dataclass(frozen=True)
 class Sampled:

@@ -1,6 +1,6 @@
 """The files on a run's loading: tables, JSON, mesh and picture."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pandas as pd
@@ -11,7 +11,7 @@ from dragchain.figures.style import drawing, save
 from dragchain.loading.contact_events import event_types, find_events
 from dragchain.loading.document import Loading
 from dragchain.loading.figure import workpiece_figure
-from dragchain.loading.samples import as_polydata, check_facets, facet_table, sample
+from dragchain.loading.samples import DRAWN, Sampled, as_polydata, check_facets, facet_table, sample
 from dragchain.loading.summary import summarise_loading
 from dragchain.loading.wear import FILE as WEAR
 from dragchain.loading.wear import Wear, compute_wear, touch_maps
@@ -30,6 +30,8 @@ class WorkpieceLoading:
     case : CaseOfRun
     surface : Surface
         The workpiece.
+    sampled : Sampled
+        All contacts with what the picture shows of them.
     facets, events : DataFrame
         Content of ``facets.parquet`` and ``contact_events.parquet``.
     summary : Loading
@@ -40,6 +42,7 @@ class WorkpieceLoading:
 
     case: CaseOfRun
     surface: Surface
+    sampled: Sampled
     facets: pd.DataFrame
     events: pd.DataFrame
     summary: Loading
@@ -91,7 +94,9 @@ def write_loading(run_dir: Path) -> list[Path]:
 
 def figure_of(loading: WorkpieceLoading) -> Figure:
     """The figure of the workpiece; see `workpiece_figure`."""
-    return workpiece_figure(loading.case, loading.surface, loading.facets, loading.summary)
+    return workpiece_figure(
+        loading.case, loading.sampled, loading.surface, loading.facets, loading.summary
+    )
 
 
 def compute_loading(run_dir: Path) -> WorkpieceLoading:
@@ -111,5 +116,6 @@ def compute_loading(run_dir: Path) -> WorkpieceLoading:
     wear, touched = compute_wear(run_dir, case, sampled, surface, summary)
     if wear is not None and wear.touches is not None and touched is not None:
         facets = facets.assign(**touch_maps(touched, surface, wear.touches.time_s))
+    drawn = replace(sampled, rows=sampled.rows[DRAWN].copy())
     events = events.drop(columns=["frame", "slid_m"])
-    return WorkpieceLoading(case, surface, facets, events, summary, wear, touched)
+    return WorkpieceLoading(case, surface, drawn, facets, events, summary, wear, touched)
