@@ -14,6 +14,7 @@ import numpy as np
 from dragdeck.dumps.content import Cursor
 from dragdeck.dumps.frame import Columns, Layout
 from dragdeck.dumps.numbers import (
+    COLUMNS_OF_WORDS,
     Cells,
     WrongRow,
     cells_of_text,
@@ -95,10 +96,9 @@ def frame_columns(at: Cursor) -> tuple[int, Columns]:
         step, cells = frame_cells(at)
         return step, columns_of_numbers(cells, layout.columns)
     step, text, names = _text_frame(at)
-    try:
-        cells = cells_of_text(text, at.width)
-    except WrongRow:
+    if any(name in COLUMNS_OF_WORDS for name in names):
         return step, columns_of_words(text, names)
+    cells = cells_of_text(text, at.width)
     return step, columns_of_numbers(_ordered(at, cells, names), layout.columns)
 
 

@@ -11,6 +11,8 @@ from dragdeck.dumps.frame import Columns, is_integer_column
 Cells = NDArray[np.float64]
 """Numbers of M columns and N rows, (M, N)."""
 
+COLUMNS_OF_WORDS = ("element", "typelabel")
+"""The columns of a dump of LAMMPS or LIGGGHTS that hold words."""
 
 _SHORT_BYTES = 8192
 """Of a shorter text pyarrow takes longer to begin than Python to read it."""
@@ -77,23 +79,25 @@ def _one_by_one(text: bytes, width: int) -> Cells:
 
 
 def columns_of_words(text: bytes, names: Sequence[str]) -> Columns:
-    """Columns by name, as strings where one of their words is no number.
+    """Columns by name: strings in the columns that have words, numbers in the others.
 
     Raises
     ------
     WrongRow
-        At the first line that is not so many words.
+        At the first line that is not so many words, or not a number where one should be.
     """
-    rows = [line.split() for line in text.decode("utf-8", "replace").splitlines()]
+    rows = [line.split() for line in text.split(b"\n")[:-1]]
     for row, words in enumerate(rows):
         if len(words) != len(names):
-            raise WrongRow(row, f"found {' '.join(words)[:120]!r}", f"{len(names)} words")
+            raise WrongRow(row, f"found {b' '.join(words)[:120]!r}", f"{len(names)} words")
     columns: dict[str, Any] = {}
-    for name, words in zip(names, map(list, zip(*rows, strict=True)), strict=True):
-        try:
-            columns[name] = _whole_if_it_is(np.array([float(word) for word in words]), name)
-        except ValueError:
-            columns[name] = np.array(words, dtype=object)
+    for place, name in enumerate(names):
+        words = [row[place] for row in rows]
+        if name in COLUMNS_OF_WORDS:
+            columns[name] = np.array([word.decode("utf-8", "replace") for word in words], object)
+        else:
+            (cells,) = _one_by_one(b"".join(word + b"\n" for word in words), 1)
+            columns[name] = _whole_if_it_is(cells, name)
     return columns
 
 

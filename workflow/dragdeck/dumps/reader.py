@@ -70,19 +70,12 @@ def _like(first: Any, column: Any, name: str) -> Any:
     """
     if first is None or column.dtype == first.dtype or not column.size:
         return column
-    if first.dtype.kind == "O":
-        return np.array([f"{value:.17g}" for value in column], dtype=object)
-    for row, value in enumerate(column.tolist()):
-        if not _fits(value, whole=first.dtype.kind == "i"):
-            raise WrongRow(row, f"{name} is {value}", "a number, or a whole one, as before")
-    return column.astype(first.dtype)
-
-
-def _fits(value: str | float, whole: bool) -> bool:
-    try:
-        return float(value).is_integer() or not whole
-    except ValueError:
-        return False
+    with np.errstate(invalid="ignore"):
+        alike = column.astype(first.dtype)
+    if (alike != column).any():
+        row = int(np.flatnonzero(alike != column)[0])
+        raise WrongRow(row, f"{name} is {column[row]}", "a whole number, as before")
+    return alike
 
 
 def read_prints(file: Path, layout: Layout, *, block_rows: int = 20_000) -> Iterator[Columns]:
@@ -145,9 +138,9 @@ def read_dump(source: Path | str, columns: Sequence[str] | None = None) -> Itera
     ------
     Frame
         In the order of the file, or of the steps in the names of the files. Columns
-        named ``id``, ``type`` or ``..._id`` are int64 if all are whole, those with words are
-        strings, all others float64. A column that a dump has twice comes once. At most one frame
-        is in memory.
+        named ``id``, ``type`` or ``..._id`` are int64 if all are whole, ``element`` and
+        ``typelabel`` are strings, all others float64. A column that a dump has twice comes once.
+        At most one frame is in memory.
 
     Warns
     -----
@@ -234,7 +227,7 @@ def _header(file: Path) -> tuple[str, list[str]]:
     expected = "the header of a text dump of LIGGGHTS"
     with Cursor(file, DumpLayout("custom", ())) as at:
         lines = b"".join(at.lines(_HEADER_LINES)).split(b"\n")
-    named = [line for line in lines if line.startswith((b"ITEM: ATOMS", b"ITEM: ENTRIES"))]
+    named = [line for line in lines if line.startswith((b"ITEM: ATOMS ", b"ITEM: ENTRIES "))]
     words = [word.decode("ascii", "replace") for word in named[0].split()] if named else []
     if len(words) < 3:
         raise DumpError(
