@@ -44,14 +44,34 @@ COMMANDS = (
         OUT_DIR, RUN_DIRS,
         Argument("--command", required=True, metavar="TEXT",
                  help="command that made the runs, to be recorded with the results; required"))),
+    Command("draw-scenes", "write studies of scenes drawn from a seed",
+            "Write studies of small scenes drawn from a seed into the project.",
+            "windows.drawn:draw_scenes", (
+        Argument("seed", type=int, help="of the random numbers"),
+        Argument("--scenes", type=int, default=12, metavar="N",
+                 help="number of scenes; default: 12"),
+        Argument("--fidelity", default="{tolerance: 0.1}", metavar="YAML",
+                 help="block of each study; default: {tolerance: 0.1}"))),
+    Command("window-targets", "print the files that Snakemake makes of all windows of a study",
+            "Print the files that Snakemake makes of the soft runs and of all windows of a study.",
+            "windows.drawn:window_targets", (STUDY,)),
+    Command("collect-windows", "collect the quantities of soft runs and of their windows",
+            "Collect the quantities of soft runs and of their windows in an archive.",
+            "windows.drawn:collect_windows", (
+        Argument("archive", type=Path, metavar="FILE", help="tar.xz archive to write"),
+        Argument("results", type=Path, nargs="+", metavar="RESULTS",
+                 help="folders of the results of studies"))),
     Command("record-scenes", "make windows.json and stable_step.json from runs of designed scenes",
             "Make windows.json and stable_step.json, which decide tolerances and time steps, from "
             "the runs of designed scenes.", "windows.record:write_scene_records", (
         OUT_DIR,
+        Argument("windows", type=Path, metavar="WINDOWS",
+                 help="archive of soft runs and windows: docs/data/windows/drawn.tar.xz"),
         Argument("archives", type=Path, nargs="+", metavar="ARCHIVE",
-                 help="tar archives of measures.json: docs/data/scenes/measures.tar.xz and "
+                 help="archives of whole runs: docs/data/scenes/measures.tar.xz and "
                  "fresh.tar.xz for the records of this version")),
-        "python -m evidence record-scenes --out workflow/dragdeck/data docs/data/scenes/*.tar.xz"),
+        "python -m evidence record-scenes --out workflow/dragdeck/data "
+        "docs/data/windows/drawn.tar.xz docs/data/scenes/*.tar.xz"),
 )  # fmt: skip
 
 PROGRAM = Program(

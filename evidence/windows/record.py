@@ -1,9 +1,11 @@
 """What runs of designed scenes say: ``windows.json`` and ``stable_step.json`` of dragdeck.
 
-Each scene was run at the physical Young's modulus and at reduced ones, over one or more packings.
-``windows.json`` has, for each quantity, the ratio of the values at both moduli and its scatter
-from scene to scene, the ratio of the variances along the path, and the scatter between packings.
-``stable_step.json`` has the law of the stability number of a time step, `StableStepLaw`.
+``windows.json`` has, for each quantity, what soft runs and their windows in drawn scenes say: the
+ratio of the values at both moduli, the slope of windows on the soft run beside them, and the
+scatter about it, each with its scatter from scene to scene. Scatter between packings, correlation
+of neighbouring blocks, and ``stable_step.json``, the law of the stability number of a time step
+(`StableStepLaw`), are from whole runs of designed scenes at the physical Young's modulus and at
+reduced ones, over one or more packings.
 """
 
 import math
@@ -22,13 +24,14 @@ from dragchain.arrays import Floats
 from dragchain.errors import SeriesError
 from dragchain.quantities.blocks import neighbour_correlation
 from dragchain.quantities.document import RunQuantities
-from dragchain.quantities.known import Known, WindowsRecord
+from dragchain.quantities.known import UNKNOWN, Known, WindowsRecord
 from dragchain.quantities.registry import MEASURED, Quantity
+from dragchain.windows.estimate import WindowOfRun
+from dragchain.windows.rounds import beside, of_windows, stretches, window_of
 from dragdeck.physics.contact_mechanics import damping_ratio
 from dragdeck.records.stability import StableStepLaw, StableStepRecord
 from dragdeck.records.tradeoff import SixDigits
 
-_SOFT = 1e-3
 _FEWEST_SCENES = 5
 _LARGEST_STD = 0.08
 """A ratio that differs more than this from scene to scene says too little to save windows."""
@@ -47,14 +50,16 @@ Scenes = Sequence[Sequence[SceneRun]]
 """The runs of each scene."""
 
 
-def write_scene_records(out_dir: Path, archives: Sequence[Path]) -> str:
+def write_scene_records(out_dir: Path, windows: Path, archives: Sequence[Path]) -> str:
     """Write ``windows.json`` and ``stable_step.json``; return a line on each.
 
     Parameters
     ----------
     out_dir : Path
+    windows : Path
+        Archive of soft runs and their windows, of `evidence.windows.drawn.collect_windows`.
     archives : sequence of Path
-        Tar archives of ``quantities.json`` files.
+        Tar archives of ``quantities.json`` files of whole runs.
 
     Raises
     ------
@@ -62,12 +67,13 @@ def write_scene_records(out_dir: Path, archives: Sequence[Path]) -> str:
         Too few scenes or runs.
     """
     scenes = read_scenes(archives)
-    windows = windows_record(scenes, [file.name for file in archives])
+    sources = [file.name for file in (windows, *archives)]
+    record = windows_record(scenes, read_windows(windows), sources)
     step = stable_step_record(scenes)
-    windows.write(out_dir / "windows.json")
+    record.write(out_dir / "windows.json")
     step.write(out_dir / "stable_step.json")
     return (
-        f"windows.json: {len(windows.quantities)} quantities\n"
+        f"windows.json: {len(record.quantities)} quantities\n"
         f"stable_step.json: {step.stable_step.runs} runs"
     )
 
@@ -117,44 +123,149 @@ class QuantityOfRun:
         return self.variance / len(self.blocks)
 
 
-def windows_record(scenes: Scenes, archives: Sequence[str]) -> WindowsRecord:
-    """The ratios of every quantity that enough of the scenes have at both moduli.
+@dataclass(frozen=True)
+class Windowed:
+    """A soft run and its windows."""
+
+    soft: RunQuantities
+    windows: Sequence[WindowOfRun]
+
+    def pairs(self, quantity: Quantity) -> "Pairs | None":
+        """A quantity in the windows and beside them, None where it is not in all of them."""
+        known = [self.soft.values(), *(window.values for window in self.windows)]
+        if len(self.windows) < _FEWEST_WINDOWS or any(quantity.name not in of for of in known):
+            return None
+        windows = of_windows(quantity, self.windows)
+        soft = beside(self.soft, quantity.name, self.windows)
+        along = stretches(self.soft, quantity.name, self.windows[0].arc_m)
+        ratio = abs(windows.mean() / soft.mean())
+        return Pairs(
+            windows / windows.mean() - 1.0,
+            soft / soft.mean() - 1.0,
+            float(np.var(along / along.mean(), ddof=1)),
+            math.log(ratio) / (1 + quantity.squared),
+        )
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """A quantity in K windows and in the soft run beside them, (K,) each, about their means.
+
+    Attributes
+    ----------
+    windows, beside : (K,) ndarray
+        Relative to the means.
+    variance : float
+        Relative, of the soft run's stretches.
+    ratio_log : float
+        Logarithm of the mean of the windows over that of the soft run beside them.
+    """
+
+    windows: Floats
+    beside: Floats
+    variance: float
+    ratio_log: float
+
+    @cached_property
+    def slope(self) -> float:
+        """Of the windows on the soft run."""
+        return float(self.beside @ self.windows / (self.beside @ self.beside))
+
+    @cached_property
+    def about(self) -> float:
+        """Variance of a window about the slope."""
+        rest = self.windows - self.slope * self.beside
+        return float(rest @ rest) / (len(rest) - 2)
+
+    @property
+    def slope_variance(self) -> float:
+        """Of the slope."""
+        return self.about / float(self.beside @ self.beside)
+
+    @property
+    def ratio_variance(self) -> float:
+        """Of the logarithm of the ratio."""
+        rest = self.windows - self.beside
+        return float(rest @ rest) / (len(rest) - 1) / len(rest)
+
+
+_FEWEST_WINDOWS = 5
+"""Of which a slope is taken."""
+
+
+def read_windows(archive: Path) -> list[Windowed]:
+    """The soft runs of an archive with their windows."""
+    folders = defaultdict[str, dict[str, RunQuantities]](dict)
+    with tarfile.open(archive) as files:
+        for member in files:
+            if stream := files.extractfile(member):
+                folder, name = member.name.rsplit("/", 1)
+                folders[folder][name] = RunQuantities.model_validate_json(stream.read())
+    return [
+        Windowed(
+            runs["soft.json"], [window_of(run) for name, run in runs.items() if name != "soft.json"]
+        )
+        for runs in folders.values()
+    ]
+
+
+def windows_record(
+    scenes: Scenes, windowed: Sequence[Windowed], sources: Sequence[str]
+) -> WindowsRecord:
+    """What is known of every quantity that enough of the soft runs and windows have.
 
     Raises
     ------
     SeriesError
         There is none.
     """
-    rows = {quantity.name: _known(quantity, scenes) for quantity in MEASURED}
+    rows = {quantity.name: _known(quantity, scenes, windowed) for quantity in MEASURED}
     quantities = {name: known for name, known in rows.items() if known}
     if not quantities:
-        raise SeriesError(f"no quantity has both moduli in {_FEWEST_SCENES} scenes or more")
+        raise SeriesError(f"no quantity has windows in {_FEWEST_SCENES} scenes or more")
     return WindowsRecord(
-        measured=_measured(scenes),
-        source=f"designed scenes at E x 1 and E x {_SOFT:g}: {', '.join(archives)}",
+        measured=max(of.soft.started for of in windowed)[:10],
+        source=f"drawn and designed scenes: {', '.join(sources)}",
         quantities=quantities,
     )
 
 
-def _known(quantity: Quantity, scenes: Scenes) -> Known | None:
-    measured = [[*_runs_with(quantity, runs)] for runs in scenes]
-    pairs = [
-        (stiff, soft)
-        for runs in measured
-        if (stiff := [run for run in runs if run.run.fidelity.youngs_modulus_scale == 1.0])
-        and (soft := [run for run in runs if _is_soft(run.run)])
-    ]
-    if len(pairs) < _FEWEST_SCENES:
+def _between_scenes(values: Sequence[float], variances: Sequence[float]) -> tuple[float, float]:
+    """Mean over scenes, and standard deviation of a further one from it.
+
+    The variance between scenes is by the method of moments (DerSimonian and Laird 1986, Controlled
+    Clinical Trials 7, 177), and never taken as less than that of the mean.
+    """
+    of, own = np.asarray(values), np.asarray(variances)
+    weight = 1.0 / own
+    mean = float(np.average(of, weights=weight))
+    excess = float(weight @ (of - mean) ** 2) - (len(of) - 1)
+    between = max(excess / float(weight.sum() - weight @ weight / weight.sum()), 0.0)
+    weight = 1.0 / (own + between)
+    return float(np.average(of, weights=weight)), math.sqrt(between + 1.0 / float(weight.sum()))
+
+
+def _known(quantity: Quantity, scenes: Scenes, windowed: Sequence[Windowed]) -> Known | None:
+    every = [pairs for of in windowed if (pairs := of.pairs(quantity)) and pairs.variance]
+    if len(every) < _FEWEST_SCENES:
         return None
-    ratios = [math.log(_mean(stiff, "value") / _mean(soft, "value")) for stiff, soft in pairs]
-    noise = float(np.mean([sum(map(_variance_of_mean, pair)) for pair in pairs]))
-    between = max(float(np.var(ratios, ddof=1)) - noise, 0.0) + noise / len(pairs)
-    std = math.sqrt(between * (1 + 1 / len(pairs)))
-    logs = [math.log(_mean(stiff, "variance") / _mean(soft, "variance")) for stiff, soft in pairs]
-    by_chance = float(np.mean([sum(map(_log_variance, pair)) for pair in pairs]))
+    ratio, ratio_std = _between_scenes(
+        [of.ratio_log for of in every], [of.ratio_variance for of in every]
+    )
+    slope, slope_std = (0.0, 0.0)
+    if not quantity.signed:
+        slope, slope_std = _between_scenes(
+            [of.slope for of in every], [of.slope_variance for of in every]
+        )
+    logs = [math.log(of.about / of.variance) for of in every]
+    by_chance = float(np.mean([2 * polygamma(1, (len(of.windows) - 2) / 2) for of in every]))
+    measured = [[*_runs_with(quantity, runs)] for runs in scenes]
+    narrow = ratio_std <= _LARGEST_STD and not quantity.signed
     return Known(
-        ratio_log=round(float(np.mean(ratios)), 4),
-        ratio_log_std=round(std, 4) if std <= _LARGEST_STD and not quantity.signed else math.inf,
+        ratio_log=round(ratio, 4),
+        ratio_log_std=round(ratio_std, 4) if narrow else math.inf,
+        slope=round(slope, 3),
+        slope_std=round(slope_std, 3),
         variance_ratio=round(math.exp(float(np.mean(logs))), 3),
         degrees=round(_degrees(float(np.var(logs, ddof=1)) - by_chance), 1),
         packing_std=round(_between_packings(measured), 4),
@@ -174,14 +285,12 @@ def _runs_with(quantity: Quantity, runs: Sequence[SceneRun]) -> list[QuantityOfR
 
 
 def _correlation(scenes: Sequence[Sequence[QuantityOfRun]]) -> float:
-    """Mean correlation of neighbouring blocks."""
+    """Mean correlation of neighbouring blocks; that of a quantity of which nothing is known."""
     series = [run.blocks for runs in scenes for run in runs if run.variance]
+    if not series:
+        return UNKNOWN.correlation
     of_runs = [neighbour_correlation(blocks) for blocks in series]
     return float(np.average(of_runs, weights=[len(blocks) for blocks in series]))
-
-
-def _is_soft(run: SceneRun) -> bool:
-    return math.isclose(run.fidelity.youngs_modulus_scale, _SOFT, rel_tol=0.1)
 
 
 def _mean(runs: Sequence[QuantityOfRun], name: str) -> float:
@@ -190,11 +299,6 @@ def _mean(runs: Sequence[QuantityOfRun], name: str) -> float:
 
 def _variance_of_mean(runs: Sequence[QuantityOfRun]) -> float:
     return _mean(runs, "variance_of_mean") / len(runs)
-
-
-def _log_variance(runs: Sequence[QuantityOfRun]) -> float:
-    """Variance of the logarithm of a variance with so many degrees of freedom."""
-    return float(polygamma(1, sum(len(run.blocks) - 1 for run in runs) / 2))
 
 
 def _degrees(excess: float) -> float:

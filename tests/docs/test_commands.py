@@ -10,10 +10,12 @@ import pytest
 import yaml
 from doc_pages import PAGES, fences, name_of
 from entry import write_entry
+from made_study import put
 from paths import PROJECT, ROOT
 from preloaded import environment, programs
 
 from dragdeck.project import Project
+from dragdeck.study.yaml import read_yaml
 
 STUDY = "quickstart"
 WAYPOINTS = "time_s,x_m,y_m\n0,0.02,0\n2,0,0.02\n5,-0.02,0\n"
@@ -48,9 +50,16 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def clone(project: Path) -> Path:
-    """The project with the results of its first study; from then on it has preloaded programs."""
-    runs(f"./run all --cores 2 --config study={STUDY}", project)
+def clone(project: Path, pytestconfig: pytest.Config) -> Path:
+    """The project with the results of its first study; from then on it has preloaded programs.
+
+    Without `--long` the study has a shorter path.
+    """
+    if not pytestconfig.getoption("--long"):
+        study = project / "studies" / STUDY / "study.yaml"
+        put(plain := read_yaml(study), {"motion.path.revolutions": 0.12})
+        study.write_text(yaml.safe_dump(plain))
+    runs(f"./run all --cores 1 --config study={STUDY}", project)
     for program in programs()[0].glob("[ds]*"):
         tool = project / ".venv/bin" / program.name
         tool.unlink(missing_ok=True)

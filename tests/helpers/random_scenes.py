@@ -30,8 +30,8 @@ def random_scenes(draw: st.DrawFn) -> dict[str, Any]:
     """A study that asks for a tolerance. Lengths of the scene follow from the diameter d."""
     d = draw(_linear(1e-3, 6e-3))
     depth = draw(_between(1.5, _TALLEST - 10))
-    height = (depth + draw(_linear(2, _TALLEST - depth))) / 0.94  # the bed may be 6 % lower
-    gap, thick = draw(_linear(1.1, 6)), draw(_between(0.5, 4))
+    height = (depth + draw(_linear(2.6, _TALLEST - depth))) / 0.94  # the bed may be 6 % lower
+    gap, thick = draw(_linear(2.1, 6)), draw(_between(0.5, 4))
     reach = draw(_between(1.5, 10))
     outer = reach + gap + thick / 2
     count = math.ceil(0.59 * 6 * outer**2 * height) + 5

@@ -18,6 +18,7 @@ pytestmark = pytest.mark.slow
 def test_advice_comes_before_the_runs_of_a_study_that_asks(tmp_path: Path) -> None:
     """In a copy of the project whose package holds a trade-off: its own interpreter reads that."""
     data = yaml.safe_load(SMALL_STUDY.read_text()) | {"fidelity": {"tolerance": 0.05}}
+    data["bowl"]["radius_m"] = 0.028
     folder = copy_of_project(tmp_path, data)
     (folder / "workflow").unlink()
     shutil.copytree(ROOT / "workflow", folder / "workflow")

@@ -180,6 +180,7 @@ def advised(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A project with the advice of a study that asks for a tolerance, and was then edited."""
     data = yaml.safe_load((DATA / "small_study.yaml").read_text())
     data["fidelity"] = {"tolerance": 0.1}
+    data["bowl"]["radius_m"] = 0.028
     folder = copy_of_project(tmp_path_factory.mktemp("advised"), data)
     succeed(folder, "results/small/advice.json", *STUDY)
     edit(folder, {"seed": 2})

@@ -38,7 +38,14 @@ from dragdeck.project import (
     study_templates,
 )
 from dragdeck.records.run import RunRecord
-from dragdeck.scenes.lead import FIRST_WINDOWS, windows_of, with_lead, with_leads
+from dragdeck.scenes.lead import (
+    FIRST_WINDOWS,
+    whole_drag,
+    whole_lengths,
+    windows_of,
+    with_lead,
+    with_leads,
+)
 from dragdeck.scenes.process import SCENES
 from dragdeck.study.base import Json
 from dragdeck.study.calibration import measurements
@@ -344,7 +351,7 @@ class Workflow:
         """Where cases of a folder's runs come from: how to name them, and by run."""
         scene, cases = PLACES[place], self.cases
         if place == WINDOWS:
-            cases = [window for case in cases for window in windows_of(case)]
+            cases = [part for case in cases for part in (*windows_of(case), *whole_drag(case))]
         elif scene.needs_bed:
             cases = with_leads(cases)
         if place != POINTS:
@@ -485,16 +492,30 @@ class Workflow:
 
     def windows_of_round(self, wildcards: RoundOfRun) -> list[str]:
         """The folders of the windows that a round judges: of those that the one before wanted."""
-        wanted = FIRST_WINDOWS
+        wanted = self._said_before(wildcards).get("wanted", FIRST_WINDOWS)
+        return self._window_folders(wildcards, self.windows_of_run(wildcards)[:wanted])
+
+    def drag_of_round(self, wildcards: RoundOfRun) -> list[str]:
+        """The folder of the whole drag, if the round before wanted it instead of more windows."""
+        if not self._said_before(wildcards).get("whole"):
+            return []
+        return self._window_folders(wildcards, whole_drag(self.case_of("process", wildcards.run)))
+
+    def _said_before(self, wildcards: RoundOfRun) -> dict[str, Any]:
+        """The content of the round before; nothing before the first."""
+        said: dict[str, Any] = {}
         for before in self.round_before(wildcards):
-            wanted = json.loads(Path(before).read_text())["wanted"]
-        windows = self.windows_of_run(wildcards)[:wanted]
+            said = json.loads(Path(before).read_text())
+        return said
+
+    def _window_folders(self, wildcards: RoundOfRun, windows: list[Case]) -> list[str]:
         runs = [SCENES["process"].run_id(window) for window in windows]
         return [run_path(wildcards.study, WINDOWS, run) for run in runs]
 
     def measured_of_round(self, wildcards: RoundOfRun) -> list[str]:
-        """The quantities of the windows of a round."""
-        return [f"{folder}/tables/quantities.json" for folder in self.windows_of_round(wildcards)]
+        """The quantities of the runs that a round judges."""
+        folders = [*self.windows_of_round(wildcards), *self.drag_of_round(wildcards)]
+        return [f"{folder}/tables/quantities.json" for folder in folders]
 
     def last_round(self, wildcards: Wildcards) -> str | list[str]:
         """The last round of windows of a run, if it has any."""
@@ -506,12 +527,15 @@ class Workflow:
             file = self.judged(wildcards.study, wildcards.run, number)
         return file
 
-    def windows_options(self, wildcards: Wildcards) -> str:
+    def windows_options(self, wildcards: RoundOfRun) -> str:
         """What the windows of a run are asked for, as options of the command line."""
-        asked = self.case_of("process", wildcards.run).study.chosen_fidelity().windows
+        study = self.case_of("process", wildcards.run).study
+        asked = study.chosen_fidelity().windows
         assert asked is not None
         quantities = " ".join(map(quote, asked.quantities))
+        drag = "".join(f" --drag {quote(folder)}" for folder in self.drag_of_round(wildcards))
         return (
             f"--tolerance {asked.tolerance} --quantities {quantities}"
             f" --most {len(self.windows_of_run(wildcards))}"
+            f" --lengths {whole_lengths(study):.6g}{drag}"
         )

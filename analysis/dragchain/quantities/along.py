@@ -89,6 +89,7 @@ class CountedPath:
 
     first_step: int
     last_step: int
+    begin_m: float
     length_m: float
     diameter_m: float
     blocks: int
@@ -103,7 +104,8 @@ class CountedPath:
         start, per_step = drag_phase(case).start_step, case.timestep_s * motion.axis_speed_m_s
         before = max(first - int(np.median(np.diff(counted_steps))), start)
         length = (last - before) * per_step
-        return cls(before, last, length, diameter, max(FEWEST, round(length / diameter)))
+        begin = (before - start) * per_step
+        return cls(before, last, begin, length, diameter, max(FEWEST, round(length / diameter)))
 
     def block(self, steps: Ints) -> Ints:
         """Number of the block of each step, (N,); steps outside get the nearest."""
@@ -166,6 +168,7 @@ def quantities_along(run_dir: Path, case: CaseOfRun) -> PathQuantities:
     }
     load_map = _load_map(sampled, needed(case.workpiece, "workpiece").immersion_depth_m)
     return PathQuantities(
+        begin_m=path.begin_m,
         arc_m=path.length_m,
         block_m=path.length_m / path.blocks,
         blocks={

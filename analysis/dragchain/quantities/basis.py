@@ -50,7 +50,7 @@ class Standing:
     reason : str
         Why it is not available, or what it is not corrected for; empty if nothing is to be said.
     windows : int
-        Number of windows that the value is from.
+        Number of windows that the value is from; 0 if it is from the whole drag.
     """
 
     quantity: Quantity
@@ -73,7 +73,8 @@ class Standing:
     @property
     def rests_on(self) -> str:
         """The basis in words, with the number of windows."""
-        return self.basis.replace("windows", f"{self.windows} windows")
+        runs = f"{self.windows} windows" if self.windows else "the whole drag"
+        return self.basis.replace("windows", runs)
 
     @property
     def shown(self) -> Estimate:

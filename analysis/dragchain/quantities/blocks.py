@@ -38,6 +38,12 @@ class Blocks:
         """Some of the blocks."""
         return Blocks(self.values[which], self.weights[which])
 
+    def between(self, first: float, last: float) -> "Blocks":
+        """The blocks of a stretch, which may begin and end inside of one: in lengths of a block."""
+        number = np.arange(len(self.values))
+        share = (np.minimum(number + 1.0, last) - np.maximum(number, first)).clip(0.0, 1.0)
+        return Blocks(self.values, self.weights * share)
+
     @property
     def mean(self) -> float:
         """The mean over the blocks that have a value; NaN if there is none."""

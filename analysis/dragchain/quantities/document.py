@@ -61,6 +61,8 @@ class PathQuantities(Part):
 
     Attributes
     ----------
+    begin_m : float
+        Path before the counted one, from the beginning of the drag at full speed, m.
     arc_m : float
         Counted path, m.
     block_m : float
@@ -74,6 +76,7 @@ class PathQuantities(Part):
         Mean normal load by depth and azimuth, N, a depth after the other.
     """
 
+    begin_m: float = 0.0
     arc_m: float = 0.0
     block_m: float = 0.0
     blocks: Mapping[str, tuple[float | None, ...]] = {}
@@ -170,6 +173,8 @@ class Reached(Part):
         Windows and packings that are expected to do.
     runs : tuple of str
         Windows that enter; none if the run itself has the physical modulus.
+    whole : bool
+        Whether that is a single run of the whole drag instead.
     refused : mapping
         Reason by window, of those that do not enter.
     """
@@ -179,6 +184,7 @@ class Reached(Part):
     reached: bool
     needed: Need
     runs: tuple[str, ...] = ()
+    whole: bool = False
     refused: Mapping[str, str] = {}
 
 
@@ -242,13 +248,15 @@ class Extrapolated(Document):
         what = " and ".join(filter(None, (", ".join(labels[:-1]), labels[-1])))
         asked = f"{what} to within {100 * reached.tolerance:.3g} %"
         who, verb = "The run at the physical Young's modulus", ("gives", "does not give")
-        if reached.runs:
+        if reached.whole:
+            who = "The whole drag at the physical Young's modulus, which began softer,"
+        elif reached.runs:
             who = f"{len(reached.runs)} windows at the physical Young's modulus"
             verb = ("give", "do not give")
         if reached.reached:
             return f"{who} {verb[0]} {asked}."
         windows, packings = reached.needed
-        more = f"{windows} windows" if packings == 1 and reached.runs else f"{packings} seeds"
+        more = f"{windows} windows" if packings == 1 and windows else f"{packings} seeds"
         return f"{who} {verb[1]} {asked}: about {more} would."
 
 

@@ -112,7 +112,8 @@ def _correction(value: Estimate, name: str, extrapolated: Extrapolated | None) -
     """What the windows of a run make of a quantity."""
     if extrapolated is None or name not in extrapolated.values or not extrapolated.tolerance:
         return None
-    windows = len(extrapolated.tolerance.runs)
+    reached = extrapolated.tolerance
+    windows = 0 if reached.whole else len(reached.runs)
     return Correction(extrapolated.values[name].over(value.value), windows)
 
 

@@ -2,10 +2,12 @@
 
 `Round` is the document of a round, ``round-<number>.json``.
 
-Two estimates are joined by precision: the mean of the windows, and the value of the soft run times
-the ratio that other scenes had, if they agree. The variance of the windows is joined with that of
-stretches of the soft run as a moderated variance (Smyth, Stat. Appl. Genet. Mol. Biol. 3, 2004,
-article 3).
+A window starts from the soft run's own bed and keeps part of its noise: where the soft run is above
+its mean, the window is, too. The mean of the windows is therefore moved by what the soft run's mean
+over the whole path differs from its mean beside the windows, times the slope of one on the other: a
+regression estimator (Cochran, Sampling Techniques, 3rd ed. 1977, chapter 7), or control variate.
+The slope of the run is shrunk to that of other scenes, and the variance about it is joined with
+theirs as a moderated variance (Smyth, Stat. Appl. Genet. Mol. Biol. 3, 2004, article 3).
 
 Windows are too short for a load map of their own: a bin has few contacts. Each bin is therefore an
 empirical Bayes estimate (Efron and Morris, J. Am. Stat. Assoc. 68, 1973, 117): the soft run's map
@@ -34,8 +36,8 @@ class WindowOfRun(Part):
     run : str
     refused : str
         Why it does not enter; empty if it does.
-    arc_m : float
-        Path of the sample, m.
+    begin_m, arc_m : float
+        Where on the path its sample begins, and how long it is, m.
     values : mapping
         Quantities of the sample.
     load_map : tuple of float
@@ -45,6 +47,7 @@ class WindowOfRun(Part):
 
     run: str
     refused: str = ""
+    begin_m: float = 0.0
     arc_m: float = 0.0
     values: Mapping[str, float] = {}
     load_map: tuple[float, ...] = ()
@@ -59,7 +62,9 @@ class Round(Extrapolated):
     windows : sequence of WindowOfRun
         So far, in the order in which they were run.
     wanted : int
-        How many windows to run in all; as many as there were if this round is the last.
+        How many windows to run in all; as many as there were if no more are wanted.
+    whole : bool
+        Whether the whole drag is to be run at the physical modulus instead of more windows.
     last : bool
     """
 
@@ -68,106 +73,117 @@ class Round(Extrapolated):
     tolerance: Reached
     windows: tuple[WindowOfRun, ...]
     wanted: int
+    whole: bool = False
     last: bool
 
 
 # --- estimate ------------------------------------------------------------------------------------
 
 
-_CAUTION, _DOUBT = 1.5, 1.5
-"""Factor on the standard deviation between scenes, since a user's differs more from designed ones
-than they do from each other; and standard deviations between the windows and other scenes beyond
-which only the windows count. Both keep the level in scenes like no other (benchmarks)."""
-
 _MOST_PACKINGS = 999
 
-_RELATIVE = ("ratio_log", "ratio_log_std", "packing_std")
+_PASSES = 4
+"""In which slope and scatter about it are found from each other."""
 
 
 @dataclass(frozen=True)
-class Joined:
-    """A value at physical stiffness, and what it is made of.
+class Paired:
+    """A value at physical stiffness; all variances are relative to its square.
 
     Attributes
     ----------
     value : float
     window_variance : float
-        Of one window.
-    other_precision : float
-        One over the variance of the value by other scenes; 0 if they do not count.
+        Of one window about the regression on the soft run.
+    path_variance : float
+        What no window reduces: of the soft run's mean, times the slope, and of the slope itself.
     packing_variance : float
     degrees : float
         Degrees of freedom of `window_variance`.
+    whole_variance : float
+        To be expected of the mean over the whole path at the physical modulus.
     """
 
     value: float
     window_variance: float
-    other_precision: float
+    path_variance: float
     packing_variance: float
     degrees: float
+    whole_variance: float
 
-    def half_width(self, windows: int, packings: int = 1) -> float:
-        """Half-width of the 95 % interval with so many windows in each packing."""
-        precision = windows / self.window_variance + self.other_precision
-        variance = (1.0 / precision + self.packing_variance) / packings
-        return student_quantile(max(self.degrees, 1.0)) * math.sqrt(variance)
+    def relative_half_width(self, windows: int, packings: int = 1, scatter: float = 1.0) -> float:
+        """Of the 95 % interval with so many windows in each packing.
+
+        The scatter along the path may be taken as so many times what was found.
+        """
+        along = scatter**2 * (self.window_variance / windows + self.path_variance)
+        quantile = student_quantile(max(self.degrees, 1.0))
+        return quantile * math.sqrt((along + self.packing_variance) / packings)
+
+    def whole_half_width(self, scatter: float = 1.0) -> float:
+        """The same, to be expected of the whole drag at the physical modulus."""
+        return NORMAL_QUANTILE * math.sqrt(scatter**2 * self.whole_variance + self.packing_variance)
 
     def estimate(self, windows: int) -> Estimate:
         """The value with its interval."""
-        return Estimate.around(self.value, self.half_width(windows))
+        return Estimate.around(self.value, self.relative_half_width(windows) * abs(self.value))
+
+    @property
+    def root(self) -> "Paired":
+        """The root of the value: half of its relative errors along the path."""
+        variances = self.window_variance / 4.0, self.path_variance / 4.0, self.packing_variance
+        return Paired(
+            math.sqrt(self.value),
+            *variances,
+            self.degrees,
+            whole_variance=self.whole_variance / 4.0,
+        )
 
 
-def joined(windows: Sequence[float] | Floats, stretches: Floats, known: Known) -> Joined:
+def paired(windows: Floats, beside: Floats, stretches: Floats, known: Known) -> Paired:
     """The value from K windows and the soft run.
 
     Parameters
     ----------
-    windows : sequence of K floats
+    windows : (K,) ndarray
         Values of the windows.
+    beside : (K,) ndarray
+        Values of the soft run over the same stretches of the path.
     stretches : (B,) ndarray
-        Values of the soft run over stretches as long as a window's sample.
+        Values of the soft run over all stretches as long as a window's sample.
     known : Known
+        Of other scenes.
     """
-    value, soft = float(np.mean(windows)), float(np.mean(stretches))
-    relative = float(np.var(stretches / soft, ddof=1)) if len(stretches) > 1 else 0.0
-    degrees = known.degrees + len(windows) - 1
-    squares = known.degrees * known.variance_ratio * relative
-    squares += float(((np.asarray(windows) / value - 1.0) ** 2).sum())
-    own = value**2 * squares / degrees
-    other = soft * math.exp(known.ratio_log)
-    std = _CAUTION * known.ratio_log_std
-    spread = other**2 * (std**2 + relative / len(stretches))
-    agrees = abs(value - other) <= _DOUBT * math.sqrt(spread + own / len(windows))
-    precision = 1.0 / spread if agrees else 0.0
-    weight = len(windows) / own
-    mean = (weight * value + precision * other) / (weight + precision) if precision else value
-    return Joined(mean, own, precision, (mean * known.packing_std) ** 2, degrees)
+    count, mean, soft = len(windows), float(windows.mean()), float(stretches.mean())
+    here = float(beside.mean())
+    away, of_soft = windows / mean - 1.0, beside / here - 1.0
+    of_stretch = float(np.var(stretches / soft, ddof=1)) if len(stretches) > 1 else 0.0
+    degrees = known.degrees + count - 1
+
+    def about(slope: float) -> float:
+        squares = known.degrees * known.variance_ratio * of_stretch
+        return (squares + float(((away - slope * of_soft) ** 2).sum())) / degrees
+
+    slope, slope_variance, seen = known.slope, known.slope_std**2, float(of_soft @ of_soft)
+    for _ in range(_PASSES if slope_variance else 0):
+        if variance := about(slope):
+            slope_variance = 1.0 / (1.0 / known.slope_std**2 + seen / variance)
+            slope = known.slope / known.slope_std**2 + float(of_soft @ away) / variance
+            slope *= slope_variance
+    move = soft / here - 1.0
+    of_path = slope**2 * of_stretch / len(stretches) + slope_variance * move**2
+    value = mean * (1.0 + slope * move)
+    of_whole = (about(slope) + slope**2 * of_stretch) / len(stretches)
+    return Paired(value, about(slope), of_path, known.packing_std**2, degrees, of_whole)
 
 
-def joined_squares(windows: Floats, stretches: Floats, known: Known) -> Joined:
-    """The root of a mean square, from the squares of windows and of the soft run's stretches.
-
-    `known` is of the root, whose relative errors are half of those of the square.
-    """
-    doubled = {name: 2.0 * getattr(known, name) for name in _RELATIVE}
-    found = joined(windows, stretches, known.model_copy(update=doubled))
-    scale = 4.0 * found.value  # the square of the derivative of the square by its root
-    return Joined(
-        math.sqrt(found.value),
-        found.window_variance / scale,
-        found.other_precision * scale,
-        found.packing_variance / scale,
-        found.degrees,
-    )
-
-
-def windows_needed(found: Joined, windows: int, tolerance: float, most: int) -> Need:
+def windows_needed(value: Paired, windows: int, tolerance: float, most: int) -> Need:
     """How many windows, at most so many, or else packings bring the half-width to a tolerance."""
-    limit = tolerance * abs(found.value)
-    enough = next((n for n in range(1, most + 1) if found.half_width(n) <= limit), most)
-    packings = 1
-    while packings < _MOST_PACKINGS and found.half_width(enough, packings) > limit:
-        packings += 1
+    enough = next(
+        (n for n in range(1, most + 1) if value.relative_half_width(n) <= tolerance), most
+    )
+    packings = math.ceil((value.relative_half_width(enough) / tolerance) ** 2)
+    packings = min(max(packings, 1), _MOST_PACKINGS)
     return Need(max(enough, windows), packings)
 
 

@@ -1,17 +1,16 @@
 """What the windows of a run give at the physical Young's modulus, and whether that is enough."""
 
-import math
 from pathlib import Path
 
 from dragchain.quantities.document import (
     EXTRAPOLATED,
     MEASURED_FILE,
     Extrapolated,
-    Need,
     Reached,
     RunQuantities,
 )
 from dragchain.windows.estimate import Round
+from dragchain.windows.rounds import reached_by
 from dragdeck.records.case import CaseOfRun, load_case
 
 
@@ -44,16 +43,6 @@ def _reached(case: CaseOfRun, quantities: RunQuantities) -> Reached | None:
     asked = case.asked
     if asked is None or asked.error is not None:
         return None
-    physical = case.fidelity.youngs_modulus_scale == 1.0
-    values = quantities.values_of_run if physical else {}
-    widths = [
-        values[name].relative_half_width if name in values else math.inf
-        for name in asked.quantities
-    ]
-    worst = max(widths) / asked.tolerance
-    return Reached(
-        tolerance=asked.tolerance,
-        asked=asked.quantities,
-        reached=worst <= 1.0,
-        needed=Need(0, math.ceil(worst**2) if math.isfinite(worst) else 1),
-    )
+    if case.fidelity.youngs_modulus_scale != 1.0:
+        quantities = quantities.model_copy(update={"values_of_run": {}})
+    return reached_by(quantities, asked.tolerance, asked.quantities)

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -20,12 +21,11 @@ from dragchain.quantities.registry import MEASURED, Quantity
 from dragchain.statistics.estimate import Estimate
 from dragchain.tables.by_step import read_table
 from dragchain.windows.estimate import (
-    Joined,
+    Paired,
     Round,
     WindowOfRun,
     corrected_map,
-    joined,
-    joined_squares,
+    paired,
     windows_needed,
 )
 
@@ -34,6 +34,10 @@ _FEWEST = 2
 
 _MOST_MORE = 2.0
 """A round has at most so many times the windows of the one before."""
+
+_DOUBT = 0.8
+"""Scatter along the path, over that found so far, with which a forecast must meet the tolerance for
+more to be run: a first round knows it to some 20 %."""
 
 _NONE = Estimate(math.nan, math.nan, math.nan)
 
@@ -48,6 +52,8 @@ def judge_windows(
     tolerance: float,
     quantities: Sequence[str],
     most: int,
+    lengths: float,
+    drag: Path | None,
     out: Path,
 ) -> None:
     """Write what the windows of a run say of its quantities at physical stiffness.
@@ -64,6 +70,10 @@ def judge_windows(
         To which the tolerance applies.
     most : int
         Number of windows that there can be.
+    lengths : float
+        How many windows cost as much as the whole drag.
+    drag : Path or None
+        Folder of the whole drag at the physical modulus, if it was run.
     out : Path
         The file to write.
 
@@ -73,40 +83,59 @@ def judge_windows(
         A run has no ``quantities.json``.
     """
     soft = RunQuantities.read(run_dir / MEASURED_FILE)
-    measured = [_measured(folder) for folder in windows]
-    judged(soft, measured, tolerance, quantities, most, WindowsRecord.shipped()).write(out)
+    measured = [measured_window(folder) for folder in windows]
+    asked = Asked(tolerance, tuple(quantities), most, lengths)
+    judged_round = judged(soft, measured, asked, WindowsRecord.shipped())
+    if drag is not None:
+        judged_round = with_drag(judged_round, RunQuantities.read(drag / MEASURED_FILE), asked)
+    judged_round.write(out)
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What the windows of a run are run for; see `judge_windows`."""
+
+    tolerance: float
+    quantities: tuple[str, ...]
+    most: int
+    lengths: float
 
 
 def judged(
-    soft: PathQuantities,
-    windows: Sequence[WindowOfRun],
-    tolerance: float,
-    asked: Sequence[str],
-    most: int,
-    record: WindowsRecord,
+    soft: PathQuantities, windows: Sequence[WindowOfRun], asked: Asked, record: WindowsRecord
 ) -> Round:
-    """The round that these windows are; see `judge_windows`."""
+    """The round that these windows are; see `judge_windows`.
+
+    Another round follows if it is expected to meet the tolerance: with as many windows as are
+    needed for that, at most twice as many as so far; or with the whole drag, where that costs less
+    or windows cannot do it. Where neither can, this round is the last.
+    """
     good = [window for window in windows if not window.refused]
-    values, needs = {}, [Need(_FEWEST, 1)]
-    for quantity, join in _joined(soft, good, record):
-        value = join.estimate(len(good))
+    values, pairs = dict[str, Estimate](), []
+    for quantity, pair in _paired(soft, good, record):
+        value = pair.estimate(len(good))
         if value.known:
             values[quantity.name] = value
-        if quantity.name in asked:
-            needs.append(windows_needed(join, len(good), tolerance, most))
-    widths = {name: value.relative_half_width for name, value in values.items()}
-    reached = len(good) >= _FEWEST and all(
-        widths.get(name, math.inf) <= tolerance for name in asked
-    )
-    need = Need(*(max(numbers) for numbers in zip(*needs, strict=True)))
-    last = reached or len(windows) >= most
-    wanted = len(windows) + max(1, need.windows - len(good))
-    wanted = min(wanted, math.ceil(_MOST_MORE * len(windows)), most)
+        if quantity.name in asked.quantities:
+            pairs.append(pair)
+    widths = [values[name].relative_half_width if name in values else math.inf
+              for name in asked.quantities]  # fmt: skip
+    reached = len(good) >= _FEWEST and max(widths) <= asked.tolerance
+    needs = [windows_needed(pair, len(good), asked.tolerance, asked.most) for pair in pairs]
+    need = Need(*(max(numbers) for numbers in zip(Need(_FEWEST, 1), *needs, strict=True)))
+    more = max(1, need.windows - len(good))
+    of_drag = max((pair.whole_half_width(_DOUBT) for pair in pairs), default=math.inf)
+    of_windows = max((pair.relative_half_width(need.windows, scatter=_DOUBT) for pair in pairs),
+                     default=0.0)  # fmt: skip
+    by_windows = len(windows) < asked.most and of_windows <= asked.tolerance
+    by_drag = of_drag <= asked.tolerance and not (by_windows and more <= asked.lengths)
+    last = reached or not (by_windows or by_drag)
+    wanted = min(len(windows) + more, math.ceil(_MOST_MORE * len(windows)), asked.most)
     return Round(
         values=values,
         tolerance=Reached(
-            tolerance=tolerance,
-            asked=tuple(asked),
+            tolerance=asked.tolerance,
+            asked=asked.quantities,
             reached=reached,
             needed=need,
             runs=tuple(window.run for window in good),
@@ -114,8 +143,44 @@ def judged(
         ),
         load_map=_load_map(soft, good, values),
         windows=tuple(windows),
-        wanted=len(windows) if last else wanted,
+        wanted=len(windows) if last or by_drag else wanted,
+        whole=by_drag and not last,
         last=last,
+    )
+
+
+def with_drag(before: Round, drag: RunQuantities, asked: Asked) -> Round:
+    """The last round, which the whole drag at the physical modulus ends.
+
+    A drag that failed leaves what the windows say.
+    """
+    if not drag.complete:
+        refused = {**before.tolerance.refused, drag.run: drag.why_failed or "not complete"}
+        update = {"refused": refused}
+        tolerance = before.tolerance.model_copy(update=update)
+        return before.model_copy(update={"tolerance": tolerance, "whole": False, "last": True})
+    return Round(
+        values={name: value for name, value in drag.values_of_run.items() if value.known},
+        tolerance=reached_by(drag, asked.tolerance, asked.quantities).model_copy(
+            update={"runs": (drag.run,), "whole": True, "refused": before.tolerance.refused}
+        ),
+        windows=before.windows,
+        wanted=before.wanted,
+        whole=False,
+        last=True,
+    )
+
+
+def reached_by(run: RunQuantities, tolerance: float, asked: Sequence[str]) -> Reached:
+    """Whether a run at the physical modulus gives what was asked for."""
+    values = run.values_of_run
+    widths = [values[name].relative_half_width if name in values else math.inf for name in asked]
+    worst = max(widths) / tolerance
+    return Reached(
+        tolerance=tolerance,
+        asked=tuple(asked),
+        reached=worst <= 1.0,
+        needed=Need(0, math.ceil(worst**2) if math.isfinite(worst) else 1),
     )
 
 
@@ -127,22 +192,25 @@ def _load_map(
     return corrected_map(soft.load_map, [window.load_map for window in windows], total, runs)
 
 
-def _joined(
+def _paired(
     soft: PathQuantities, windows: Sequence[WindowOfRun], record: WindowsRecord
-) -> Iterator[tuple[Quantity, Joined]]:
+) -> Iterator[tuple[Quantity, Paired]]:
     """Each quantity at physical stiffness that the soft run and all windows have."""
     known_of_all = [soft.values(), *(window.values for window in windows)]
     for quantity in MEASURED if len(windows) >= _FEWEST else ():
         if quantity.name == "peaks":  # they stand out of the drag's long waves, which windows lack
             continue
         if all(quantity.name in values for values in known_of_all):
-            join = joined_squares if quantity.squared else joined
-            known = record.quantities.get(quantity.name, UNKNOWN)
-            stretches = _stretches(soft, quantity.name, windows[0].arc_m)
-            yield quantity, join(_of_windows(quantity, windows), stretches, known)
+            pair = paired(
+                of_windows(quantity, windows),
+                beside(soft, quantity.name, windows),
+                stretches(soft, quantity.name, windows[0].arc_m),
+                record.quantities.get(quantity.name, UNKNOWN),
+            )
+            yield quantity, pair.root if quantity.squared else pair
 
 
-def _of_windows(quantity: Quantity, windows: Sequence[WindowOfRun]) -> Floats:
+def of_windows(quantity: Quantity, windows: Sequence[WindowOfRun]) -> Floats:
     """A quantity in each window, its square where its blocks hold squares.
 
     In a window, the drag deviates from a mean of its own. What waves longer than its sample add to
@@ -156,7 +224,23 @@ def _of_windows(quantity: Quantity, windows: Sequence[WindowOfRun]) -> Floats:
     return np.asarray(own + away)
 
 
-def _stretches(soft: PathQuantities, name: str, arc_m: float) -> Floats:
+def beside(soft: PathQuantities, name: str, windows: Sequence[WindowOfRun]) -> Floats:
+    """Means of a quantity's blocks of the soft run where the windows sample, (K,).
+
+    Where the soft run has none, its mean.
+    """
+    blocks = soft.of_blocks(name)
+    begins = [(window.begin_m - soft.begin_m) / soft.block_m for window in windows]
+    means = np.array(
+        [
+            blocks.between(begin, begin + window.arc_m / soft.block_m).mean
+            for begin, window in zip(begins, windows, strict=True)
+        ]
+    )
+    return np.where(np.isfinite(means), means, blocks.mean)
+
+
+def stretches(soft: PathQuantities, name: str, arc_m: float) -> Floats:
     """Means of a quantity's blocks over stretches of the soft run as long as a window's sample."""
     blocks = soft.of_blocks(name)
     each = max(1, round(arc_m / soft.block_m))
@@ -164,14 +248,24 @@ def _stretches(soft: PathQuantities, name: str, arc_m: float) -> Floats:
     return means[np.isfinite(means)]
 
 
-def _measured(folder: Path) -> WindowOfRun:
+def measured_window(folder: Path) -> WindowOfRun:
     """A window with its quantities; refused if it failed or its bed has not come to rest."""
     run = RunQuantities.read(folder / MEASURED_FILE)
-    window = WindowOfRun(run=folder.name, cpu_time_s=run.cost.cpu_time_s)
-    if not run.complete:
-        return window.model_copy(update={"refused": run.why_failed or "not complete"})
-    measured = {"arc_m": run.arc_m, "values": run.values(), "refused": unsettled(folder)}
-    return window.model_copy(update={**measured, "load_map": run.load_map})
+    window = window_of(run)
+    refused = unsettled(folder) if run.complete else run.why_failed or "not complete"
+    return window.model_copy(update={"run": folder.name, "refused": refused})
+
+
+def window_of(run: RunQuantities) -> WindowOfRun:
+    """A window from its quantities."""
+    return WindowOfRun(
+        run=run.run,
+        begin_m=run.begin_m,
+        arc_m=run.arc_m,
+        values=run.values(),
+        load_map=run.load_map,
+        cpu_time_s=run.cost.cpu_time_s,
+    )
 
 
 def unsettled(folder: Path) -> str:

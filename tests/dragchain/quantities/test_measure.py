@@ -69,7 +69,9 @@ def test_a_mean_belongs_to_the_longest_waves() -> None:
     assert band_pass(wave(5.0) + 3.0, SPACING, 0.0, 2.0) == pytest.approx(0.0, abs=1e-12)
 
 
-PATH = CountedPath(first_step=100, last_step=500, length_m=0.04, diameter_m=0.01, blocks=4)
+PATH = CountedPath(
+    first_step=100, last_step=500, begin_m=0.0, length_m=0.04, diameter_m=0.01, blocks=4
+)
 
 
 def test_a_step_belongs_to_the_block_that_it_ends_in() -> None:

@@ -7,10 +7,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dragchain.quantities.document import PathQuantities
+from dragchain.quantities.document import PathQuantities, RunQuantities
 from dragchain.quantities.known import WindowsRecord
+from dragchain.statistics.estimate import Estimate
 from dragchain.windows.estimate import Round, WindowOfRun
-from dragchain.windows.rounds import judged, unsettled
+from dragchain.windows.rounds import Asked, judged, unsettled, with_drag
 
 RECORD = WindowsRecord.shipped()
 SOFT = PathQuantities(
@@ -29,7 +30,15 @@ def windows(values: Sequence[float]) -> list[WindowOfRun]:
 
 
 def judge(values: Sequence[float], tolerance: float, most: int = 16) -> Round:
-    return judged(SOFT, windows(values), tolerance, ["workpiece_contacts"], most, RECORD)
+    return judged(SOFT, windows(values), asked(tolerance, most), RECORD)
+
+
+def asked(
+    tolerance: float, most: int = 16, lengths: float = 99.0,
+    quantities: tuple[str, ...] = ("workpiece_contacts",),
+) -> Asked:  # fmt: skip
+    """What is asked for; the whole drag is dearer than all windows by default."""
+    return Asked(tolerance, quantities, most, lengths)
 
 
 def test_it_stops_when_the_tolerance_is_reached() -> None:
@@ -56,10 +65,49 @@ def test_the_last_window_is_the_last() -> None:
     )
 
 
+@pytest.mark.parametrize(("lengths", "whole"), [(0.5, True), (99.0, False)])
+def test_the_whole_drag_goes_on_where_it_is_cheaper(lengths: float, whole: bool) -> None:
+    next_round = judged(SOFT, windows([15.0, 16.5, 13.5]), asked(0.085, lengths=lengths), RECORD)
+    assert (next_round.whole, next_round.last) == (whole, False)
+    assert (next_round.wanted == 3) == whole
+
+
+def test_the_whole_drag_goes_on_where_no_window_is_left() -> None:
+    ended = judged(SOFT, windows([15.0, 17.5, 12.5]), asked(0.085, most=3), RECORD)
+    assert ended.whole and not ended.last
+
+
+def test_what_nothing_can_reach_is_said_after_the_round_that_shows_it() -> None:
+    ended = judge([15.0, 19.0, 11.0], 0.01)
+    assert ended.last and not ended.whole and not ended.tolerance.reached
+    assert ended.tolerance.needed.packings > 30
+
+
+def test_the_whole_drag_gives_its_own_values(small_run: RunQuantities) -> None:
+    drag = small_run
+    before = judged(SOFT, windows([15.0, 16.5, 13.5]), asked(0.085, lengths=0.5), RECORD)
+    ended = with_drag(before, drag, asked(0.085))
+    assert ended.last and ended.tolerance.whole and ended.tolerance.runs == (drag.run,)
+    assert ended.values == drag.values_of_run and ended.tolerance.reached
+    failed = drag.model_copy(update={"complete": False})
+    kept = with_drag(before, failed, asked(0.085))
+    assert kept.last and not kept.tolerance.whole and kept.values == before.values
+    assert drag.run in kept.tolerance.refused
+
+
+@pytest.fixture
+def small_run() -> RunQuantities:
+    """The whole drag of the scene."""
+    contacts = Estimate.around(15.0, 1.0)
+    return RunQuantities.model_construct(
+        run="whole", complete=True, failure=(), values_of_run={"workpiece_contacts": contacts}
+    )
+
+
 def test_a_refused_window_does_not_enter_and_is_made_up_for() -> None:
     good = windows([15.0, 15.1, 14.9, 15.0])
     bad = good[3].model_copy(update={"refused": "lost", "values": {"workpiece_contacts": 99.0}})
-    found = judged(SOFT, [*good[:3], bad], 0.05, ["workpiece_contacts"], 16, RECORD)
+    found = judged(SOFT, [*good[:3], bad], asked(0.068), RECORD)
     assert found.values["workpiece_contacts"].value == pytest.approx(15.0)
     assert found.tolerance.runs == ("w-0", "w-1", "w-2")
     assert found.tolerance.refused == {"w-3": "lost"}
@@ -69,13 +117,15 @@ def test_a_refused_window_does_not_enter_and_is_made_up_for() -> None:
 def test_a_quantity_that_a_window_lacks_is_never_reached() -> None:
     some = windows([15.0, 15.0, 15.0])
     some[1] = some[1].model_copy(update={"values": {}})
-    found = judged(SOFT, some, 0.5, ["workpiece_contacts"], 3, RECORD)
+    found = judged(SOFT, some, asked(0.5, 3), RECORD)
     assert not found.tolerance.reached and not found.values
 
 
 def test_an_asked_quantity_that_the_run_lacks_is_never_reached() -> None:
     every = windows([15.0, 15.0, 15.0])
-    found = judged(SOFT, every, 0.5, ["workpiece_contacts", "drag_mean"], 3, RECORD)
+    found = judged(
+        SOFT, every, asked(0.5, 3, quantities=("workpiece_contacts", "drag_mean")), RECORD
+    )
     assert not found.tolerance.reached and found.tolerance.asked == (
         "workpiece_contacts",
         "drag_mean",
@@ -91,7 +141,7 @@ def test_the_drag_fluctuates_between_windows_as_within_them() -> None:
         for mean in (-1.0, -2.0, -3.0)
     ]
     soft = SOFT.model_copy(update={"blocks": blocks})
-    values = judged(soft, some, 0.5, [], 3, RECORD).values
+    values = judged(soft, some, asked(0.5, 3, quantities=("drag_std",)), RECORD).values
     within, between = 1.0, 1.0
     assert values["drag_std"].value == pytest.approx((within + between) ** 0.5)
 

@@ -42,6 +42,13 @@ SEVERAL = ["drag_mean", "workpiece_contacts"]
 
 
 @pytest.fixture
+def small(small: dict[str, Any]) -> dict[str, Any]:
+    """The small study in a bowl in which no particle jams."""
+    small["bowl"]["radius_m"] = 0.028
+    return small
+
+
+@pytest.fixture
 def tradeoff() -> TradeoffRecord:
     return made_tradeoff()
 
@@ -50,6 +57,17 @@ def tradeoff() -> TradeoffRecord:
 def paper() -> Case:
     """A slow drag along a long path."""
     return Project(ROOT).cases("uhlmann2015")[0]
+
+
+def test_no_tolerance_is_promised_where_particles_may_jam(
+    made: Made, tradeoff: TradeoffRecord
+) -> None:
+    deep = {"motion.immersion_depth_m": 0.028}
+    for narrow in ({"bowl.radius_m": 0.025}, deep):
+        with pytest.raises(InputError, match="jam") as caught:
+            resolve(made(narrow), asked(), tradeoff)
+        assert caught.value.field == "fidelity.tolerance"
+    resolve(made(deep), asked(0.1, quantity="restitution"), tradeoff)
 
 
 def asked(tolerance: float = 0.1, **more: Any) -> Tolerance:

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import pytest
+from made_study import Made
 
 from dragdeck.advice.advise import advised_settings, with_option
 from dragdeck.cases.case import Case
@@ -22,9 +23,10 @@ def test_the_default_of_two_ranks_is_one_on_a_single_core(
 
 @pytest.mark.parametrize("cores", ["1", "8"])
 def test_advised_runs_of_a_small_bowl_have_one_rank(
-    case: Case, monkeypatch: pytest.MonkeyPatch, cores: str
+    made: Made, monkeypatch: pytest.MonkeyPatch, cores: str
 ) -> None:
     monkeypatch.setenv(CORES_VARIABLE, cores)
+    case = made({"bowl.radius_m": 0.028})
     for tolerance in (0.001, 0.5):
         found = advised_settings(case, Tolerance(tolerance=tolerance), measured_tradeoff())
         assert replace(case, study=with_option(case.study, found.chosen)).ranks == 1

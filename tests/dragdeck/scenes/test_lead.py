@@ -15,7 +15,7 @@ from dragdeck.cases.case import Case, of_each_workpiece
 from dragdeck.errors import InputError
 from dragdeck.project import Project
 from dragdeck.scenes.filling import FILLING
-from dragdeck.scenes.lead import RAMP_STAGES, covered, step_at, windows_of, with_lead
+from dragdeck.scenes.lead import RAMP_STAGES, covered, spread_out, step_at, windows_of, with_lead
 from dragdeck.scenes.motion import course
 from dragdeck.scenes.process import PROCESS, process_scene
 from dragdeck.scenes.workpiece import reference_height
@@ -174,11 +174,16 @@ def test_a_fraction_of_the_drag_has_its_step() -> None:
     assert [step_at(fraction, drag) for fraction in (0, 0.25, 1)] == [100, 200, 500]
 
 
-def test_the_first_windows_are_spread_over_the_path(made: Make) -> None:
-    begins = [one.stretch.begin for one in windows_of(made(SOFT))]
-    assert begins[0] == min(begins)
-    middle = 0.5 * (min(begins) + max(begins))
-    assert abs(begins[1] - middle) == pytest.approx(min(abs(one - middle) for one in begins))
+@pytest.mark.parametrize("count", [0, 1, 3, 4, 7, 16, 17, 64])
+def test_the_first_windows_are_spread_over_the_path(count: int) -> None:
+    """All are there once; the first three, six and nine are symmetric but for rounding."""
+    order = spread_out(count)
+    assert sorted(order) == list(range(count))
+    for first in (3, 5, 7, 9):
+        if count > first:
+            assert abs(2 * sum(order[:first]) / first - (count - 1)) <= 1.0
+    if count == 16:
+        assert sorted(order[:3]) == [2, 8, 13]
 
 
 def test_a_tolerance_does_not_name_a_run(made: Make) -> None:

@@ -12,15 +12,14 @@ from made_study import plain_study
 from paths import ROOT, SNAKEFILES
 
 from dragchain.errors import SeriesError
-from dragchain.quantities.document import RunCost
+from dragchain.quantities.document import RunCost, RunQuantities
 from dragchain.quantities.known import WindowsRecord
-from dragchain.windows.estimate import joined
 from dragdeck.physics.contact_mechanics import damping_ratio
 from dragdeck.records.case import FidelityOfRun
 from dragdeck.records.stability import StableStepRecord
 from dragdeck.study.model import Study
 from evidence.__main__ import COMMANDS, main
-from evidence.windows.record import SceneRun, read_scenes, windows_record
+from evidence.windows.record import SceneRun, Windowed, read_scenes, read_windows, windows_record
 
 DATA = ROOT / "workflow/dragdeck/data"
 COST = RunCost(steps=1, wall_time_s=1, cpu_time_s=1, ranks=1, timestep_s=1e-6, axis_speed_m_s=0.1,
@@ -55,77 +54,117 @@ def made_run(
     )  # fmt: skip
 
 
-def archive(file: Path, runs: list[SceneRun]) -> Path:
+def archive(file: Path, runs: dict[str, RunQuantities]) -> Path:
+    """An archive of runs by their names in it."""
     with tarfile.open(file, "w:xz") as out:
-        for number, run in enumerate(runs):
+        for name, run in runs.items():
             text = run.as_text().encode()
-            info = tarfile.TarInfo(f"made/{number:03}.json")
+            info = tarfile.TarInfo(f"{name}.json")
             info.size = len(text)
             out.addfile(info, io.BytesIO(text))
     return file
 
 
-def scenes(ratios: list[float], packing: float = 0.0, seeds: int = 2) -> list[SceneRun]:
+def numbered(runs: list[SceneRun]) -> dict[str, RunQuantities]:
+    return {f"made/{number:03}": run for number, run in enumerate(runs)}
+
+
+def scenes(packing: float = 0.0, number: int = 6, seeds: int = 2) -> list[SceneRun]:
     return [
-        made_run(scene, scale, seed, ratio=ratio, packing=packing)
-        for scene, ratio in enumerate(ratios)
+        made_run(scene, scale, seed, ratio=1.1, packing=packing)
+        for scene in range(number)
         for scale in (1.0, 0.001)
         for seed in range(seeds)
     ]
 
 
+SLOPE, ABOUT, WINDOWS = 0.7, 0.5, 12
+"""Of windows on the soft run; variance about it over that of the soft run's stretches."""
+
+
+def with_windows(ratios: list[float]) -> dict[str, RunQuantities]:
+    """A soft run of so many blocks and as many windows in each scene, by their names."""
+    runs = dict[str, RunQuantities]()
+    for scene, ratio in enumerate(ratios):
+        rng = np.random.default_rng([7, scene])
+        noise, rest = 0.1 * rng.normal(size=(2, WINDOWS))
+        base = made_run(scene, 0.001, 0, ratio=ratio).model_copy(update={"stability_number": None})
+        soft = base.model_copy(
+            update={"arc_m": float(WINDOWS), "block_m": 1.0,
+                    "blocks": {"drag_mean": tuple(-2.0 * (1 + noise))}}
+        )  # fmt: skip
+        runs[f"{scene}/soft"] = soft
+        for place, value in enumerate(-2.0 * ratio * (1 + SLOPE * noise + ABOUT**0.5 * rest)):
+            runs[f"{scene}/{place}"] = base.model_copy(
+                update={"run": f"{place}", "begin_m": float(place), "arc_m": 1.0, "block_m": 1.0,
+                        "blocks": {"drag_mean": (value,)}}
+            )  # fmt: skip
+    return runs
+
+
+def windowed(ratios: list[float], folder: Path) -> list[Windowed]:
+    return read_windows(archive(folder / "windows.tar.xz", with_windows(ratios)))
+
+
 def test_the_command_makes_records_that_the_product_reads(tmp_path: Path) -> None:
-    """Of small made-up inputs of which ratio and law are known."""
-    runs = [*scenes([1.1] * 6), made_run(0, 1.0, 9, ratio=1.1, speed=2.0)]
+    """Of small made-up inputs of which ratio, slope and law are known."""
+    runs = [*scenes(), made_run(0, 1.0, 9, ratio=1.1, speed=2.0)]
     half = len(runs) // 2
     files = [
-        archive(tmp_path / "a.tar.xz", runs[:half]),
-        archive(tmp_path / "b.tar.xz", runs[half:]),
+        archive(tmp_path / "drawn.tar.xz", with_windows([1.1] * 12)),
+        archive(tmp_path / "a.tar.xz", numbered(runs[:half])),
+        archive(tmp_path / "b.tar.xz", numbered(runs[half:])),
     ]
     assert main(["record-scenes", "--out", str(tmp_path), *map(str, files)]) == 0
     record = WindowsRecord.read(tmp_path / "windows.json")
-    assert list(record.quantities) == ["drag_mean"]  # no run has all blocks of the contacts
-    assert record.measured == "2026-01-15" and record.source.endswith(": a.tar.xz, b.tar.xz")
+    assert list(record.quantities) == ["drag_mean"]
+    assert record.measured == "2026-01-21"
+    assert record.source.endswith(": drawn.tar.xz, a.tar.xz, b.tar.xz")
     drag = record.quantities["drag_mean"]
-    assert drag.ratio_log == pytest.approx(math.log(1.1), abs=0.01)
-    assert 0 < drag.ratio_log_std < 0.02 and drag.degrees == 10
-    assert drag.variance_ratio == pytest.approx(1, abs=0.15)
+    assert drag.ratio_log == pytest.approx(math.log(1.1), abs=0.02)
+    assert 0 < drag.ratio_log_std < 0.03
+    assert drag.slope == pytest.approx(SLOPE, abs=2 * drag.slope_std)
+    assert 0 < drag.slope_std < 0.25
+    assert drag.variance_ratio == pytest.approx(ABOUT, rel=0.4) and drag.degrees > 5
     assert drag.correlation == pytest.approx(0.0, abs=0.1)  # blocks are drawn independently
-    assert joined([2.0, 2.1], np.full(9, 1.85), drag).value == pytest.approx(2.04, abs=0.03)
     law = StableStepRecord.read(tmp_path / "stable_step.json").stable_step
     assert {name: getattr(law, name) for name in LAW} == pytest.approx(LAW, rel=1e-3)
     assert law.runs == len(runs) and law.scatter < 1e-4
 
 
 @pytest.mark.parametrize(
-    ("ratios", "packing", "std", "between"),
-    [
-        ([1.0, 1.1, 1.0, 1.1, 1.0, 1.1], 0.0, (0.04, 0.08), (0.0, 0.01)),
-        ([1.0, 1.5, 1.0, 1.5, 1.0, 1.5], 0.0, (math.inf, math.inf), (0.0, 0.01)),
-        ([1.1] * 20, 0.1, (0.01, 0.08), (0.07, 0.13)),
-    ],
+    ("ratios", "std"), [([1.0, 1.1] * 3, (0.04, 0.08)), ([1.0, 1.5] * 3, (math.inf, math.inf))]
 )
-def test_scatter_between_scenes_and_packings_is_kept_apart(
-    ratios: list[float], packing: float, std: tuple[float, float], between: tuple[float, float]
+def test_a_ratio_that_scatters_between_scenes_says_little(
+    ratios: list[float], std: tuple[float, float], tmp_path: Path
 ) -> None:
-    runs = scenes(ratios, packing, seeds=4)
-    by_scene = [[run for run in runs if run.run.startswith(f"{k}-")] for k in range(len(ratios))]
-    drag = windows_record(by_scene, []).quantities["drag_mean"]
+    drag = windows_record([], windowed(ratios, tmp_path), []).quantities["drag_mean"]
     assert std[0] <= drag.ratio_log_std <= std[1]
-    # seeds at one time step are compared, 0 with 3
+
+
+@pytest.mark.parametrize(("packing", "between"), [(0.0, (0.0, 0.01)), (0.1, (0.07, 0.13))])
+def test_scatter_between_packings_is_that_beyond_the_path(
+    packing: float, between: tuple[float, float], tmp_path: Path
+) -> None:
+    """Seeds at one time step are compared, 0 with 3."""
+    number = 20 if packing else 6
+    runs = scenes(packing, number, seeds=4)
+    by_scene = [[run for run in runs if run.run.startswith(f"{k}-")] for k in range(number)]
+    drag = windows_record(by_scene, windowed([1.1] * 6, tmp_path), []).quantities["drag_mean"]
     assert between[0] <= drag.packing_std <= between[1]
 
 
 def test_too_few_scenes_make_no_record(tmp_path: Path) -> None:
-    few = read_scenes([archive(tmp_path / "few.tar.xz", scenes([1.1] * 4))])
+    few = read_scenes([archive(tmp_path / "few.tar.xz", numbered(scenes(number=4)))])
     assert len(few) == 4
     with pytest.raises(SeriesError, match="5 scenes"):
-        windows_record(few, [])
+        windows_record(few, windowed([1.1] * 4, tmp_path), [])
 
 
 @pytest.mark.slow
 def test_the_shipped_records_are_those_of_the_archives(tmp_path: Path) -> None:
-    archives = sorted((ROOT / "docs/data/scenes").glob("*.tar.xz"))
+    windows = ROOT / "docs/data/windows/drawn.tar.xz"
+    archives = [windows, *sorted((ROOT / "docs/data/scenes").glob("*.tar.xz"))]
     assert main(["record-scenes", "--out", str(tmp_path), *map(str, archives)]) == 0
     for name in ("windows.json", "stable_step.json"):
         assert (tmp_path / name).read_text() == (DATA / name).read_text()

@@ -30,8 +30,10 @@ from dragdeck.scenes.lead import FIRST_WINDOWS, covered_fraction, window_count, 
 from dragdeck.scenes.motion import plunge_point
 from dragdeck.scenes.workpiece import (
     FACET_STEP_S,
+    JAMMING_GAP,
     PARTICLE_STEPS_PER_S,
     describe,
+    may_jam,
     process_cautions,
     workpiece_facets,
 )
@@ -281,7 +283,23 @@ def process_option(case: Case, requested: Tolerance, tradeoff: TradeoffRecord) -
     A soft run over the whole path, and windows at the physical modulus until the tolerance is met.
     Where a few of them would take most of the path, or the material is so soft that nothing is
     saved, a run at the physical modulus.
+
+    Raises
+    ------
+    InputError
+        Particles may jam between workpiece and bowl: a few events decide the means then, and
+        neither the soft run nor the windows need contain one.
     """
+    if may_jam(_with(case), expected_surface(case.study)):
+        raise InputError(
+            "a tolerance cannot be promised where particles may jam",
+            file=case.file,
+            field="fidelity.tolerance",
+            value=requested.tolerance,
+            limit=f"a gap of at least {JAMMING_GAP:g} particle diameters between workpiece and "
+            "bowl, wall and floor",
+            remedy="use a larger gap, or fidelity: {youngs_modulus_scale: 1} with several seeds",
+        )
     stiff, soft = stiff_settings(case), soft_settings(case)
     work = Work.of(case, tradeoff)
     plain = work.cpu_time(plain_option(case).fidelity)

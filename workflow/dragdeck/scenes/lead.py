@@ -84,18 +84,40 @@ def windows_of(case: Case) -> list[Case]:
     and samples a stretch. Any number of the first ones is spread over the path. Those of a further
     workpiece are those of the run, seen from it.
     """
-    lead, windows = with_lead(case.all_workpieces), []
-    if lead.study.chosen_fidelity().windows is None:
-        return []
+    count, lead = window_count(case.study), with_lead(case.all_workpieces)
+    length = window_fraction(case.study) if count else 0.0
+    return [
+        _from_mark(lead, case.number, mark, length, f"window-{mark + 1}", rank)
+        for rank, mark in enumerate(spread_out(count), 1)
+    ]
+
+
+def whole_drag(case: Case) -> list[Case]:
+    """The whole counted path at the physical modulus, instead of windows where these cost more.
+
+    It begins at the first mark of the case's own run, which is its soft start. A list of one case,
+    or of none if the fidelity asks for no windows.
+    """
+    count, lead = window_count(case.study), with_lead(case.all_workpieces)
+    rank = FIRST_WINDOWS + count + 1
+    return [_from_mark(lead, case.number, 0, 1.0, "whole-drag", rank)] if count else []
+
+
+def _from_mark(lead: Case, number: int, mark: int, length: float, part: str, rank: int) -> Case:
+    """A run at the physical modulus that goes on at a mark of a softer one; seen from a workpiece.
+
+    The number of the workpiece is 0 for that of all.
+    """
+    begin = lead.stretch.marks[mark]
+    stretch = Stretch(begin, min(begin + length, 1.0))
     study = _window_study(lead.study)
-    length = (_before_s(study) + _sample_s(study)) / driven(study).drive.duration_s
-    for rank, number in enumerate(_spread_out(len(lead.stretch.marks)), 1):
-        begin = lead.stretch.marks[number]
-        stretch = Stretch(begin, min(begin + length, 1.0))
-        window = replace(lead, study=study, stretch=stretch, lead=lead)
-        window = replace(window, part=f"window-{number + 1}", rank_of_window=rank)
-        windows.append(of_each_workpiece(window)[case.number - 1] if case.number else window)
-    return windows
+    run = replace(lead, study=study, stretch=stretch, lead=lead, part=part, rank_of_window=rank)
+    return of_each_workpiece(run)[number - 1] if number else run
+
+
+def whole_lengths(study: Study) -> float:
+    """How many windows cost as much as the whole drag at the physical modulus."""
+    return (1.0 - _marks(study)[0]) / window_fraction(study)
 
 
 def _too_short(case: Case) -> InputError:
@@ -133,7 +155,11 @@ def covered_fraction(study: Study) -> float:
 
 def with_leads(cases: Iterable[Case]) -> list[Case]:
     """Cases, each after the case of its lead and before its windows."""
-    every = (part for case in cases for part in (with_lead(case).lead, case, *windows_of(case)))
+    every = (
+        part
+        for case in cases
+        for part in (with_lead(case).lead, case, *windows_of(case), *whole_drag(case))
+    )
     return [part for part in every if part is not None]
 
 
@@ -275,13 +301,19 @@ def _marks(study: Study) -> tuple[float, ...]:
     before = _before_s(stiff)
     first = max(_until_counted(stiff), before + frame * drag)
     places = math.floor((drag - first) / sample + 1e-9)
-    chosen = sorted(_spread_out(places)[: windows.most])
+    chosen = sorted(spread_out(places)[: windows.most])
     starts = ((first + number * sample - before) / drag for number in chosen)
     return tuple(frame * math.floor(start / frame + 1e-9) for start in starts)
 
 
-def _spread_out(count: int) -> list[int]:
-    """Numbers below `count`, the first ones spread evenly: van der Corput's sequence."""
-    bits = max(1, (count - 1).bit_length())
-    reversed_bits = (int(f"{number:0{bits}b}"[::-1], 2) for number in range(2**bits))
-    return [*dict.fromkeys(place * count >> bits for place in reversed_bits)] if count > 0 else []
+def spread_out(count: int) -> list[int]:
+    """Numbers below `count`: the middles of thirds first, then of ninths, from both ends at once.
+
+    Any number of the first ones is about symmetric: their mean has that of a drift along the path.
+    """
+    places, parts = list[int](), 3
+    while len(dict.fromkeys(places)) < count:
+        ends = (each for first in range((parts + 1) // 2) for each in (first, parts - 1 - first))
+        places += [(2 * part + 1) * count // (2 * parts) for part in ends]
+        parts *= 3
+    return [*dict.fromkeys(places)]

@@ -332,7 +332,7 @@ _FEWEST_STEPS_PER_CONTACT = 5
 _PLACES_PER_LEG = 500
 """At which the distance of two workpieces is compared."""
 
-_JAMMING_GAP = 2.0
+JAMMING_GAP = 2.0
 """Particle diameters between workpiece and bowl below which a warning is given: in a narrower gap,
 an arch of two particles can block the workpiece (docs/development/liggghts.md)."""
 
@@ -376,7 +376,7 @@ def _wall_gap(case: Case) -> float:
 def may_jam(case: Case, surface_m: float) -> bool:
     """Whether particles can be squeezed between a workpiece and the bowl, and leave fast."""
     gaps = clearances(case, surface_m)
-    return in_diameters(case, min(gaps.wall_m, gaps.floor_m)) < _JAMMING_GAP
+    return in_diameters(case, min(gaps.wall_m, gaps.floor_m)) < JAMMING_GAP
 
 
 def check_fit(case: Case, surface_m: float, timestep_s: float) -> None:
@@ -462,11 +462,11 @@ def process_cautions(case: Case) -> Iterator[Caution]:
             f"{box_half_width(study):.3g} m from the axis of the bowl: the run leaves them out",
         )
     gap = in_diameters(case, _wall_gap(case))
-    if gap < _JAMMING_GAP:
+    if gap < JAMMING_GAP:
         yield Caution(
             "gap",
             f"the gap between workpiece and bowl is {gap:.2g} particle diameters, less than "
-            f"{_JAMMING_GAP:g}: particles may jam there and cause very large forces",
+            f"{JAMMING_GAP:g}: particles may jam there and cause very large forces",
         )
     fidelity = study.chosen_fidelity()
     surface = _driven_surface(case)

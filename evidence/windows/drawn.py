@@ -1,0 +1,169 @@
+"""Scenes of drag finishing drawn from a seed, for what windows are judged by.
+
+    python -m evidence draw-scenes 17 --scenes 12    # studies in this project
+    ./run $(python -m evidence window-targets drawn-17-00) --config study=drawn-17-00
+    python -m evidence collect-windows drawn.tar.xz results/drawn-17-*
+
+Workpiece, wall and floor are at least 2.8 diameters apart: in narrower gaps, particles jam at the
+physical modulus, and single forces decide the means.
+"""
+
+import math
+import tarfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from dragchain.quantities.document import MEASURED_FILE
+from dragchain.windows.rounds import measured_window
+from dragdeck.project import project_here
+from dragdeck.records.case import load_case
+from dragdeck.scenes.lead import windows_of
+from dragdeck.scenes.process import SCENES
+
+MATERIALS = {
+    "glass": (63e9, 0.22, 2500.0),
+    "alumina": (370e9, 0.22, 3900.0),
+    "zirconia": (205e9, 0.31, 6000.0),
+    "porcelain": (77e9, 0.19, 2656.0),
+    "steel": (210e9, 0.30, 7800.0),
+    "polyester": (4e9, 0.38, 1400.0),
+}
+"""Young's modulus, Pa, Poisson's ratio, and density, kg/m3, of common media."""
+
+_SOLID, _GRAVITY = 0.59, 9.81
+
+
+def drawn(random: np.random.Generator, number: int) -> dict[str, Any]:
+    """A scene as plain data: 400 to 800 particles, lengths in particle diameters d.
+
+    Parameters
+    ----------
+    random : numpy.random.Generator
+    number : int
+        From 0; the material follows from it.
+    """
+    name = [*MATERIALS][number % len(MATERIALS)]
+    d = random.uniform(4e-3, 9e-3)
+    thick, gap, reach = random.uniform(0.8, 1.4), random.uniform(2.8, 3.2), random.uniform(1.2, 1.8)
+    outer, height = reach + thick / 2 + gap, random.uniform(6.0, 7.0)
+    depth = height - random.uniform(2.8, 3.2)
+    inertial = math.exp(random.uniform(math.log(0.02), math.log(0.1)))
+    speed = inertial * math.sqrt(_SOLID * _GRAVITY * depth * d)
+    restitution, friction = random.uniform(0.5, 0.9), random.uniform(0.15, 0.5)
+    on_tool = friction * random.uniform(0.6, 1.0)
+    return {
+        "title": f"Drawn scene {number}: {name}",
+        "materials": {"media": _material(*MATERIALS[name]), "tool": _material(210e9, 0.3, 7800.0)},
+        "pairs": {
+            "media-media": {"restitution": _short(restitution), "friction": _short(friction)},
+            "media-tool": {"restitution": _short(restitution - 0.05), "friction": _short(on_tool)},
+        },
+        "media": {
+            "material": "media",
+            "count": math.ceil(6 * _SOLID * outer**2 * height),
+            "radius_mean_m": _short(d / 2),
+            "radius_std_m": _short(random.uniform(0.02, 0.08) * d / 2),
+        },
+        "bowl": {
+            "material": "tool",
+            "radius_m": _short(outer * d),
+            "height_m": _short(1.6 * height * d),
+        },
+        "workpiece": {
+            "material": "tool",
+            "shape": {"kind": "cylinder", "radius_m": _short(thick * d / 2)},
+        },
+        "motion": {
+            "path": {
+                "kind": "circle",
+                "radius_m": _short(reach * d),
+                "revolutions": _short(random.uniform(10.0, 20.0) / (2 * math.pi * reach)),
+            },
+            "speed_m_s": _short(speed),
+            "immersion_depth_m": _short(depth * d),
+            "transient_m": _short(1.5 * d),
+        },
+        "outputs": {
+            "workpiece_force_hz": _short(100 * speed / d),
+            "workpiece_contacts_hz": _short(50 * speed / d),
+            "network_hz": _short(12 * speed / d),
+        },
+        "seed": int(random.integers(1, 10_000)),
+    }
+
+
+def _material(modulus: float, poisson: float, density: float) -> dict[str, float]:
+    return {"youngs_modulus_pa": modulus, "poissons_ratio": poisson, "density_kg_m3": density}
+
+
+def _short(number: float) -> float:
+    return float(f"{number:.4g}")
+
+
+def draw_scenes(seed: int, scenes: int, fidelity: str) -> str:
+    """Write a study for each scene into the project; return their names.
+
+    Parameters
+    ----------
+    seed : int
+    scenes : int
+    fidelity : str
+        Block of each study, as YAML.
+    """
+    random = np.random.default_rng(seed)
+    names = []
+    for number in range(scenes):
+        name = f"drawn-{seed}-{number:02d}"
+        folder = project_here().studies / name
+        folder.mkdir(parents=True)
+        study = {**drawn(random, number), "fidelity": yaml.safe_load(fidelity)}
+        (folder / "study.yaml").write_text(yaml.safe_dump(study, sort_keys=False))
+        names.append(name)
+    return "\n".join(names)
+
+
+def window_targets(study: str) -> str:
+    """The files that Snakemake makes of all windows of a study, and of its soft runs; in a line.
+
+    Parameters
+    ----------
+    study : str
+    """
+    project = project_here()
+    cases = project.cases(study)
+    process = SCENES["process"]
+    runs = [run for case in cases for run in (case, *windows_of(case))]
+    folders = (project.run_folder(run, process).relative_to(project.root) for run in runs)
+    return " ".join(str(folder / MEASURED_FILE) for folder in folders)
+
+
+def collect_windows(archive: Path, results: Sequence[Path]) -> str:
+    """Write an archive with the quantities of soft runs and of their windows, a folder a soft run.
+
+    Windows that a study would refuse are left out.
+
+    Parameters
+    ----------
+    archive : Path
+        A ``.tar.xz`` file.
+    results : sequence of Path
+        Folders of results of studies.
+    """
+    number = 0
+    with tarfile.open(archive, "w:xz") as files:
+        for study in results:
+            for folder in sorted(study.glob("windows/*_window-*")):
+                lead = load_case(folder).lead
+                assert lead is not None
+                if measured_window(folder).refused:
+                    continue
+                soft = f"{study.name}/{lead}/soft.json"
+                if soft not in files.getnames():
+                    files.add(study / "process" / lead / MEASURED_FILE, soft)
+                files.add(folder / MEASURED_FILE, f"{study.name}/{lead}/{folder.name}.json")
+                number += 1
+    return f"{archive}: {number} windows"
