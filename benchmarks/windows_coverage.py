@@ -21,11 +21,11 @@ import pandas as pd
 
 from dragchain.arrays import Floats
 from dragchain.quantities.document import PathQuantities, RunQuantities
-from dragchain.quantities.known import UNKNOWN, WindowsRecord
 from dragchain.report.values import mean_over_packings
 from dragchain.statistics.estimate import Estimate
 from dragchain.windows.estimate import WindowOfRun
 from dragchain.windows.rounds import Asked, judged, with_drag
+from dragdeck.records.windows import UNKNOWN, WindowsRecord
 from dragdeck.scenes.lead import FIRST_WINDOWS, spread_out
 
 TRUE, STRETCHES, BLOCKS, LENGTHS = -2.0, 16, 3, 9.0

@@ -24,13 +24,13 @@ from dragchain.arrays import Floats
 from dragchain.errors import SeriesError
 from dragchain.quantities.blocks import neighbour_correlation
 from dragchain.quantities.document import RunQuantities
-from dragchain.quantities.known import UNKNOWN, Known, WindowsRecord
 from dragchain.quantities.registry import MEASURED, Quantity
 from dragchain.windows.estimate import WindowOfRun
 from dragchain.windows.rounds import beside, of_windows, stretches, window_of
 from dragdeck.physics.contact_mechanics import damping_ratio
 from dragdeck.records.stability import StableStepLaw, StableStepRecord
 from dragdeck.records.tradeoff import SixDigits
+from dragdeck.records.windows import UNKNOWN, Known, WindowsRecord
 
 _FEWEST_SCENES = 5
 _LARGEST_STD = 0.08
@@ -132,18 +132,21 @@ class Windowed:
 
     def pairs(self, quantity: Quantity) -> "Pairs | None":
         """A quantity in the windows and beside them, None where it is not in all of them."""
-        known = [self.soft.values(), *(window.values for window in self.windows)]
-        if len(self.windows) < _FEWEST_WINDOWS or any(quantity.name not in of for of in known):
+        there = [self.soft.values(), *(window.values for window in self.windows)]
+        if len(self.windows) < _FEWEST_WINDOWS or any(quantity.name not in of for of in there):
             return None
         windows = of_windows(quantity, self.windows)
         soft = beside(self.soft, quantity.name, self.windows)
         along = stretches(self.soft, quantity.name, self.windows[0].arc_m)
+        blocks = self.soft.of_blocks(quantity.name).values
+        known = blocks[np.isfinite(blocks)]
         ratio = abs(windows.mean() / soft.mean())
         return Pairs(
             windows / windows.mean() - 1.0,
             soft / soft.mean() - 1.0,
             float(np.var(along / along.mean(), ddof=1)),
             math.log(ratio) / (1 + quantity.squared),
+            float(np.var(known / known.mean(), ddof=1)) / (1 + quantity.squared) ** 2,
         )
 
 
@@ -159,12 +162,15 @@ class Pairs:
         Relative, of the soft run's stretches.
     ratio_log : float
         Logarithm of the mean of the windows over that of the soft run beside them.
+    of_block : float
+        Relative variance of a block of the soft run; of the root of a mean square.
     """
 
     windows: Floats
     beside: Floats
     variance: float
     ratio_log: float
+    of_block: float
 
     @cached_property
     def slope(self) -> float:
@@ -270,6 +276,7 @@ def _known(quantity: Quantity, scenes: Scenes, windowed: Sequence[Windowed]) -> 
         degrees=round(_degrees(float(np.var(logs, ddof=1)) - by_chance), 1),
         packing_std=round(_between_packings(measured), 4),
         correlation=round(_correlation(measured), 2),
+        block_std=round(math.sqrt(float(np.mean([of.of_block for of in every]))), 4),
     )
 
 

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dragchain.arrays import Floats
-from dragchain.quantities.known import UNKNOWN, Known
 from dragchain.quantities.registry import Quantity
 from dragchain.statistics.correlated import LARGEST_REACH
 from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate, student_quantile
+from dragdeck.records.windows import UNKNOWN, Known
 
 
 @dataclass(frozen=True)

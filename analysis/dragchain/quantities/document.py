@@ -12,12 +12,12 @@ from typing import NamedTuple
 import numpy as np
 
 from dragchain.quantities.blocks import Blocks, estimate_of
-from dragchain.quantities.known import UNKNOWN, Known
 from dragchain.quantities.registry import MEASURED
 from dragchain.statistics.estimate import Estimate
 from dragdeck.documents import Document, Part
 from dragdeck.records.case import FidelityOfRun, StudyOfRun
 from dragdeck.records.run import AcceptanceCheck
+from dragdeck.records.windows import UNKNOWN, Known
 
 MEASURED_FILE = Path("tables") / "quantities.json"
 EXTRAPOLATED = Path("tables") / "extrapolated.json"

@@ -6,13 +6,13 @@ from dragchain.errors import TableError
 from dragchain.network.write import write_chains
 from dragchain.quantities.along import quantities_along
 from dragchain.quantities.document import MEASURED_FILE, RunCost, RunQuantities
-from dragchain.quantities.known import WindowsRecord
 from dragchain.run.case import upstream_folders
 from dragchain.statistics.estimate import Estimate
 from dragchain.tables.write import write_tables
 from dragdeck.records.case import CaseOfRun, load_case
 from dragdeck.records.packing import Packing
 from dragdeck.records.run import RunRecord
+from dragdeck.records.windows import WindowsRecord
 
 OUTCOME = "outcome.json"
 """The record of a run whose failure is a finding."""

@@ -23,9 +23,9 @@ from scipy.special import erf
 
 from dragchain.arrays import Floats
 from dragchain.quantities.document import Extrapolated, LoadMap, Need, Reached
-from dragchain.quantities.known import Known
 from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate, student_quantile
 from dragdeck.documents import Part
+from dragdeck.records.windows import Known
 
 
 class WindowOfRun(Part):

@@ -16,7 +16,6 @@ from dragchain.quantities.document import (
     Reached,
     RunQuantities,
 )
-from dragchain.quantities.known import UNKNOWN, WindowsRecord
 from dragchain.quantities.registry import MEASURED, Quantity
 from dragchain.statistics.estimate import Estimate
 from dragchain.tables.by_step import read_table
@@ -28,6 +27,7 @@ from dragchain.windows.estimate import (
     paired,
     windows_needed,
 )
+from dragdeck.records.windows import UNKNOWN, WindowsRecord
 
 _FEWEST = 2
 """Windows of which one alone says nothing of its scatter."""

@@ -8,10 +8,10 @@ import pytest
 from dragchain.arrays import Floats
 from dragchain.quantities.blocks import Blocks, estimate_of
 from dragchain.quantities.document import PathQuantities
-from dragchain.quantities.known import UNKNOWN, Known
 from dragchain.quantities.registry import MEASURED, Quantity
 from dragchain.statistics.correlated import estimate_mean
 from dragchain.statistics.estimate import NORMAL_QUANTILE
+from dragdeck.records.windows import UNKNOWN, Known
 
 NAMED = {quantity.name: quantity for quantity in MEASURED}
 DRAG, STD, RATIO = (NAMED[name] for name in ("drag_mean", "drag_std", "ahead_behind"))

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from dragchain.quantities.known import UNKNOWN
 from dragchain.statistics.estimate import Estimate, student_quantile
 from dragchain.windows.estimate import corrected_map, paired, windows_needed
+from dragdeck.records.windows import UNKNOWN
 
 KNOWN = UNKNOWN.model_copy(update={"slope": 0.5, "variance_ratio": 1.0, "degrees": 10.0})
 SOFT = np.array([0.9, 1.0, 1.1] * 6)

@@ -8,10 +8,10 @@ import pandas as pd
 import pytest
 
 from dragchain.quantities.document import PathQuantities, RunQuantities
-from dragchain.quantities.known import WindowsRecord
 from dragchain.statistics.estimate import Estimate
 from dragchain.windows.estimate import Round, WindowOfRun
 from dragchain.windows.rounds import Asked, judged, unsettled, with_drag
+from dragdeck.records.windows import WindowsRecord
 
 RECORD = WindowsRecord.shipped()
 SOFT = PathQuantities(

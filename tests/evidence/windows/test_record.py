@@ -13,10 +13,10 @@ from paths import ROOT, SNAKEFILES
 
 from dragchain.errors import SeriesError
 from dragchain.quantities.document import RunCost, RunQuantities
-from dragchain.quantities.known import WindowsRecord
 from dragdeck.physics.contact_mechanics import damping_ratio
 from dragdeck.records.case import FidelityOfRun
 from dragdeck.records.stability import StableStepRecord
+from dragdeck.records.windows import WindowsRecord
 from dragdeck.study.model import Study
 from evidence.__main__ import COMMANDS, main
 from evidence.windows.record import SceneRun, Windowed, read_scenes, read_windows, windows_record

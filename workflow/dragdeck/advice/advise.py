@@ -10,33 +10,19 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import chain
 
-import numpy as np
-
-from dragdeck.cases.bed import (
-    bed_timestep,
-    expected_surface,
-    full_stiffness_number,
-    softest_scale,
-    widest_skin,
-)
-from dragdeck.cases.case import Case, of_each_workpiece
+from dragdeck.advice.ways import Way, Ways
+from dragdeck.advice.work import Work
+from dragdeck.cases.bed import expected_surface, full_stiffness_number, softest_scale, widest_skin
+from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
 from dragdeck.outlook.timestep import largest_fraction, stable_fraction, stable_step_cautions
 from dragdeck.physics.rounding import rounded
 from dragdeck.records.advised import AdvisedSettings
 from dragdeck.records.tradeoff import DropEntry, TradeoffRecord, measured_tradeoff
-from dragdeck.scenes.filling import FILLING, expected_time, filling_cautions
-from dragdeck.scenes.lead import FIRST_WINDOWS, covered_fraction, window_count, window_fraction
-from dragdeck.scenes.motion import plunge_point
-from dragdeck.scenes.workpiece import (
-    FACET_STEP_S,
-    JAMMING_GAP,
-    PARTICLE_STEPS_PER_S,
-    describe,
-    may_jam,
-    process_cautions,
-    workpiece_facets,
-)
+from dragdeck.records.windows import WindowsRecord
+from dragdeck.scenes.filling import filling_cautions
+from dragdeck.scenes.lead import FIRST_WINDOWS
+from dragdeck.scenes.workpiece import JAMMING_GAP, describe, may_jam, process_cautions
 from dragdeck.study.model import (
     BUILT_IN_FIDELITIES,
     LARGEST_TIMESTEP_FRACTION,
@@ -62,110 +48,8 @@ _STABILITY_NUMBER, _FAST = 0.72, 0.1
 above which they are no larger than those of the plain run: there, impacts decide, and a sliding
 distance was 12 % too small at the larger step (docs/evidence/windows.md)."""
 
-_MOST_OF_DRAG = 0.5
-"""Fraction of the drag that the first windows may take: with more, the whole drag at the physical
-modulus is no dearer."""
-
 _PLAIN_FRACTION = 0.64
 """Time step over the Rayleigh time of the plain run that costs are compared with."""
-
-
-@dataclass(frozen=True)
-class Work:
-    """What the filling and the process of a case take. Its drop test is the same at all settings.
-
-    Attributes
-    ----------
-    study : Study
-    tradeoff : TradeoffRecord
-    filling_s, process_s, entry_s : float
-        Simulated time, that of the process and of what goes before its drag at the study's own
-        speed, s.
-    facets : int
-        Of all workpieces.
-    """
-
-    study: Study
-    tradeoff: TradeoffRecord
-    filling_s: float
-    process_s: float
-    entry_s: float
-    facets: int
-
-    @classmethod
-    def of(cls, case: Case, tradeoff: TradeoffRecord) -> "Work":
-        """Of a case; its own fidelity does not matter."""
-        study, motion = case.study, case.study.motion
-        way = math.dist(plunge_point(motion), motion.path.start_point)
-        entry_s = (
-            expected_surface(study) / motion.plunge_speed_m_s + way / motion.approach_speed_m_s
-        )
-        process_s = entry_s + motion.path_length_m / motion.nominal_speed_m_s + motion.ramp_s / 2
-        facets = sum(workpiece_facets(workpiece) for workpiece in of_each_workpiece(case))
-        return cls(study, tradeoff, expected_time(study), process_s, entry_s, facets)
-
-    def steps(self, fidelity: Fidelity, windows: int = 0) -> float:
-        """Time steps of process and windows, each counted as it costs at its modulus.
-
-        Parameters
-        ----------
-        fidelity : Fidelity
-        windows : int
-            How many are run, if the settings have any.
-        """
-        study = self.study.model_copy(update={"fidelity": fidelity})
-        start, entry = study.at_start(), covered_fraction(study)
-        drag_s = self.process_s - self.entry_s
-        softer = self.entry_s + entry * drag_s
-        steps = self._steps(start, softer) + self._steps(study, self.process_s - softer)
-        if fidelity.windows is not None:
-            stiff = fidelity.model_copy(
-                update={
-                    "youngs_modulus_scale": 1.0,
-                    "timestep_fraction": fidelity.windows.timestep_fraction,
-                }
-            )
-            stiffer = self.study.model_copy(update={"fidelity": stiff})
-            steps += windows * self._steps(stiffer, window_fraction(study) * drag_s)
-        return steps
-
-    def cpu_time(self, fidelity: Fidelity, windows: int = 0) -> float:
-        """CPU time of all runs with some settings, s: only ratios of it count."""
-        filled = self.study.model_copy(update={"fidelity": fidelity}).at_filling()
-        filling = self.filling_s / bed_timestep(filled, "filling_timestep_fraction")
-        count, of_facets = self.study.sphere_count, self.facets * FACET_STEP_S
-        return filling * count / FILLING.particle_steps_per_s + self.steps(fidelity, windows) * (
-            count / PARTICLE_STEPS_PER_S + of_facets
-        )
-
-    def _steps(self, study: Study, time_s: float) -> float:
-        """Steps of a stretch of the process, each counted as it costs at its modulus."""
-        chosen = study.chosen_fidelity()
-        steps = time_s / bed_timestep(study, "timestep_fraction") / chosen.speed_factor
-        return steps * step_cost(chosen.youngs_modulus_scale, self.tradeoff)
-
-
-def step_cost(scale: float, tradeoff: TradeoffRecord) -> float:
-    """Time of a step of the drag at a modulus scale, over that at the others that were timed.
-
-    Soft particles have more contacts, and their steps cost more. Interpolated over
-    logarithms; 1 where nothing was timed.
-
-    Parameters
-    ----------
-    scale : float
-        Factor on every Young's modulus.
-    tradeoff : TradeoffRecord
-    """
-    timed = sorted(
-        (cost.level, cost.per_step)
-        for cost in tradeoff.costs
-        if cost.parameter == "youngs_modulus_scale" and cost.level and cost.per_step
-    )
-    if not timed:
-        return 1.0
-    levels, logs = zip(*((level, math.log(time)) for level, time in timed), strict=True)
-    return math.exp(np.interp(math.log(scale), np.log(levels), logs))
 
 
 @dataclass(frozen=True)
@@ -280,9 +164,8 @@ def _step(stable: float) -> float:
 def process_option(case: Case, requested: Tolerance, tradeoff: TradeoffRecord) -> Option:
     """The settings with which a tolerance is met in a case's own scene.
 
-    A soft run over the whole path, and windows at the physical modulus until the tolerance is met.
-    Where a few of them would take most of the path, or the material is so soft that nothing is
-    saved, a run at the physical modulus.
+    A soft run over the whole path, and windows at the physical modulus until the tolerance is met;
+    where the whole drag at that modulus is expected to cost less, that, after a soft start.
 
     Raises
     ------
@@ -300,23 +183,30 @@ def process_option(case: Case, requested: Tolerance, tradeoff: TradeoffRecord) -
             "bowl, wall and floor",
             remedy="use a larger gap, or fidelity: {youngs_modulus_scale: 1} with several seeds",
         )
-    stiff, soft = stiff_settings(case), soft_settings(case)
+    ways = ways_of(case, requested, tradeoff)
+    if ways is not None and ways.windows_pay:
+        costs = (ways.with_windows(count).relative_cost for count in (FIRST_WINDOWS, ways.most))
+        return Option(ways.soft, *costs)
+    stiff, work = stiff_settings(case), Work.of(case, tradeoff)
+    cost = work.cpu_time(stiff) / work.cpu_time(plain_option(case).fidelity)
+    return Option(stiff, cost, cost)
+
+
+def ways_of(case: Case, requested: Tolerance, tradeoff: TradeoffRecord) -> Ways | None:
+    """The ways to a tolerance; None where a softer run saves nothing, or no windows fit."""
+    stiff = stiff_settings(case)
+    if stiff.soft_start is None:
+        return None
+    windows = Windows(
+        tolerance=requested.tolerance,
+        quantities=list(requested.quantities),
+        timestep_fraction=stiff.timestep_fraction,
+    )
+    soft = soft_settings(case).model_copy(update={"windows": windows})
     work = Work.of(case, tradeoff)
     plain = work.cpu_time(plain_option(case).fidelity)
-    if stiff.soft_start is not None:
-        windows = Windows(
-            tolerance=requested.tolerance,
-            quantities=list(requested.quantities),
-            timestep_fraction=stiff.timestep_fraction,
-        )
-        windowed = soft.model_copy(update={"windows": windows})
-        study = case.study.model_copy(update={"fidelity": windowed})
-        if FIRST_WINDOWS * window_fraction(study) <= _MOST_OF_DRAG:
-            most = window_count(study)
-            costs = (work.cpu_time(windowed, min(n, most)) for n in (FIRST_WINDOWS, most))
-            return Option(windowed, *(cost / plain for cost in costs))
-    cost = work.cpu_time(stiff) / plain
-    return Option(stiff, cost, cost)
+    ways = Ways(work, soft, stiff, requested, plain, WindowsRecord.shipped())
+    return ways if ways.most >= FIRST_WINDOWS else None
 
 
 def plain_option(case: Case) -> Option:
@@ -365,12 +255,15 @@ class Advice:
         That costs are compared with; of a drop test, the finest.
     fallback : str or None
         Why the reference was chosen.
+    ways : tuple of Way
+        What could be done instead; none for a drop test, or where a softer run saves nothing.
     """
 
     requested: Tolerance
     chosen: Option
     reference: Option
     fallback: str | None = None
+    ways: tuple[Way, ...] = ()
 
     @property
     def for_case(self) -> AdvisedSettings:
@@ -422,7 +315,9 @@ def advised_settings(case: Case, requested: Tolerance, tradeoff: TradeoffRecord)
         The quantities do not go together.
     """
     if RESTITUTION not in requested.quantities:
-        return Advice(requested, process_option(case, requested, tradeoff), plain_option(case))
+        ways = ways_of(case, requested, tradeoff) or ()
+        option = process_option(case, requested, tradeoff)
+        return Advice(requested, option, plain_option(case), ways=tuple(ways))
     if len(requested.quantities) > 1:
         raise InputError(
             "the restitution is a quantity of the drop test, others are of the process",

@@ -1,5 +1,6 @@
 """What a study's runs will take: `./run dragdeck advise`."""
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -12,7 +13,7 @@ from dragdeck.advice.advise import Advice, Option, shown_share, with_option
 from dragdeck.cases.case import Case
 from dragdeck.engine.reports import shown_time
 from dragdeck.outlook.explain import expected_cost, measured_speeds
-from dragdeck.records.advice import AdviceFile, AdvisedCase, OptionEntry, SettingsOfOption
+from dragdeck.records.advice import AdviceFile, AdvisedCase, OptionEntry, SettingsOfOption, WayEntry
 from dragdeck.scenes.drop_test import DROP_TEST
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.lead import FIRST_WINDOWS, with_leads
@@ -63,7 +64,15 @@ def advised_case(case: Case, advice: Advice, results: Path) -> AdvisedCase:
         run=PROCESS.run_id(chosen),
         asked=advice.for_case,
         options=[_forecast(case, role, option, results) for role, option in _roles(advice)],
+        ways=[*_ways(advice)],
     )
+
+
+def _ways(advice: Advice) -> Iterator[WayEntry]:
+    """The ways of an advice, the cheapest first, with their cost over that of the reference."""
+    for way in sorted(advice.ways, key=lambda way: way.relative_cost):
+        half = way.half_width if math.isfinite(way.half_width) else None
+        yield WayEntry(name=way.name, half_width=half, relative_cost=way.relative_cost)
 
 
 def _roles(advice: Advice) -> Iterator[tuple[str, Option]]:
@@ -127,12 +136,26 @@ def advice_tables(case: Case, advice: Advice, advised: AdvisedCase) -> Iterator[
         wall = shown_time(sum(row.wall_time_s.values()))
         table.add_row(role, str(option), cost, steps, wall, style=style)
     yield table
+    if advised.ways:
+        yield _ways_table(advised.ways, requested)
     said = Table(show_header=False)
     said.add_column(style="bold")
     said.add_column()
     for heading, text in _about(case, advice, advised.options[0]):
         said.add_row(heading, text)
     yield said
+
+
+def _ways_table(ways: Sequence[WayEntry], requested: Tolerance) -> Table:
+    """What each way is expected to give, and to cost."""
+    table = Table(title="ways, as other scenes let expect", title_justify="left")
+    for name in ("way", "half-width", "cost"):
+        table.add_column(name)
+    for way in ways:
+        half = "not known" if way.half_width is None else shown_share(way.half_width)
+        enough = way.half_width is not None and way.half_width <= requested.tolerance
+        table.add_row(way.name, half, f"{way.relative_cost:.3g}", style="bold" if enough else None)
+    return table
 
 
 def _cost_text(option: Option) -> str:

@@ -55,6 +55,24 @@ class OptionEntry(Part):
     source: str
 
 
+class WayEntry(Part):
+    """A way to the quantities at the physical modulus.
+
+    Attributes
+    ----------
+    name : str
+    half_width : float or None
+        Expected relative half-width of the 95 % interval, the largest of the quantities; None where
+        other scenes say nothing of one.
+    relative_cost : float
+        CPU time / CPU time of a plain run at the physical modulus.
+    """
+
+    name: str
+    half_width: float | None
+    relative_cost: float
+
+
 class AdvisedCase(Part):
     """A case of ``advice.json``: its process run and its options.
 
@@ -66,12 +84,15 @@ class AdvisedCase(Part):
         The tolerance, and what it costs.
     options : sequence of OptionEntry
         The advised settings first.
+    ways : sequence of WayEntry
+        What could be done, the cheapest way first.
     """
 
     case: str
     run: str
     asked: AdvisedSettings
     options: tuple[OptionEntry, ...]
+    ways: tuple[WayEntry, ...] = ()
 
 
 class AdviceFile(Document):

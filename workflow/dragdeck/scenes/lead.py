@@ -148,6 +148,14 @@ def window_fraction(study: Study) -> float:
     return float((_before_s(stiff) + _sample_s(stiff)) / driven(stiff).drive.duration_s)
 
 
+def counted_blocks(study: Study) -> tuple[float, float]:
+    """Blocks of about a mean particle diameter: of the counted path, and of a window's sample."""
+    stiff = _window_study(study)
+    motion, block = stiff.motion, _block_s(stiff)
+    counted = _seconds(motion.path_length_m - motion.uncounted_m, stiff)
+    return counted / block, _sample_s(stiff) / block
+
+
 def covered_fraction(study: Study) -> float:
     """Part of the drag that a softer run covers before a run goes on from it; 0 without one."""
     return 0.0 if study.chosen_fidelity().soft_start is None else _entry_fraction(study)

@@ -1,4 +1,4 @@
-"""``windows.json``: what runs of other scenes say of a quantity."""
+"""``windows.json``: what soft runs, their windows and whole runs of other scenes say."""
 
 import math
 from collections.abc import Mapping
@@ -9,6 +9,9 @@ from pydantic import AllowInfNan, BeforeValidator
 
 import dragdeck
 from dragdeck.documents import Document, Part
+
+_NORMAL_QUANTILE = 1.96
+"""Of 95 % of a normal distribution."""
 
 
 def _infinite(number: object) -> object:
@@ -33,6 +36,8 @@ class Known(Part):
         Relative standard deviation of the mean from packing to packing.
     correlation : float
         Correlation of neighbouring blocks of one particle diameter.
+    block_std : float
+        Relative standard deviation of such a block of a soft run.
     """
 
     ratio_log: float
@@ -43,11 +48,28 @@ class Known(Part):
     degrees: float
     packing_std: float
     correlation: float
+    block_std: Annotated[float, AllowInfNan(True)]
+
+    def soft_half_width(self, blocks: float) -> float:
+        """Expected relative half-width of the soft run of so many blocks, times the ratio."""
+        return self._half_width(self.block_std**2 / blocks + self.ratio_log_std**2)
+
+    def windows_half_width(self, windows: int, sample: float, blocks: float) -> float:
+        """Expected relative half-width of windows that sample so many blocks each."""
+        about = self.variance_ratio / (sample * windows) + self.slope**2 / blocks
+        return self._half_width(about * self.block_std**2)
+
+    def whole_half_width(self, blocks: float) -> float:
+        """Expected relative half-width of the whole drag at the physical modulus."""
+        return self._half_width((self.variance_ratio + self.slope**2) * self.block_std**2 / blocks)
+
+    def _half_width(self, variance: float) -> float:
+        return _NORMAL_QUANTILE * math.sqrt(variance + self.packing_std**2)
 
 
 UNKNOWN = Known(
     ratio_log=0.0, ratio_log_std=math.inf, slope=0.0, slope_std=0.0, variance_ratio=0.0,
-    degrees=0.0, packing_std=0.0, correlation=0.3,
+    degrees=0.0, packing_std=0.0, correlation=0.3, block_std=math.inf,
 )  # fmt: skip
 """Of a quantity of which nothing is known; few quantities have a larger correlation."""
 
