@@ -27,8 +27,11 @@ ROOT = Path(__file__).resolve().parents[2]
 DATA = ROOT / "docs/data"
 
 RECORDS = {
-    **{name: ROOT / f"workflow/dragdeck/data/{name}.json" for name in ("tradeoff", "stability")},
-    "stable_step": ROOT / "workflow/dragdeck/data/stable_step.json",
+    **{
+        name: ROOT / f"workflow/dragdeck/data/{name}.json"
+        for name in ("tradeoff", "stability", "stable_step")
+    },
+    "kept_by_windows": ROOT / "workflow/dragdeck/data/windows.json",
     "quantities": ROOT / "workflow/dragdeck/study/quantities.csv",
     **{
         f"scaling/{file.stem}": file

@@ -13,7 +13,13 @@ from pydantic import ValidationError
 from rich.table import Table
 
 from dragdeck.advice.advise import advised_settings
-from dragdeck.advice.forecast import advice_file, advice_tables, advised_case, question
+from dragdeck.advice.forecast import (
+    advice_file,
+    advice_tables,
+    advised_case,
+    question,
+    ways_in_words,
+)
 from dragdeck.cases.bed import clump_of
 from dragdeck.cases.case import Case
 from dragdeck.cases.ranks import check_ranks, cores_here
@@ -153,6 +159,7 @@ class _Findings:
             self.warnings.setdefault(text, {})[case.name] = None
         notes = [not_corrected(case) if kind.needs_bed else ""]
         notes.append(changed_in_words(used_templates["changed_scripts"]))
+        notes.append(ways_in_words(case, measured_tradeoff()) if kind.needs_bed else "")
         for text in filter(None, notes):
             self.reduced.setdefault(text, {})[case.name] = None
         lines = [f"time step: {scene.deck.timestep_s:.3g} s, about {scene.steps:,} steps"]

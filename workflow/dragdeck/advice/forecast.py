@@ -9,16 +9,17 @@ from pathlib import Path
 from rich.table import Table
 
 from dragdeck import __version__
-from dragdeck.advice.advise import Advice, Option, shown_share, with_option
+from dragdeck.advice.advise import Advice, Option, advised_settings, shown_share, with_option
 from dragdeck.cases.case import Case
 from dragdeck.engine.reports import shown_time
 from dragdeck.outlook.explain import expected_cost, measured_speeds
 from dragdeck.records.advice import AdviceFile, AdvisedCase, OptionEntry, SettingsOfOption, WayEntry
+from dragdeck.records.tradeoff import TradeoffRecord
 from dragdeck.scenes.drop_test import DROP_TEST
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.lead import FIRST_WINDOWS, with_leads
 from dragdeck.scenes.process import PROCESS, process_scene
-from dragdeck.study.model import Tolerance
+from dragdeck.study.model import RESTITUTION, Tolerance
 
 _DEFAULT_TOLERANCE = Tolerance(tolerance=0.1)
 """What is advised for where a study asks for nothing."""
@@ -146,15 +147,39 @@ def advice_tables(case: Case, advice: Advice, advised: AdvisedCase) -> Iterator[
     yield said
 
 
+def ways_in_words(case: Case, tradeoff: TradeoffRecord) -> str:
+    """What the ways to a case's tolerance are expected to give and to cost; empty without one."""
+    requested = case.requested
+    if requested is None or case.part or RESTITUTION in requested.quantities:
+        return ""
+    shown = [
+        f"{way.name} ({_half_width(way.half_width)}, {way.relative_cost:.2g})"
+        for way in _ways(advised_settings(case, requested, tradeoff))
+    ]
+    what = f"{', '.join(requested.quantities)} within {shown_share(requested.tolerance)}"
+    return (
+        f"ways to {what}, with the half-width to be expected and the cost over that of a plain "
+        f"run: {', '.join(shown)}"
+    )
+
+
+def _half_width(half_width: float | None) -> str:
+    return "not known" if half_width is None else shown_share(half_width)
+
+
 def _ways_table(ways: Sequence[WayEntry], requested: Tolerance) -> Table:
     """What each way is expected to give, and to cost."""
     table = Table(title="ways, as other scenes let expect", title_justify="left")
     for name in ("way", "half-width", "cost"):
         table.add_column(name)
     for way in ways:
-        half = "not known" if way.half_width is None else shown_share(way.half_width)
         enough = way.half_width is not None and way.half_width <= requested.tolerance
-        table.add_row(way.name, half, f"{way.relative_cost:.3g}", style="bold" if enough else None)
+        table.add_row(
+            way.name,
+            _half_width(way.half_width),
+            f"{way.relative_cost:.3g}",
+            style="bold" if enough else None,
+        )
     return table
 
 
