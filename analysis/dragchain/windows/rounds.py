@@ -111,24 +111,19 @@ def judged(
     or windows cannot do it. Where neither can, this round is the last.
     """
     good = [window for window in windows if not window.refused]
-    values, pairs = dict[str, Estimate](), []
-    for quantity, pair in _paired(soft, good, record):
-        value = pair.estimate(len(good))
-        if value.known:
-            values[quantity.name] = value
-        if quantity.name in asked.quantities:
-            pairs.append(pair)
+    pairs = dict(_paired(soft, good, record))
+    values = {quantity.name: pair.estimate(len(good)) for quantity, pair in pairs.items()}
+    values = {name: value for name, value in values.items() if value.known}
     widths = [values[name].relative_half_width if name in values else math.inf
               for name in asked.quantities]  # fmt: skip
     reached = len(good) >= _FEWEST and max(widths) <= asked.tolerance
-    needs = [windows_needed(pair, len(good), asked.tolerance, asked.most) for pair in pairs]
+    concerned = [pair for quantity, pair in pairs.items() if quantity.name in asked.quantities]
+    needs = [windows_needed(pair, len(good), asked.tolerance, asked.most) for pair in concerned]
     need = Need(*(max(numbers) for numbers in zip(Need(_FEWEST, 1), *needs, strict=True)))
     more = max(1, need.windows - len(good))
-    of_drag = max((pair.whole_half_width(_DOUBT) for pair in pairs), default=math.inf)
-    of_windows = max((pair.relative_half_width(need.windows, scatter=_DOUBT) for pair in pairs),
-                     default=0.0)  # fmt: skip
-    by_windows = len(windows) < asked.most and of_windows <= asked.tolerance
-    by_drag = of_drag <= asked.tolerance and not (by_windows and more <= asked.lengths)
+    by_windows, by_drag = _expected(concerned, need.windows, asked, len(good))
+    by_windows &= len(windows) < asked.most
+    by_drag &= not (by_windows and more <= asked.lengths)
     last = reached or not (by_windows or by_drag)
     wanted = min(len(windows) + more, math.ceil(_MOST_MORE * len(windows)), asked.most)
     return Round(
@@ -147,6 +142,21 @@ def judged(
         whole=by_drag and not last,
         last=last,
     )
+
+
+def _expected(pairs: Sequence[Paired], windows: int, asked: Asked, good: int) -> tuple[bool, bool]:
+    """Whether so many windows, and whether the whole drag, are expected to meet the tolerance.
+
+    With fewer than two good windows, nothing is known yet; and nothing gives a quantity that two
+    good windows lack.
+    """
+    if good < _FEWEST:
+        return True, False
+    if len(pairs) < len(asked.quantities):
+        return False, False
+    widths = [pair.relative_half_width(windows, scatter=_DOUBT) for pair in pairs]
+    of_drag = [pair.whole_half_width(_DOUBT) for pair in pairs]
+    return max(widths) <= asked.tolerance, max(of_drag) <= asked.tolerance
 
 
 def with_drag(before: Round, drag: RunQuantities, asked: Asked) -> Round:
