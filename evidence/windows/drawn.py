@@ -144,7 +144,7 @@ def window_targets(study: str) -> str:
 def collect_windows(archive: Path, results: Sequence[Path]) -> str:
     """Write an archive with the quantities of soft runs and of their windows, a folder a soft run.
 
-    Windows that a study would refuse are left out.
+    Windows that a study would refuse, and those that were not run, are left out.
 
     Parameters
     ----------
@@ -156,7 +156,8 @@ def collect_windows(archive: Path, results: Sequence[Path]) -> str:
     number = 0
     with tarfile.open(archive, "w:xz") as files:
         for study in results:
-            for folder in sorted(study.glob("windows/*_window-*")):
+            for file in sorted(study.glob(f"windows/*_window-*/{MEASURED_FILE}")):
+                folder = file.parents[1]
                 lead = load_case(folder).lead
                 assert lead is not None
                 if measured_window(folder).refused:
@@ -164,6 +165,6 @@ def collect_windows(archive: Path, results: Sequence[Path]) -> str:
                 soft = f"{study.name}/{lead}/soft.json"
                 if soft not in files.getnames():
                     files.add(study / "process" / lead / MEASURED_FILE, soft)
-                files.add(folder / MEASURED_FILE, f"{study.name}/{lead}/{folder.name}.json")
+                files.add(file, f"{study.name}/{lead}/{folder.name}.json")
                 number += 1
     return f"{archive}: {number} windows"

@@ -18,13 +18,14 @@ from pathlib import Path
 
 import numpy as np
 from scipy.optimize import brentq, least_squares
-from scipy.special import polygamma
+from scipy.special import digamma, polygamma
 
 from dragchain.arrays import Floats
 from dragchain.errors import SeriesError
 from dragchain.quantities.blocks import neighbour_correlation
 from dragchain.quantities.document import RunQuantities
 from dragchain.quantities.registry import MEASURED, Quantity
+from dragchain.statistics.estimate import NORMAL_QUANTILE
 from dragchain.windows.estimate import WindowOfRun
 from dragchain.windows.rounds import beside, of_windows, stretches, window_of
 from dragdeck.physics.contact_mechanics import damping_ratio
@@ -144,7 +145,7 @@ class Windowed:
         return Pairs(
             windows / windows.mean() - 1.0,
             soft / soft.mean() - 1.0,
-            float(np.var(along / along.mean(), ddof=1)),
+            along / along.mean() - 1.0,
             math.log(ratio) / (1 + quantity.squared),
             float(np.var(known / known.mean(), ddof=1)) / (1 + quantity.squared) ** 2,
         )
@@ -158,8 +159,8 @@ class Pairs:
     ----------
     windows, beside : (K,) ndarray
         Relative to the means.
-    variance : float
-        Relative, of the soft run's stretches.
+    stretches : (B,) ndarray
+        The soft run's stretches, relative to the mean of it.
     ratio_log : float
         Logarithm of the mean of the windows over that of the soft run beside them.
     of_block : float
@@ -168,25 +169,30 @@ class Pairs:
 
     windows: Floats
     beside: Floats
-    variance: float
+    stretches: Floats
     ratio_log: float
     of_block: float
+
+    @property
+    def variance(self) -> float:
+        """Relative, of the soft run's stretches."""
+        return float(np.var(self.stretches, ddof=1))
 
     @cached_property
     def slope(self) -> float:
         """Of the windows on the soft run."""
         return float(self.beside @ self.windows / (self.beside @ self.beside))
 
-    @cached_property
-    def about(self) -> float:
-        """Variance of a window about the slope."""
-        rest = self.windows - self.slope * self.beside
-        return float(rest @ rest) / (len(rest) - 2)
+    def about(self, slope: float) -> float:
+        """Variance of a window about a slope that is given."""
+        rest = self.windows - slope * self.beside
+        return float(rest @ rest) / (len(rest) - 1)
 
     @property
     def slope_variance(self) -> float:
-        """Of the slope."""
-        return self.about / float(self.beside @ self.beside)
+        """Of the slope of the windows."""
+        degrees = len(self.windows) - 1
+        return self.about(self.slope) * degrees / (degrees - 1) / float(self.beside @ self.beside)
 
     @property
     def ratio_variance(self) -> float:
@@ -236,8 +242,10 @@ def windows_record(
     )
 
 
-def _between_scenes(values: Sequence[float], variances: Sequence[float]) -> tuple[float, float]:
-    """Mean over scenes, and standard deviation of a further one from it.
+def _between_scenes(
+    values: Sequence[float], variances: Sequence[float]
+) -> tuple[float, float, float]:
+    """Mean over scenes, its standard error, and standard deviation of a further scene from it.
 
     The variance between scenes is by the method of moments (DerSimonian and Laird 1986, Controlled
     Clinical Trials 7, 177), and never taken as less than that of the mean.
@@ -248,23 +256,27 @@ def _between_scenes(values: Sequence[float], variances: Sequence[float]) -> tupl
     excess = float(weight @ (of - mean) ** 2) - (len(of) - 1)
     between = max(excess / float(weight.sum() - weight @ weight / weight.sum()), 0.0)
     weight = 1.0 / (own + between)
-    return float(np.average(of, weights=weight)), math.sqrt(between + 1.0 / float(weight.sum()))
+    error = 1.0 / float(weight.sum())
+    return float(np.average(of, weights=weight)), math.sqrt(error), math.sqrt(between + error)
 
 
 def _known(quantity: Quantity, scenes: Scenes, windowed: Sequence[Windowed]) -> Known | None:
     every = [pairs for of in windowed if (pairs := of.pairs(quantity)) and pairs.variance]
     if len(every) < _FEWEST_SCENES:
         return None
-    ratio, ratio_std = _between_scenes(
+    ratio, _, ratio_std = _between_scenes(
         [of.ratio_log for of in every], [of.ratio_variance for of in every]
     )
-    slope, slope_std = (0.0, 0.0)
-    if not quantity.signed:
-        slope, slope_std = _between_scenes(
-            [of.slope for of in every], [of.slope_variance for of in every]
-        )
-    logs = [math.log(of.about / of.variance) for of in every]
-    by_chance = float(np.mean([2 * polygamma(1, (len(of.windows) - 2) / 2) for of in every]))
+    slope, error, slope_std = _between_scenes(
+        [of.slope for of in every], [of.slope_variance for of in every]
+    )
+    if quantity.signed or slope < NORMAL_QUANTILE * error:  # it would add more than it removes
+        slope = slope_std = 0.0
+    logs = [
+        math.log(of.about(slope) / of.variance) - _log_bias(of.windows) + _log_bias(of.stretches)
+        for of in every
+    ]
+    by_chance = float(np.mean([_by_chance(of.windows) + _by_chance(of.stretches) for of in every]))
     measured = [[*_runs_with(quantity, runs)] for runs in scenes]
     narrow = ratio_std <= _LARGEST_STD and not quantity.signed
     return Known(
@@ -278,6 +290,17 @@ def _known(quantity: Quantity, scenes: Scenes, windowed: Sequence[Windowed]) -> 
         correlation=round(_correlation(measured), 2),
         block_std=round(math.sqrt(float(np.mean([of.of_block for of in every]))), 4),
     )
+
+
+def _log_bias(values: Floats) -> float:
+    """Of the logarithm of the variance of N normal values, whose mean is estimated, too."""
+    half = (len(values) - 1) / 2
+    return float(digamma(half) - math.log(half))
+
+
+def _by_chance(values: Floats) -> float:
+    """Variance of that logarithm."""
+    return float(polygamma(1, (len(values) - 1) / 2))
 
 
 def _runs_with(quantity: Quantity, runs: Sequence[SceneRun]) -> list[QuantityOfRun]:
