@@ -52,6 +52,10 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
                 item.add_marker(skipped)
 
 
+LONGEST = ("attacks/test_damage", "workflow/test_windows", "workflow/test_superposed", "workflow")
+"""Files to begin with, from the longest on; the first makes what all attacks share."""
+
+
 def _longest_files_first(items: list[pytest.Item]) -> None:
     """Let no process begin with a long file when the others have nothing left to do."""
     marked = {
@@ -60,7 +64,12 @@ def _longest_files_first(items: list[pytest.Item]) -> None:
         for mark in item.iter_markers()
         if mark.name in ("slow", "engine")
     }
-    items.sort(key=lambda item: ("workflow" not in item.path.parts[-2:], item.path not in marked))
+
+    def place(item: pytest.Item) -> tuple[int, bool]:
+        known = [number for number, name in enumerate(LONGEST) if f"tests/{name}" in str(item.path)]
+        return min(known, default=len(LONGEST)), item.path not in marked
+
+    items.sort(key=place)
 
 
 @pytest.fixture
