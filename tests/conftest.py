@@ -2,13 +2,14 @@
 
 import copy
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 # Before numpy is imported: threads that wait for work of small matrices take the cores of others.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+import jinja2
 import pytest
 import yaml
 from hypothesis import settings
@@ -70,6 +71,26 @@ def _longest_files_first(items: list[pytest.Item]) -> None:
         return min(known, default=len(LONGEST)), item.path not in marked
 
     items.sort(key=place)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def compiled_once() -> Iterator[None]:
+    """Let each of the project's templates be compiled once, and not for each input script."""
+    shipped = {file.read_text() for file in (ROOT / "templates").iterdir()}
+    known: dict[tuple[Any, ...], Any] = {}
+    compile_anew: Callable[..., Any] = jinja2.Environment.compile
+
+    def compiled(self: jinja2.Environment, source: Any, *names: Any, **options: Any) -> Any:
+        if source not in shipped:
+            return compile_anew(self, source, *names, **options)
+        key = type(self), source, names[0]
+        if key not in known:
+            known[key] = compile_anew(self, source, *names, **options)
+        return known[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(jinja2.Environment, "compile", compiled)
+        yield
 
 
 @pytest.fixture

@@ -15,13 +15,11 @@ import pyarrow.parquet as pq
 import pytest
 import pyvista as pv
 import yaml
-from fat_files import fatten
 from pages import stands_alone
 from paths import PROJECT, ROOT, SMALL_STUDY
 from snakemake_calls import jobs, snakemake, succeed
 
-from dragchain import read_dump, write_tables
-from dragchain.network.write import write_chains
+from dragchain import read_dump
 from dragchain.quantities.registry import REPORTED
 from dragchain.report.cases import ReportedCase, read_study_runs
 from dragchain.tables.columns import _rows
@@ -176,20 +174,6 @@ def test_contact_forces_weight_and_inertia_of_every_particle_balance(finished: P
     assert cut < 0.25 * written
 
 
-def test_all_contact_columns_would_give_the_same_tables(finished: Path, tmp_path: Path) -> None:
-    """Real frames with columns that nobody reads; what the engine wrote stays digit by digit."""
-    (run,) = (finished / "results/small/process").glob("*0.016*")
-    fatten(run, tmp_path / "fat")
-    write_tables(tmp_path / "fat")
-    write_chains(tmp_path / "fat")
-    for name in ("contacts", "workpiece_contacts", "network", "chains"):
-        lean, fat = (
-            pd.read_parquet(folder / f"tables/{name}.parquet") for folder in (run, tmp_path / "fat")
-        )
-        assert len(lean) > 0
-        pd.testing.assert_frame_equal(lean, fat, check_exact=True)
-
-
 @pytest.mark.parametrize(
     "file", sorted((ROOT / "docs/examples").glob("*.ipynb")), ids=lambda f: f.stem
 )
@@ -324,7 +308,11 @@ def test_an_edited_template_runs_what_depends_on_it_and_a_failed_case_is_listed(
     assert "rule run_process" in told
     assert "rule run_filling" not in told and "rule render_filling" not in told
     logs = [file.read_text() for file in finished.glob("results/small/process/*/logs/run.log")]
-    assert sorted("already complete with these inputs" in log for log in logs) == [False, True, True]
+    assert sorted("already complete with these inputs" in log for log in logs) == [
+        False,
+        True,
+        True,
+    ]
     report = finished / "results/small/report"
     assert len(pd.read_parquet(report / "summary.parquet")) == 2
     assert "LIGGGHTS ended normally" in (report / "report.html").read_text()
