@@ -8,6 +8,8 @@ from typing import Any
 
 # Before numpy is imported: threads that wait for work of small matrices take the cores of others.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# Two MPI ranks on a core that is shared: the one that waits lets the other go on.
+os.environ.setdefault("OMPI_MCA_mpi_yield_when_idle", "1")
 
 import jinja2
 import pytest
