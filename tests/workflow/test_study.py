@@ -317,4 +317,5 @@ def test_an_edited_template_runs_what_depends_on_it_and_a_failed_case_is_listed(
     assert len(pd.read_parquet(report / "summary.parquet")) == 2
     assert "LIGGGHTS ended normally" in (report / "report.html").read_text()
     edited(finished, 0.012, 0.016)
-    assert jobs(finished, *STUDY) == {"write_report"}
+    wanted = jobs(finished, *STUDY)
+    assert "write_report" in wanted and not wanted & {"render_process", "run_process"}
