@@ -153,6 +153,8 @@ UNCHANGED = {
     "workpiece.shape": {"drop_test", "filling"},
     "drop_test": {"filling", "process", "lead", "window"},
     "media.count": {"drop_test"},
+    "bowl": {"drop_test"},
+    "pairs.ceramic-ceramic": {"drop_test"},
     "seed": {"drop_test"},
     "compound": {"drop_test"},
     "fidelity": {"drop_test"},
