@@ -2,13 +2,16 @@
 
 import copy
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 # Before numpy is imported: threads that wait for work of small matrices take the cores of others.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# Two MPI ranks on a core that is shared: the one that waits lets the other go on.
+os.environ.setdefault("OMPI_MCA_mpi_yield_when_idle", "1")
 
+import jinja2
 import pytest
 import yaml
 from hypothesis import settings
@@ -52,6 +55,10 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
                 item.add_marker(skipped)
 
 
+LONGEST = ("attacks/test_damage", "workflow/test_windows", "workflow/test_superposed", "workflow")
+"""Files to begin with, from the longest on; the first makes what all attacks share."""
+
+
 def _longest_files_first(items: list[pytest.Item]) -> None:
     """Let no process begin with a long file when the others have nothing left to do."""
     marked = {
@@ -60,7 +67,32 @@ def _longest_files_first(items: list[pytest.Item]) -> None:
         for mark in item.iter_markers()
         if mark.name in ("slow", "engine")
     }
-    items.sort(key=lambda item: ("workflow" not in item.path.parts[-2:], item.path not in marked))
+
+    def place(item: pytest.Item) -> tuple[int, bool]:
+        known = [number for number, name in enumerate(LONGEST) if f"tests/{name}" in str(item.path)]
+        return min(known, default=len(LONGEST)), item.path not in marked
+
+    items.sort(key=place)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def compiled_once() -> Iterator[None]:
+    """Let each of the project's templates be compiled once, and not for each input script."""
+    shipped = {file.read_text() for file in (ROOT / "templates").iterdir()}
+    known: dict[tuple[Any, ...], Any] = {}
+    compile_anew: Callable[..., Any] = jinja2.Environment.compile
+
+    def compiled(self: jinja2.Environment, source: Any, *names: Any, **options: Any) -> Any:
+        if source not in shipped:
+            return compile_anew(self, source, *names, **options)
+        key = type(self), source, names[0]
+        if key not in known:
+            known[key] = compile_anew(self, source, *names, **options)
+        return known[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(jinja2.Environment, "compile", compiled)
+        yield
 
 
 @pytest.fixture

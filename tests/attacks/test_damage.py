@@ -368,7 +368,7 @@ def results() -> dict[str, Result]:
 _RESULTS = results()
 
 
-@pytest.mark.attack(sample=3)
+@pytest.mark.attack(sample=2)
 @pytest.mark.parametrize(("place", "name", "damage", "reader"), _RESULTS.values(), ids=_RESULTS)
 def test_a_damaged_result_is_refused_or_harmless(
     place: str, name: str, damage: Damage, reader: str, study: Undisturbed, tmp_path: Path

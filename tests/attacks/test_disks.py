@@ -36,7 +36,7 @@ def disks() -> dict[str, Full]:
 _DISKS = disks()
 
 
-@pytest.mark.attack(sample=2)
+@pytest.mark.attack(sample=1)
 @pytest.mark.parametrize(("name", "fraction", "later"), _DISKS.values(), ids=_DISKS)
 def test_a_full_disk_leaves_no_hole(
     name: str, fraction: float, later: bool, study: Undisturbed, disk: Disk | None, target: Path

@@ -32,7 +32,7 @@ def kills() -> dict[str, Kill]:
 _KILLS = kills()
 
 
-@pytest.mark.attack(sample=2)
+@pytest.mark.attack(sample=1)
 @pytest.mark.parametrize(("name", "victim", "fraction", "at_once"), _KILLS.values(), ids=_KILLS)
 def test_a_kill_costs_nothing_but_time(
     name: str, victim: str, fraction: float, at_once: bool, study: Undisturbed, tmp_path: Path

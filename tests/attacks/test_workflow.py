@@ -129,18 +129,6 @@ def _unlike_undisturbed(study: Undisturbed, project: Path) -> list[str]:
 # --- other attacks ---------------------------------------------------------------------
 
 
-def _two_at_once(study: Undisturbed, tmp_path: Path) -> None:
-    """A second call while the first runs: a live lock is respected."""
-    project = entry(tmp_path / "project")
-    first = Call(words_of(project), project, tmp_path / "first.log")
-    locks = project / ".snakemake/locks"
-    assert first.wait_until(lambda: bool(list(locks.glob("*")))), first.wait().tail
-    second = whole(project, tmp_path / "second.log")
-    said = first.wait(_PATIENCE_S)
-    assert refused(second, "lock|another|already runs|running"), f"both ran: {second.tail}"
-    assert said.status == 0, said.tail
-
-
 def _of_another_user(study: Undisturbed, tmp_path: Path) -> None:
     """Results that may be read but not written."""
     project = study.copy(tmp_path / "project")
@@ -185,7 +173,6 @@ def _emptied_state(study: Undisturbed, tmp_path: Path) -> None:
 
 
 _PLACES = {
-    "two calls at once": _two_at_once,
     "results of another user": _of_another_user,
     "a study that may not be read": _unreadable,
     "what Snakemake keeps is emptied": _emptied_state,

@@ -8,8 +8,7 @@ import nbformat
 import pytest
 import reference
 import yaml
-from doc_pages import PAGES, template_examples
-from made_scenes import own_template
+from doc_pages import PAGES
 from paths import ROOT, SNAKEFILES
 from pybtex.database import parse_file
 
@@ -17,8 +16,6 @@ import dragchain
 from dragchain.report.page import MINUS
 from dragchain.scaling.document import ScalingFile
 from dragchain.scaling.fit import read_scalings, said
-from dragdeck.cases.case import Case
-from dragdeck.cli import main
 from dragdeck.errors import CautionCode
 from dragdeck.project import Project
 from dragdeck.records.run import CheckCode
@@ -84,16 +81,6 @@ def test_every_value_and_block_of_the_templates_is_on_the_page() -> None:
         assert set(deck.__dataclass_fields__) - {"materials"} <= named
     for template in (ROOT / "templates").glob("*.in.j2"):
         assert set(re.findall(r"{% block (\w+) %}", template.read_text())) <= named, template
-
-
-@pytest.mark.engine
-@pytest.mark.parametrize("name", template_examples())
-def test_a_template_of_the_how_to_passes_the_check(
-    name: str, case: Case, project: Project, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    own_template(case, template_examples()[name], name)
-    monkeypatch.chdir(project.root)
-    assert main(["check", "small"]) == 0
 
 
 def test_every_public_name_of_dragchain_is_on_the_page() -> None:

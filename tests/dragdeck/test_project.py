@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 from dragdeck.project import Project, study_files
-from dragdeck.scenes.process import PROCESS
 from dragdeck.sweep.cases import load_cases
 
 
@@ -28,12 +27,3 @@ def test_files_of_a_study_are_those_of_its_folders_and_its_meshes(
         base,
         base.parent / "templates/process.in.j2",
     ]
-
-
-def test_the_licence_is_no_input_of_a_run(
-    small: dict[str, Any], write_study: Callable[..., Path]
-) -> None:
-    (without,) = load_cases(write_study(small))
-    (stated,) = load_cases(write_study({**small, "licence": "CC-BY-4.0"}))
-    assert stated.study.licence == "CC-BY-4.0" and without.study.licence is None
-    assert PROCESS.run_id(stated) == PROCESS.run_id(without)

@@ -4,11 +4,11 @@ import math
 from pathlib import Path
 from typing import Any
 
+from loading_files import write_without_picture
 from made_run import run_json, stl, write_documents
 from tiny_run_files import WORKPIECE_RADIUS_M, case_json, write_tiny_run
 
 from dragchain import write_tables
-from dragchain.loading.write import write_loading
 from dragchain.network.write import write_chains
 
 TRANSIENT_S = 0.01
@@ -40,5 +40,5 @@ def write_finished_run(folder: Path, **case: Any) -> Path:
     (folder / "workpiece.stl").write_text(square_workpiece())
     write_tables(folder)
     write_chains(folder)
-    write_loading(folder)
+    write_without_picture(folder)
     return folder

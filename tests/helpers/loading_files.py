@@ -7,7 +7,11 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import pytest
 from made_run import line, made_case, output, phases, stl, touching, write_documents
+from matplotlib.figure import Figure
+
+from dragchain.loading.write import write_loading
 
 STEP_S = 1e-4
 PERIOD = 10
@@ -95,3 +99,10 @@ def write_run(folder: Path, rows: list[dict[str, Any]]) -> Path:
     )  # fmt: skip
     workpiece.to_parquet(folder / "tables/workpiece_force.parquet")
     return folder
+
+
+def write_without_picture(folder: Path) -> None:
+    """Write the loading of a run; its picture, which takes seconds, is empty."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("dragchain.loading.write.figure_of", lambda loading: Figure())
+        write_loading(folder)

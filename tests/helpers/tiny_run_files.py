@@ -1,11 +1,12 @@
 """The files of a run small enough to check by hand."""
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from made_run import Raw, line, made_case, output, phases, touching, write_documents
+from made_run import Raw, line, made_case, phases, touching, write_documents
+
+from dragdeck.decks import outputs
 
 TIMESTEP_S = 1e-3
 GRAVITY_M_S2 = 9.81
@@ -23,40 +24,16 @@ SPIN_RAD_S = 0.02
 DRAG_START = 20
 LAST = 100
 
-VECTOR = ("x", "y", "z")
-FORCE = [f"force_{axis}_n" for axis in VECTOR]
-COLUMNS: dict[str, list[str]] = {
-    "thermo": ["step", "time_s", "n_particles", "kinetic_energy_j", "rotational_energy_j"],
-    "workpiece_force": [
-        *("step", "time_s", *FORCE),
-        *(f"torque_{axis}_n_m" for axis in VECTOR),
-        *(f"ref_{axis}_m" for axis in VECTOR),
-    ],
-    "workpiece_particles": [
-        *("particle_id", "x_m", "y_m", "z_m", *(f"v{axis}_m_s" for axis in VECTOR)),
-        *(f"w{axis}_rad_s" for axis in VECTOR),
-        *("radius_m", *FORCE),
-    ],
-    "workpiece_contacts": [
-        *(f"point_{axis}_m" for axis in VECTOR),
-        *("facet_id", "particle_id", *FORCE, "overlap_m"),
-    ],
-    "contacts": ["particle1_id", "particle2_id", *FORCE, "overlap_m"],
-    "particles": [
-        *("particle_id", "x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s"),
-        *("wx_rad_s", "wy_rad_s", "wz_rad_s", "radius_m"),
-        *(f"floor_force_{axis}_n" for axis in VECTOR),
-        *(f"side_force_{axis}_n" for axis in VECTOR),
-    ],
+OUTPUTS = {
+    output.name: output
+    for output in (
+        *(outputs.thermo(20, LAST), outputs.workpiece_force(2, LAST, "workpiece")),
+        *(outputs.workpiece_particles(10, 0, LAST), outputs.contacts(20, 0, LAST)),
+        outputs.workpiece_contacts(10, 0, LAST, several=False),
+        outputs.particles(20, 0, LAST, bowl_facets=False),
+    )
 }
-KINDS = {
-    "thermo": ("print", False, "txt", 20, 20),
-    "workpiece_force": ("print", False, "txt", 2, 2),
-    "workpiece_particles": ("custom", True, "bin", 10, 0),
-    "workpiece_contacts": ("local", False, "dump", 10, 0),
-    "contacts": ("local", False, "dump", 20, 0),
-    "particles": ("custom", True, "bin", 20, 0),
-}
+COLUMNS = {name: [column.name for column in output.columns] for name, output in OUTPUTS.items()}
 
 
 def workpiece_x_m(step: int) -> float:
@@ -75,9 +52,13 @@ def chain_n(step: int) -> float:
     return STIFFNESS_N_M * overlap_m(step) if step >= 10 else 0.0
 
 
-def _workpiece_force(step: int) -> list[float]:
+def _thermo(step: int) -> list[list[float]]:
+    return [[step, step * TIMESTEP_S, 4, 0, 0, 0]]
+
+
+def _workpiece_force(step: int) -> list[list[float]]:
     force = [-chain_n(step), 0.0, -WEIGHT_N if step >= 10 else 0.0]
-    return [step, step * TIMESTEP_S, *force, 0, 0, 0, workpiece_x_m(step), 0.0, 0.02]
+    return [[step, step * TIMESTEP_S, *force, 0, 0, 0, workpiece_x_m(step), 0.0, 0.02, 0.0]]
 
 
 def _centre_1(step: int) -> float:
@@ -119,20 +100,6 @@ def _particles(step: int) -> list[list[float]]:
     ]
 
 
-def outputs() -> dict[str, Any]:
-    """The outputs in ``columns.json``."""
-    return {
-        name: output(kind, COLUMNS[name], period, first, LAST, f"{name}.{{part}}.{ending}",
-                     binary=binary, engine_columns=_engine_columns(name))
-        for name, (kind, binary, ending, period, first) in KINDS.items()
-    }  # fmt: skip
-
-
-def _engine_columns(name: str) -> list[str] | None:
-    local = KINDS[name][0] == "local"
-    return [f"c_x[{i}]" for i in range(len(COLUMNS[name]))] if local else None
-
-
 def case_json(**values: Any) -> dict[str, Any]:
     """Content of ``case.json``."""
     tiny = {
@@ -148,36 +115,36 @@ def case_json(**values: Any) -> dict[str, Any]:
     return made_case("process", "tiny-00000000", **tiny | values)
 
 
-def raw_files() -> Mapping[str, bytes]:
-    """Names and contents of the raw outputs."""
-    steps = {name: range(first, LAST + 1, period) for name, (*_, period, first) in KINDS.items()}
-    thermo = [[step, step * TIMESTEP_S, 4, 0, 0] for step in steps["thermo"]]
-    workpiece_force = [_workpiece_force(step) for step in steps["workpiece_force"]]
-    binary = {"workpiece_particles": workpiece_particles, "particles": _particles}
-    text = {"workpiece_contacts": _workpiece_contacts, "contacts": _contacts}
-    return {
-        "thermo.1.txt": Raw.prints(thermo, COLUMNS["thermo"]),
-        "workpiece_force.1.txt": Raw.prints(workpiece_force, COLUMNS["workpiece_force"]),
-        **{
-            f"{name}.1.bin": b"".join(
-                Raw.binary(step, rows(step), len(COLUMNS[name])) for step in steps[name]
-            )
-            for name, rows in binary.items()
-        },
-        **{
-            f"{name}.1.dump": b"".join(
-                Raw.text(step, rows(step), _engine_columns(name), "local") for step in steps[name]
-            )
-            for name, rows in text.items()
-        },
+ROWS = {
+    "thermo": _thermo,
+    "workpiece_force": _workpiece_force,
+    "workpiece_particles": workpiece_particles,
+    "workpiece_contacts": _workpiece_contacts,
+    "contacts": _contacts,
+    "particles": _particles,
+}
+
+
+def _content(output: outputs.Output) -> bytes:
+    """What a raw output contains."""
+    frames = {
+        step: ROWS[output.name](step)
+        for step in range(output.first_step, LAST + 1, output.period_steps)
     }
+    part = output.as_part()
+    if output.kind == "print":
+        return Raw.prints([row for rows in frames.values() for row in rows], part.columns)
+    if output.binary:
+        width = len(part.columns)
+        return b"".join(Raw.binary(step, rows, width) for step, rows in frames.items())
+    return b"".join(Raw.text(step, rows, part.header, "local") for step, rows in frames.items())
 
 
 def write_tiny_run(folder: Path) -> Path:
     """Write the run into a new folder, without its tables."""
-    folder.mkdir()
-    write_documents(folder, case_json(), outputs())
+    parts = {name: output.as_part().model_dump() for name, output in OUTPUTS.items()}
+    write_documents(folder, case_json(), parts)
     (folder / "tables").rmdir()
-    for name, content in raw_files().items():
-        (folder / name).write_bytes(content)
+    for output in OUTPUTS.values():
+        (folder / output.pattern.format(part=1)).write_bytes(_content(output))
     return folder

@@ -175,6 +175,13 @@ def test_an_edit_after_the_advice_runs_all(advised: Path, target: str) -> None:
     assert {"advise", *runs[target]} <= jobs(advised, target, *STUDY)
 
 
+def test_advice_comes_before_the_runs_of_a_study_that_asks(advised: Path) -> None:
+    planned = succeed(advised, "all", *STUDY, "--dry-run")
+    rules = re.findall(r"^(?:local)?rule (\w+):", planned.stdout + planned.stderr, re.MULTILINE)
+    assert rules.count("advise") == 1
+    assert rules.index("advise") < min(map(rules.index, ("run_filling", "run_process")))
+
+
 @pytest.fixture(scope="module")
 def advised(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A project with the advice of a study that asks for a tolerance, and was then edited."""

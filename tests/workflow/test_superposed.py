@@ -196,14 +196,15 @@ def farthest_corner(folder: Path, steps: np.ndarray, ref_m: np.ndarray) -> float
     return off
 
 
-LONG = {"eight-fixed", "eight-tilt-spin", "inclined-tilt", "waypoints-turn"}
+SHORT = ("clockwise", "fixed", "waypoints-spin", "tilt-spin-fixed", "eight", "start", "inclined")
+"""Motions with all that a script can contain; the others take minutes more."""
 
 
 def motions(*names: str) -> pytest.MarkDecorator:
-    """One test for each; the long ones when all tests are wanted."""
-    mark = pytest.mark.long
+    """One test for each; all of them when all tests are wanted."""
+    long = pytest.mark.long
     return pytest.mark.parametrize(
-        "name", [pytest.param(name, marks=[mark] * (name in LONG)) for name in names]
+        "name", [pytest.param(name, marks=[long] * (name not in SHORT)) for name in names]
     )
 
 
@@ -225,7 +226,7 @@ def off_pose(folder: Path, steps: np.ndarray, place: np.ndarray) -> float:
     return float(np.abs(place - moved.places(steps - start, begun)).max())
 
 
-@pytest.mark.parametrize("rpm", [30, -30])
+@pytest.mark.parametrize("rpm", [pytest.param(30, marks=pytest.mark.long), -30])
 def test_the_bed_rotates_with_the_bowl_about_a_workpiece_at_rest(runs: Runs, rpm: float) -> None:
     """The same way and no faster, slowed by the workpiece; the drag is along the bed's motion."""
     path = {"kind": "rest", "radius_m": 0.01, "bowl_rpm": rpm, "revolutions": 0.15}
@@ -244,7 +245,7 @@ def test_the_bed_rotates_with_the_bowl_about_a_workpiece_at_rest(runs: Runs, rpm
     assert force["drag_n"].mean() < 0
 
 
-@motions("clockwise", "waypoints-spin", "tilt-spin-fixed", "eight-tilt-spin", "inclined")
+@motions("planetary", "waypoints-spin", "tilt-spin-fixed", "eight-tilt-spin", "inclined-tilt")
 def test_a_resumed_run_continues_the_motion(runs: Runs, name: str) -> None:
     """A restart file keeps neither axis nor moved centre. Of stages, from within the second."""
     folder = runs.driven(name)

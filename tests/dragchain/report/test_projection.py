@@ -7,7 +7,7 @@ import meshio
 import numpy as np
 import pandas as pd
 import pytest
-from loading_files import SIZE, case_json, made_contacts, write_run
+from loading_files import SIZE, case_json, made_contacts, write_run, write_without_picture
 from made_run import run_json, stl
 from report_files import process_findings, write_measured
 from scipy.spatial.transform import Rotation
@@ -17,7 +17,6 @@ from dragchain.errors import TableError
 from dragchain.loading.contact_events import AMOUNTS, POINT
 from dragchain.loading.document import FILE as LOADING
 from dragchain.loading.document import Loading
-from dragchain.loading.write import write_loading
 from dragchain.report.findings import FILE
 from dragchain.report.projection import Target, write_projection
 from dragchain.run.workpiece import Surface
@@ -49,7 +48,7 @@ def packing(folder: Path, seed: int, law: bool = True) -> Path:
     case = case_json(study | ({"removal": GIVEN} if law else {})) | {"run": run.name}
     (run / "case.json").write_text(json.dumps(case))
     (run / "run.json").write_text(json.dumps(run_json()))
-    write_loading(run)
+    write_without_picture(run)
     process_findings().write(run / FILE)
     load = Loading.read(run / LOADING)
     per_metre = load.totals["force_slide_n_m"] / load.path_m

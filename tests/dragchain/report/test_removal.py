@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import trimesh
-from loading_files import PLATE, made_contacts, write_run
+from loading_files import PLATE, made_contacts, write_run, write_without_picture
 from loading_files import case_json as contact_case
 from report_files import (
     PICTURES,
@@ -28,7 +28,6 @@ from dragchain.loading.document import Loading
 from dragchain.loading.edges import EdgeBands, edge_bands
 from dragchain.loading.samples import Sampled
 from dragchain.loading.wear import Wear
-from dragchain.loading.write import write_loading
 from dragchain.report.removal import (
     Parted,
     edge_rows,
@@ -217,7 +216,7 @@ def report(
             row["tangential_force_n"] *= 1 + 0.5 * seed
         made = write_run(tmp_path / f"made-{seed}", rows)
         (made / "case.json").write_text(json.dumps(contact_case({"removal": removal})))
-        write_loading(made)
+        write_without_picture(made)
         study = {"materials.steel.density_kg_m3": 7800.0, "seed": seed, "removal": removal}
         case = case_json("process", f"run-{seed}", study)
         run = make_run(tmp_path / "results", case, process_findings(), PICTURES)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from loading_files import made_contacts, write_run
+from loading_files import made_contacts, write_run, write_without_picture
 from made_run import particles_kept, run_json, with_motion
 from pages import stands_alone
 from report_files import (
@@ -25,7 +25,6 @@ from report_files import (
 )
 
 from dragchain.errors import MissingRunsError, TableError
-from dragchain.loading.write import write_loading
 from dragchain.report.study_report import write_study_report
 from dragchain.report.summary import main_numbers
 from dragchain.statistics.estimate import Estimate
@@ -181,7 +180,7 @@ def with_settings(process: Path, **settings: float) -> Path:
     case = with_motion(case, circle, 0.01, orientation="follow_path")
     (process / "case.json").write_text(json.dumps(case))
     made = write_run(process.parent / "made", made_contacts())
-    write_loading(made)
+    write_without_picture(made)
     (process / "tables/loading.json").write_bytes((made / "tables/loading.json").read_bytes())
     shutil.rmtree(made)
     return process

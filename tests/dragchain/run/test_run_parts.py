@@ -1,4 +1,3 @@
-import struct
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +9,7 @@ from hypothesis.extra import numpy as arrays
 from made_run import output_of_run
 
 from dragchain.run.run_parts import iter_frames, iter_prints, output_files
-from dragdeck.dumps.reader import read_frames, read_prints
+from dragdeck.dumps.reader import read_prints
 from dragdeck.errors import DumpError, TruncatedDumpError
 
 PARTICLES = output_of_run("particles", "custom", ("particle_id", "x_m"), 10, 0, 20, binary=True)
@@ -28,14 +27,6 @@ def force_file(raw, steps, scale=1.0):
 
 def steps_of(frames):
     return [frame.step for frame in frames]
-
-
-def test_reads_a_frame_in_a_tilted_box(tmp_path: Path, raw) -> None:
-    frame = raw.binary(0, [[1, 2.0]], 2, ranks=1)
-    tilted = frame[:16] + struct.pack("<i", 1) + frame[20:92] + bytes(24) + frame[92:]
-    (tmp_path / "a.bin").write_bytes(tilted)
-    (read,) = read_frames([tmp_path / "a.bin"], PARTICLES)
-    np.testing.assert_array_equal(read.columns["x_m"], [2.0])
 
 
 def test_a_cut_number_is_not_read_as_another_number(tmp_path: Path, raw) -> None:

@@ -1,6 +1,7 @@
 """What a template may do, and what a value may bring into an input script."""
 
 import re
+from pathlib import Path
 
 import pytest
 from made_scenes import BED, own_template, script
@@ -52,7 +53,37 @@ compute particle_contacts all pair/gran/local id force delta"""
 _LOOPS = ("label again\nrun 1\njump SELF again", "jump SELF", "label a\nlabel b\njump SELF a")
 _ANALYSED = ("outputs", "contacts", "run", "integration")
 _NOT_WRITTEN = "would not write the output files"
+_GLOBALS = "__init__.__globals__"
+_SHELL = ".popen('touch pwned').read() }}"
+_NOT_ALLOWED = [
+    *(f"{{{{ {name}.{_GLOBALS}.os{_SHELL}" for name in ("cycler", "joiner", "namespace")),
+    f"{{{{ self.{_GLOBALS}.__builtins__.__import__('os'){_SHELL}",
+    *("{{ deck.__class__ }}", f"{{{{ deck.{_GLOBALS} }}}}", "{{ deck.__module__ }}"),
+    *("{{ '{0.__class__.__mro__}'.format(deck) }}", "{{ '{a.b}'.format_map({'a': deck}) }}"),
+]
+_MISTAKEN = {
+    f"{{{{ (cycler|attr('__init__')|attr('__globals__'))['os']{_SHELL}": "a value is missing",
+    "{{ [deck]|map(attribute='__class__')|list }}": "is not a number",
+    "{{ 1|speeed }}": "No filter named",
+    "{{ 1 is speeed }}": "No test named",
+    "{{ deck.outputs[99].name }}": "has no element 99",
+    "{{ 'a' + 1 }}": "cannot be used",
+    "{% macro m() %}{{ m() }}{% endmacro %}{{ m() }}": "calls itself endlessly",
+    '{% include "../study.yaml" %}': "no such template",
+    '{% include "/etc/passwd" %}': "no such template",
+    '{% import "missing.j2" as m %}': "no such template",
+    "{% do deck.title %}": "unknown tag",
+    "{% set deck.title = 'b' %}": "cannot assign attribute",
+    "{{ " + "(" * 3000 + "1" + ")" * 3000 + " }}": "nested too deeply",
+    "{% if true %}" * 2000 + "{% endif %}" * 2000: "nested too deeply",
+    "{% endblock %}{% block extra %}": "defined twice",
+    "a\x00b": "not printable text",
+}
 REFUSED = [
+    *((PROCESS, in_block(text), "not allowed") for text in _NOT_ALLOWED),
+    *((PROCESS, in_block(text), words) for text, words in _MISTAKEN.items()),
+    (PROCESS, "", "lacks its last command"),
+    (PROCESS, "run 1\n", "lacks its last command"),
     (PROCESS, in_block("{{ ''.__class__.__mro__ }}"), "not allowed"),
     (PROCESS, in_block("{{ deck.outputs.append(1) }}"), "not allowed"),
     (PROCESS, in_block("{{ 'a'.upper() }}"), "not allowed"),
@@ -97,6 +128,39 @@ def test_a_template_that_cannot_be_is_refused_and_named(
     with pytest.raises(InputError, match=words) as caught:
         render(case, project)
     assert name in str(caught.value.file)
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (bytes(range(256)) * 9, "not UTF-8 text"),
+        (_EXTENDS.encode("utf-16"), "not UTF-8 text"),
+        (Path(PROCESS), "this is not a file"),
+        (Path("nothing"), "this is not a file"),
+        (None, "this is not a file"),
+    ],
+)
+def test_a_template_that_cannot_be_read_is_refused(
+    case: Case, project: Project, content: bytes | Path | None, words: str
+) -> None:
+    """Bytes, a link to itself or to nothing, a folder."""
+    file = own_template(case, "")
+    file.unlink()
+    if content is None:
+        file.mkdir()
+    elif isinstance(content, Path):
+        file.symlink_to(content)
+    else:
+        file.write_bytes(content)
+    with pytest.raises(InputError, match=rf"process\.in\.j2: {words}"):
+        render(case, project)
+
+
+def test_templates_that_extend_each_other_are_refused(case: Case, project: Project) -> None:
+    own_template(case, '{% extends "filling.in.j2" %}')
+    own_template(case, '{% extends "process.in.j2" %}', "filling.in.j2")
+    with pytest.raises(InputError, match="extends or calls itself endlessly"):
+        render(case, project)
 
 
 def test_a_new_block_within_a_known_one_is_fine(case: Case, project: Project) -> None:

@@ -44,17 +44,13 @@ def state(folder: Path) -> RunRecord:
     return RunRecord.read(folder / "state.json")
 
 
-def test_a_filling_keeps_every_particle_and_comes_to_rest(filling: Path) -> None:
+def test_a_filling_keeps_every_particle_comes_to_rest_and_is_not_repeated(filling: Path) -> None:
     result = run(filling, silent)
     assert result.state == "complete"
     assert all(check.passed for check in result.checks)
     assert {check.code for check in result.checks} >= {"at_rest", "particles_kept", "within_limits"}
     assert (filling / "packing.restart").is_file()
     assert not list(filling.glob("checkpoint.*"))
-
-
-def test_a_complete_run_is_not_repeated(filling: Path) -> None:
-    run(filling, silent)
     first = (filling / "run.json").read_text()
     (filling / "run.json").unlink()  # as Snakemake does before it runs a rule again
     run(filling, silent)

@@ -186,11 +186,6 @@ def test_the_first_windows_are_spread_over_the_path(count: int) -> None:
         assert sorted(order[:3]) == [2, 8, 13]
 
 
-def test_a_tolerance_does_not_name_a_run(made: Make) -> None:
-    other = made({**SOFT, "windows": {**WINDOWS, "tolerance": 0.2, "quantities": ["drag_mean"]}})
-    assert PROCESS.run_id(other) == PROCESS.run_id(made(SOFT))
-
-
 @pytest.mark.parametrize(
     ("settings", "said"),
     [

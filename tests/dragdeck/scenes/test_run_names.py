@@ -153,11 +153,14 @@ UNCHANGED = {
     "workpiece.shape": {"drop_test", "filling"},
     "drop_test": {"filling", "process", "lead", "window"},
     "media.count": {"drop_test"},
+    "bowl": {"drop_test"},
+    "pairs.ceramic-ceramic": {"drop_test"},
     "seed": {"drop_test"},
     "compound": {"drop_test"},
     "fidelity": {"drop_test"},
     "fidelity.timestep_fraction": {"drop_test", "filling"},
     "fidelity.windows.tolerance": {"drop_test", "filling", "process", "window"},
+    "fidelity.windows.quantities": {"drop_test", "filling", "process", "window"},
     **{block: {"drop_test", "filling", "process", "lead", "window"} for block in OF_NO_RUN},
 }
 """Scenes whose runs are found again when a field, or a field of a block, is changed."""

@@ -74,11 +74,6 @@ def test_a_workpiece_that_follows_a_circle_leans_along_it(moved: Made) -> None:
     assert upright < farthest
 
 
-def test_an_upright_study_keeps_its_run_id(moved: Made) -> None:
-    plain = PROCESS.run_id(moved())
-    assert PROCESS.run_id(moved(tilt_deg=None)) == plain != PROCESS.run_id(moved(tilt_deg=10))
-
-
 INCLINED = [[0, 0, 0], [0.5, 0.002, 0, 0, 40, 20], [1, 0.004, 0, 0, 90, 0, -25]]
 
 

@@ -24,18 +24,7 @@ def ids(case: Case) -> dict[str, str]:
 @pytest.mark.parametrize(
     ("field", "value", "scenes"),
     [
-        ("title", "another", set()),
-        ("assumptions", [{"field": "seed", "why": "any"}], set()),
-        ("reference", {"source": "somebody"}, set()),
-        ("motion.speed_m_s", 0.03, {"process"}),
-        ("motion.immersion_depth_m", 0.01, {"process"}),
-        ("outputs.network_hz", 10, {"process"}),
         ("bowl.facet_size_m", 0.005, {"process"}),
-        ("drop_test.height_m", 0.02, {"drop_test"}),
-        ("seed", 2, {"filling", "process"}),
-        ("media.count", 200, {"filling", "process"}),
-        ("pairs.ceramic-ceramic.friction", 0.5, {"filling", "process"}),
-        ("contact.limit_force", False, {"drop_test", "filling", "process"}),
         ("fidelities.quick.timestep_fraction", 0.4, {"process"}),
         ("fidelities.quick.youngs_modulus_scale", 0.01, {"filling", "process"}),
     ],
@@ -43,6 +32,7 @@ def ids(case: Case) -> dict[str, str]:
 def test_a_run_is_named_by_what_it_depends_on(
     case: Case, made: Made, field: str, value: Any, scenes: set[str]
 ) -> None:
+    """And of all fields: `tests/dragdeck/scenes/test_run_names.py`."""
     before, after = ids(case), ids(made({field: value}))
     assert {scene for scene in SCENES if before[scene] != after[scene]} == scenes
 

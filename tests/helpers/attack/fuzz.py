@@ -14,6 +14,7 @@ from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
 from made_run import Raw
 from plain_dumps import WholeFrame, binary_frames, text_frames
+from spoilt_dumps import NAMES, ROWS, text
 
 from dragdeck.decks.outputs import OutputOfRun
 from dragdeck.dumps.reader import read_dump, read_prints
@@ -88,20 +89,14 @@ def _names_sorted(frames: Frames) -> Frames:
 
 # --- the files ------------------------------------------------------------------------
 
-_NAMES = ("id", "x", "c_f[1]")
-_ROWS = {0: [[3, 0.5, -1e-30], [1, 1 / 3, 2e8], [2, -0.25, 5e-324]], 7: [], 14: [[1, 0.125, 4.0]]}
-
 
 def _text_dumps() -> list[bytes]:
-    return [
-        b"".join(Raw.text(step, rows, _NAMES, kind) for step, rows in _ROWS.items())
-        for kind in ("custom", "local")
-    ]
+    return [text(kind=kind) for kind in ("custom", "local")]
 
 
 def _binary_dumps() -> list[bytes]:
     return [
-        b"".join(Raw.binary(step, rows, 3, ranks) for step, rows in _ROWS.items())
+        b"".join(Raw.binary(step, rows, len(NAMES), ranks) for step, rows in ROWS.items())
         for ranks in (1, 2)
     ]
 
@@ -118,7 +113,7 @@ def _try_text_dump(folder: Path, content: bytes) -> None:
 def _try_binary_dump(folder: Path, content: bytes) -> None:
     file = folder / "a.bin"
     file.write_bytes(content)
-    _compare(lambda: read_dump(file, _NAMES), lambda: binary_frames(content, _NAMES))
+    _compare(lambda: read_dump(file, NAMES), lambda: binary_frames(content, NAMES))
 
 
 def _compare(reader: Callable, oracle: Callable) -> bool:  # type: ignore[type-arg]
@@ -169,8 +164,8 @@ def _try_print_file(folder: Path, content: bytes) -> None:
 def _tables(mark: str, decimal: str) -> list[bytes]:
     rows = [mark.join(f"{one:.4f}".replace(".", decimal) for one in (1e-3 * n, 2.5 - n))
             for n in range(8)]  # fmt: skip
-    text = "\n".join([mark.join(("time_s", "force_n")), "# a remark", *rows, ""])
-    return [text.encode(), text.replace("\n", "\r\n").encode("utf-8-sig")]
+    lines = "\n".join([mark.join(("time_s", "force_n")), "# a remark", *rows, ""])
+    return [lines.encode(), lines.replace("\n", "\r\n").encode("utf-8-sig")]
 
 
 def _try_table(folder: Path, content: bytes) -> None:
@@ -185,8 +180,8 @@ def _try_table(folder: Path, content: bytes) -> None:
         return
     if not known or b'"' in content:  # its callers ask for the names; quotes are left to csv
         return
-    text = content.decode("utf-8-sig", "replace").replace("\r\n", "\n").replace("\r", "\n")
-    lines = text.split("\n")[table.header_line - 1 :]
+    whole = content.decode("utf-8-sig", "replace").replace("\r\n", "\n").replace("\r", "\n")
+    lines = whole.split("\n")[table.header_line - 1 :]
     lines = [line for line in lines if line.strip() and line.lstrip()[0] != "#"]
     mark = next((mark for mark in ";\t" if mark in lines[0]), ",")
     _, *rows = [[cell.strip() for cell in line.split(mark)] for line in lines]

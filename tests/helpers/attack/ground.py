@@ -202,32 +202,23 @@ def _make(root: Path) -> Iterator[Phase]:
         name = place.replace("_", " ")
         words = command("dragdeck", "run", runs[place])
         yield _made(root, Phase(name, words, runs[place], engine=True))
-        analyses = ["tables", "figures"]
-        if place == "process":
-            analyses = ["tables", "chains", "loading", "quantities", "figures"]
-        for step in analyses:
-            if place == "process":
-                words = command("dragchain", step, runs[place])
-                yield _made(root, Phase(step, words, runs[place], engine=False))
-            else:
-                said = main_of("dragchain", [step, runs[place]], root)
-                assert said.status == 0, said.text
+        for step in ("tables", "figures") if place != "process" else ():
+            said = main_of("dragchain", [step, runs[place]], root)
+            assert said.status == 0, said.text
+    for step in ("tables", "chains", "loading", "quantities", "figures"):
+        words = command("dragchain", step, runs["process"])
+        yield _made(root, Phase(step, words, runs["process"], engine=False))
     folder = f"results/{STUDY}/report"
     words = command("dragchain", "report", "--out", folder, runs["process"])
     yield _made(root, Phase("report", words, folder, engine=False))
-
-
-def render_words(place: str, run: str, filling: str | None) -> list[str]:
-    """The command that writes the input script of a run."""
-    bed = ["--packing", f"{filling}/tables/packing.json"] if place == "process" else []
-    return command("dragdeck", "step", "render", STUDY, place, run, *bed)
 
 
 def _render(root: Path, place: str, filling: str | None) -> str:
     """Render the only run of a scene."""
     (case,) = Project(root).cases(STUDY)
     name = SCENES[place].run_id(case)
-    said = call(render_words(place, name, filling), root, root / "said.log")
+    bed = ["--packing", f"{filling}/tables/packing.json"] if place == "process" else []
+    said = main_of("dragdeck", ["step", "render", STUDY, place, name, *bed], root)
     assert said.status == 0, said.text
     return f"results/{STUDY}/{place}/{name}"
 
@@ -236,7 +227,7 @@ def _made(root: Path, phase: Phase) -> Phase:
     before = files_of(root)
     size = size_of(root)
     if phase.name == "chains":  # it compiles code when it is called for the first time
-        call(phase.words, root, root / "said.log")
+        main_of("dragchain", ["chains", phase.run], root)
     spent = _children_s()
     said = call(phase.words, root, root / "said.log")
     assert said.status == 0, f"{phase.name}: {said.text}"
