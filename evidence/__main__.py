@@ -65,13 +65,12 @@ COMMANDS = (
             "Make windows.json and stable_step.json, which decide tolerances and time steps, from "
             "the runs of designed scenes.", "windows.record:write_scene_records", (
         OUT_DIR,
-        Argument("windows", type=Path, metavar="WINDOWS",
-                 help="archive of soft runs and windows: docs/data/windows/drawn.tar.xz"),
         Argument("archives", type=Path, nargs="+", metavar="ARCHIVE",
                  help="archives of whole runs: docs/data/scenes/measures.tar.xz and "
-                 "fresh.tar.xz for the records of this version")),
-        "python -m evidence record-scenes --out workflow/dragdeck/data "
-        "docs/data/windows/drawn.tar.xz docs/data/scenes/*.tar.xz"),
+                 "fresh.tar.xz for the records of this version"),
+        Argument("--windows", type=Path, metavar="ARCHIVE",
+                 help="archive of soft runs and windows, of collect-windows")),
+        "python -m evidence record-scenes --out workflow/dragdeck/data docs/data/scenes/*.tar.xz"),
 )  # fmt: skip
 
 PROGRAM = Program(

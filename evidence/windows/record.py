@@ -5,7 +5,8 @@ ratio of the values at both moduli, the slope of windows on the soft run beside 
 scatter about it, each with its scatter from scene to scene. Scatter between packings, correlation
 of neighbouring blocks, and ``stable_step.json``, the law of the stability number of a time step
 (`StableStepLaw`), are from whole runs of designed scenes at the physical Young's modulus and at
-reduced ones, over one or more packings.
+reduced ones, over one or more packings. Where there are windows in fewer than five scenes, whole
+runs give ratio and scatter, too, and the slope is 0.
 """
 
 import math
@@ -33,6 +34,7 @@ from dragdeck.records.stability import StableStepLaw, StableStepRecord
 from dragdeck.records.tradeoff import SixDigits
 from dragdeck.records.windows import UNKNOWN, Known, WindowsRecord
 
+_SOFT = 1e-3
 _FEWEST_SCENES = 5
 _LARGEST_STD = 0.08
 """A ratio that differs more than this from scene to scene says too little to save windows."""
@@ -51,16 +53,16 @@ Scenes = Sequence[Sequence[SceneRun]]
 """The runs of each scene."""
 
 
-def write_scene_records(out_dir: Path, windows: Path, archives: Sequence[Path]) -> str:
+def write_scene_records(out_dir: Path, archives: Sequence[Path], windows: Path | None) -> str:
     """Write ``windows.json`` and ``stable_step.json``; return a line on each.
 
     Parameters
     ----------
     out_dir : Path
-    windows : Path
-        Archive of soft runs and their windows, of `evidence.windows.drawn.collect_windows`.
     archives : sequence of Path
         Tar archives of ``quantities.json`` files of whole runs.
+    windows : Path or None
+        Archive of soft runs and their windows, of `evidence.windows.drawn.collect_windows`.
 
     Raises
     ------
@@ -68,8 +70,9 @@ def write_scene_records(out_dir: Path, windows: Path, archives: Sequence[Path]) 
         Too few scenes or runs.
     """
     scenes = read_scenes(archives)
-    sources = [file.name for file in (windows, *archives)]
-    record = windows_record(scenes, read_windows(windows), sources)
+    of_windows = [windows] if windows else []
+    windowed = [of for file in of_windows for of in read_windows(file)]
+    record = windows_record(scenes, windowed, [file.name for file in (*of_windows, *archives)])
     step = stable_step_record(scenes)
     record.write(out_dir / "windows.json")
     step.write(out_dir / "stable_step.json")
@@ -94,7 +97,7 @@ def read_scenes(archives: Sequence[Path]) -> Scenes:
     return list(scenes.values())
 
 
-def _measured(scenes: Scenes) -> str:
+def _measured(scenes: Sequence[Sequence[RunQuantities]]) -> str:
     return max(run.started for runs in scenes for run in runs)[:10]
 
 
@@ -234,10 +237,10 @@ def windows_record(
     rows = {quantity.name: _known(quantity, scenes, windowed) for quantity in MEASURED}
     quantities = {name: known for name, known in rows.items() if known}
     if not quantities:
-        raise SeriesError(f"no quantity has windows in {_FEWEST_SCENES} scenes or more")
+        raise SeriesError(f"no quantity is known in {_FEWEST_SCENES} scenes or more")
     return WindowsRecord(
-        measured=max(of.soft.started for of in windowed)[:10],
-        source=f"drawn and designed scenes: {', '.join(sources)}",
+        measured=_measured([*scenes, [of.soft for of in windowed]]),
+        source=f"runs of scenes: {', '.join(sources)}",
         quantities=quantities,
     )
 
@@ -261,35 +264,82 @@ def _between_scenes(
 
 
 def _known(quantity: Quantity, scenes: Scenes, windowed: Sequence[Windowed]) -> Known | None:
-    every = [pairs for of in windowed if (pairs := of.pairs(quantity)) and pairs.variance]
-    if len(every) < _FEWEST_SCENES:
+    measured = [[*_runs_with(quantity, runs)] for runs in scenes]
+    pairs = [of for each in windowed if (of := each.pairs(quantity)) and of.variance]
+    if len(pairs) >= _FEWEST_SCENES:
+        said = _of_windows(quantity, pairs)
+    elif (whole := _of_whole_runs(measured)) is None:
         return None
+    else:
+        said = whole
+    std = said["ratio_log_std"] if not quantity.signed else math.inf
+    return Known(
+        **{name: round(value, 4) for name, value in said.items() if name != "ratio_log_std"},
+        ratio_log_std=round(std, 4) if std <= _LARGEST_STD else math.inf,
+        packing_std=round(_between_packings(measured), 4),
+        correlation=round(_correlation(measured), 2),
+    )
+
+
+def _of_windows(quantity: Quantity, pairs: Sequence[Pairs]) -> dict[str, float]:
+    """What soft runs and their windows say."""
     ratio, _, ratio_std = _between_scenes(
-        [of.ratio_log for of in every], [of.ratio_variance for of in every]
+        [of.ratio_log for of in pairs], [of.ratio_variance for of in pairs]
     )
     slope, error, slope_std = _between_scenes(
-        [of.slope for of in every], [of.slope_variance for of in every]
+        [of.slope for of in pairs], [of.slope_variance for of in pairs]
     )
     if quantity.signed or slope < NORMAL_QUANTILE * error:  # it would add more than it removes
         slope = slope_std = 0.0
     logs = [
         math.log(of.about(slope) / of.variance) - _log_bias(of.windows) + _log_bias(of.stretches)
-        for of in every
+        for of in pairs
     ]
-    by_chance = float(np.mean([_by_chance(of.windows) + _by_chance(of.stretches) for of in every]))
-    measured = [[*_runs_with(quantity, runs)] for runs in scenes]
-    narrow = ratio_std <= _LARGEST_STD and not quantity.signed
-    return Known(
-        ratio_log=round(ratio, 4),
-        ratio_log_std=round(ratio_std, 4) if narrow else math.inf,
-        slope=round(slope, 3),
-        slope_std=round(slope_std, 3),
-        variance_ratio=round(math.exp(float(np.mean(logs))), 3),
-        degrees=round(_degrees(float(np.var(logs, ddof=1)) - by_chance), 1),
-        packing_std=round(_between_packings(measured), 4),
-        correlation=round(_correlation(measured), 2),
-        block_std=round(math.sqrt(float(np.mean([of.of_block for of in every]))), 4),
-    )
+    by_chance = float(np.mean([_by_chance(of.windows) + _by_chance(of.stretches) for of in pairs]))
+    return {
+        "ratio_log": ratio,
+        "ratio_log_std": ratio_std,
+        "slope": slope,
+        "slope_std": slope_std,
+        "variance_ratio": math.exp(float(np.mean(logs))),
+        "degrees": _degrees(float(np.var(logs, ddof=1)) - by_chance),
+        "block_std": math.sqrt(float(np.mean([of.of_block for of in pairs]))),
+    }
+
+
+def _of_whole_runs(scenes: Sequence[Sequence[QuantityOfRun]]) -> dict[str, float] | None:
+    """What runs at both moduli say, which know nothing of each other's noise; None if too few."""
+    pairs = [
+        (stiff, soft)
+        for runs in scenes
+        if (stiff := [run for run in runs if run.run.fidelity.youngs_modulus_scale == 1.0])
+        and (soft := [run for run in runs if _is_soft(run.run)])
+    ]
+    if len(pairs) < _FEWEST_SCENES:
+        return None
+    ratios = [math.log(_mean(stiff, "value") / _mean(soft, "value")) for stiff, soft in pairs]
+    noise = float(np.mean([sum(map(_variance_of_mean, pair)) for pair in pairs]))
+    between = max(float(np.var(ratios, ddof=1)) - noise, 0.0) + noise / len(pairs)
+    logs = [math.log(_mean(stiff, "variance") / _mean(soft, "variance")) for stiff, soft in pairs]
+    by_chance = float(np.mean([sum(map(_log_variance, pair)) for pair in pairs]))
+    return {
+        "ratio_log": float(np.mean(ratios)),
+        "ratio_log_std": math.sqrt(between * (1 + 1 / len(pairs))),
+        "slope": 0.0,
+        "slope_std": 0.0,
+        "variance_ratio": math.exp(float(np.mean(logs))),
+        "degrees": _degrees(float(np.var(logs, ddof=1)) - by_chance),
+        "block_std": math.sqrt(float(np.mean([_mean(soft, "variance") for _, soft in pairs]))),
+    }
+
+
+def _is_soft(run: SceneRun) -> bool:
+    return math.isclose(run.fidelity.youngs_modulus_scale, _SOFT, rel_tol=0.1)
+
+
+def _log_variance(runs: Sequence[QuantityOfRun]) -> float:
+    """Variance of the logarithm of a variance with so many degrees of freedom."""
+    return float(polygamma(1, sum(len(run.blocks) - 1 for run in runs) / 2))
 
 
 def _log_bias(values: Floats) -> float:
