@@ -127,7 +127,7 @@ def _records(case: Case) -> Iterator[str]:
     signal = study.reference.signal if study.reference else None
     if signal:
         record = recorded_file(signal.file, file, "reference.signal.file")
-        yield f"reference.signal: {in_words(record, signal.column, signal.rate_hz)}"
+        yield f"reference.signal: {in_words(record, signal)}"
     if study.calibration and study.calibration.record:
         record = recorded_file(study.calibration.record, file, "calibration.record")
         yield f"calibration.record: {in_words(record)}"
