@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,8 +13,18 @@ import numpy as np
 from dragdeck.errors import InputError
 from dragdeck.mesh import formats
 from dragdeck.mesh.formats import Polygons
+from dragdeck.mesh.remesh import remeshed
 from dragdeck.mesh.step import mesh_step
-from dragdeck.mesh.surface import CAD_VOLUME, MERGED, Floats, Integers, obtuse_third, surface, weld
+from dragdeck.mesh.surface import (
+    CAD_VOLUME,
+    MERGED,
+    REMESHED,
+    Floats,
+    Integers,
+    obtuse_third,
+    surface,
+    weld,
+)
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
@@ -27,30 +38,34 @@ STEP = (".step", ".stp")
 
 def read(
     path: Path | str,
-    unit: str,
+    unit: str | None,
     facet_size_m: float | None = None,
     edge_facet_size_m: float | None = None,
+    widest_m: float = math.inf,
 ) -> Trimesh:
     """Read a surface from STL (ASCII or binary), OBJ, PLY, legacy VTK or VTU, or mesh a STEP part.
 
     STL, OBJ and PLY are read by `formats`, the rest by meshio. VTK polygon data is refused: meshio
     does not know it, and VTK's own reader fills a file that was cut short with whatever the memory
-    holds. gmsh meshes STEP.
+    holds. gmsh meshes STEP; MMG meshes a closed surface anew for which a facet size is given.
 
     Parameters
     ----------
     path : Path or str
         The file; its suffix tells the format.
-    unit : str
-        What one is in the file: a key of `UNITS`.
+    unit : str, optional
+        What one is in the file: a key of `UNITS`; none: the unit that a STEP file states.
     facet_size_m, edge_facet_size_m : float, optional
-        Target edge length of a STEP part's facets, and of those at sharp edges, in metres.
+        Target edge length of the facets, and of those at sharp edges of a STEP part, in metres.
+    widest_m : float, optional
+        Width of the bowl, m, for the message on a part with too many facets.
 
     Returns
     -------
     Trimesh
         In metres, welded, where the file puts it. Its metadata have the nodes that were merged
-        (`MERGED`) and the volume of a STEP part (`CAD_VOLUME`, m3), for `findings`.
+        (`MERGED`), the volume of a part that was meshed here (`CAD_VOLUME`, m3) and the `Deviation`
+        of a surface that was meshed anew (`REMESHED`), for `findings`.
 
     Raises
     ------
@@ -59,12 +74,14 @@ def read(
         or holds cells that are no surface.
     """
     path = Path(path)
-    if unit not in UNITS:
+    step = path.suffix.lower() in STEP
+    if unit not in UNITS and not (step and unit is None):
         raise InputError(
             "unknown length unit", file=path, field="unit", value=unit, limit=", ".join(UNITS)
         )
-    if path.suffix.lower() in STEP:
-        return _read_step(path, unit, facet_size_m, edge_facet_size_m)
+    if step:
+        return _read_step(path, unit, facet_size_m, edge_facet_size_m, widest_m)
+    assert unit is not None
     with _damage(path):
         points, cells = _polygons(path)
         triangles = [_triangles(nodes, points) for nodes in cells]
@@ -73,16 +90,23 @@ def read(
         mesh = weld(body)
     if path.suffix.lower() != ".stl":  # each facet of an STL file has nodes of its own
         mesh.metadata[MERGED] = int(body.referenced_vertices.sum()) - len(mesh.vertices)
-    return mesh
+    if facet_size_m is None:
+        return mesh
+    made, deviation = remeshed(mesh, facet_size_m, path)
+    if deviation is not None:
+        made.metadata.update({REMESHED: deviation, CAD_VOLUME: abs(mesh.volume)})
+    return made
 
 
-def _read_step(path: Path, unit: str, size_m: float | None, edge_size_m: float | None) -> Trimesh:
+def _read_step(
+    path: Path, unit: str | None, size_m: float | None, edge_size_m: float | None, widest_m: float
+) -> Trimesh:
     assert size_m is not None, "a study with a STEP part states the size of its facets"
     _refuse_missing(path)
-    unit_m = UNITS[unit]
-    meshed = mesh_step(path, unit, size_m / unit_m, (edge_size_m or size_m) / unit_m)
-    mesh = weld(surface(unit_m * np.array(meshed["points"]), meshed["triangles"]))
-    mesh.metadata[CAD_VOLUME] = unit_m**3 * meshed["volume"]
+    unit_m = None if unit is None else UNITS[unit]
+    meshed = mesh_step(path, unit_m, size_m, edge_size_m or size_m, widest_m)
+    mesh = weld(surface(meshed["points"], meshed["triangles"]))
+    mesh.metadata[CAD_VOLUME] = meshed["volume"]
     return mesh
 
 
@@ -98,7 +122,7 @@ def _polygons(path: Path) -> Polygons:
             "unknown mesh format",
             file=path,
             value=path.suffix or "no suffix",
-            limit=", ".join([*_READERS, *STEP]),
+            limit=", ".join(FORMATS),
             remedy="export the surface as STL",
         )
     _refuse_missing(path)
@@ -134,6 +158,10 @@ _READERS: Mapping[str, Callable[[Path], Polygons]] = {
     ".vtk": _vtk,
     ".vtu": _vtk,
 }
+
+
+FORMATS = (*_READERS, *STEP)
+"""Suffixes of all files that are read."""
 
 
 @contextmanager

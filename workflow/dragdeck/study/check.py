@@ -179,10 +179,11 @@ def _shape(study: Study) -> _Found:
             problem = "the facets at edges are larger than the others"
             yield f"{field}.edge_facet_size_m", problem, f"at most facet_size_m, {size:g}"
         return
-    for name, value in (("facet_size_m", size), ("edge_facet_size_m", edge)):
-        if value is not None:
-            problem = f"{shape.file} is a mesh already: its facets are used as they are"
-            yield f"{field}.{name}", problem, "a STEP file (.step, .stp); or remove the field"
+    if shape.unit is None:
+        yield f"{field}.unit", f"{shape.file} states no unit", "m, cm, mm, um or in"
+    if edge is not None:
+        problem = f"{shape.file} is a mesh: its sharp edges are kept, with facets of one size"
+        yield f"{field}.edge_facet_size_m", problem, "a STEP file (.step, .stp); or no such field"
 
 
 def _motion(study: Study) -> _Found:
