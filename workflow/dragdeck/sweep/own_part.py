@@ -37,11 +37,11 @@ _IMMERSED, _DEEPEST_M = 2 / 3, 0.055
 """Immersion depth divided by the length; and the largest one: a deeper bed has a higher pressure,
 at which particles of `draft` need a smaller time step."""
 
-_BESIDE, _INSIDE, _BELOW, _PATH, _SPREAD = 3.0, 2.0, 4.0, 8.0, 0.046
+_BESIDE, _INSIDE, _BELOW, _PATH, _SPREAD = 3.0, 2.0, 4.0, 6.5, 0.046
 """In diameters: gaps to the wall, the bowl's axis and the floor, length of the path; and relative
 standard deviation of the radius, as in uhlmann2015."""
 
-_SOLID, _MOST_PARTICLES = 0.6, 6000
+_SOLID, _MOST_PARTICLES = 0.6, 3500
 _FACETS_PER_DIAMETER, _MOST_FACETS = 5, 5000
 _TRIES = 4
 
