@@ -222,7 +222,7 @@ def compare_signal(case: ReportedCase, file: Path | None) -> SignalComparison | 
     factor = first.fidelity.speed_factor
     transient_s = factor * needed(first.statistics, "statistics").transient_s
     try:
-        measured = measured_signal(file, signal, first.study.motion, transient_s)
+        measured = measured_signal(file, signal, case.first.process.study.motion, transient_s)
         simulated = tuple(_simulated(study.process, signal) for study in case.studies)
         found = SignalComparison(case, signal, "", measured, simulated, transient_s)
         differences = compared(

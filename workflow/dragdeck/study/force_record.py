@@ -121,9 +121,9 @@ def _series(
 
 def in_words(file: Path, signal: Signal | None = None) -> str:
     """How a record is read: columns, rate, first and last row, and what is missing of it."""
-    table, angle = read_table(file), signal and signal.angle_column
+    table, gaps = read_table(file), signal is not None
+    angle, rate_hz = (signal.angle_column, signal.rate_hz) if signal else (None, None)
     columns = signal.columns if signal else [_column(table, FORCE_COLUMNS)]
-    rate_hz, gaps = signal and signal.rate_hz, signal is not None
     time, values = _series(table, columns, rate_hz, angle, gaps=gaps)
     rate = (len(time) - 1) / (time[-1] - time[0]) if len(time) > 1 else math.nan
     forces = values[: len(columns)]
@@ -410,7 +410,7 @@ def _gathered(
     filled_time, filled = _with_holes(time, values)
     holes = len(filled_time) > len(time)
     even, interval = _even(filled_time, None if holes else lines)
-    missing = ~np.isfinite(filled).all(axis=0)
+    missing = np.asarray(~np.isfinite(filled).all(axis=0))
     if np.count_nonzero(missing) > MOST_MISSING * len(missing):
         value = f"{np.count_nonzero(missing)} of {len(missing)} samples"
         limit, remedy = f"at most {100 * MOST_MISSING:g} %", "record again, or export every sample"
