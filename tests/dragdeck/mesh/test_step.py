@@ -13,7 +13,6 @@ from trimesh import Trimesh
 
 from dragdeck.errors import InputError
 from dragdeck.mesh import checks, files, step_mesher
-from dragdeck.mesh.step import mesh_step
 from dragdeck.mesh.surface import CAD_VOLUME
 
 gmsh = pytest.importorskip("gmsh", reason="gmsh is not made for every machine")
@@ -269,7 +268,7 @@ def test_however_the_mesher_ends_the_file_is_named(
 
     monkeypatch.setattr(subprocess, "run", ended)
     with pytest.raises(InputError, match=problem) as caught:
-        mesh_step(cube, 1e-3, 1e-3, 1e-3)
+        files.read(cube, "mm", 1e-3)
     assert caught.value.value == (
         "last line" if code == 1 else f"the mesher ended with code {code}"
     )

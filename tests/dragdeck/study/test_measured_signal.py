@@ -1,6 +1,7 @@
 """A measured force signal beside a study: what is read, and what is refused before any run."""
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from dragdeck.errors import InputError, RecordError
 from dragdeck.study import force_record
 from dragdeck.study.check import validate
+from dragdeck.study.driven import directions
 from dragdeck.study.force_record import in_words, low_passed, measured_signal
 from dragdeck.study.model import Motion
 from dragdeck.study.reference import Signal
@@ -51,7 +53,8 @@ def read(
 ) -> force_record.MeasuredSignal:
     file = folder / "force.csv"
     file.write_text(content)
-    return measured_signal(file, signal(**fields), Motion.model_validate(motion), 0.5)
+    heading = partial(directions, Motion.model_validate(motion))
+    return measured_signal(file, signal(**fields), heading, 0.5)
 
 
 def test_offset_drift_sign_and_unit_are_undone(tmp_path: Path) -> None:

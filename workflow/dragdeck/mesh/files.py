@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -11,16 +12,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dragdeck.errors import InputError
-from dragdeck.mesh import formats
+from dragdeck.mesh import formats, remesher, step_mesher
+from dragdeck.mesh.deviation import deviation
 from dragdeck.mesh.formats import Polygons
-from dragdeck.mesh.remesh import remeshed
-from dragdeck.mesh.step import mesh_step
+from dragdeck.mesh.mesher import answer_of
+from dragdeck.mesh.step import step_text
 from dragdeck.mesh.surface import (
     CAD_VOLUME,
     MERGED,
     REMESHED,
     Floats,
     Integers,
+    facing_out,
     obtuse_third,
     surface,
     weld,
@@ -34,6 +37,9 @@ UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
 
 STEP = (".step", ".stp")
 """Suffixes of CAD parts, which are meshed here."""
+
+FACET_AREA = 0.433
+"""Area of a facet whose edges have the length 1."""
 
 
 def read(
@@ -92,21 +98,47 @@ def read(
         mesh.metadata[MERGED] = int(body.referenced_vertices.sum()) - len(mesh.vertices)
     if facet_size_m is None:
         return mesh
-    made, deviation = remeshed(mesh, facet_size_m, path)
-    if deviation is not None:
-        made.metadata.update({REMESHED: deviation, CAD_VOLUME: abs(mesh.volume)})
+    return _meshed_anew(mesh, facet_size_m, path)
+
+
+def _meshed_anew(mesh: Trimesh, size_m: float, path: Path) -> Trimesh:
+    """A closed surface with facets of a size; one that is open or has one side only as it is.
+
+    Raises
+    ------
+    InputError
+        mmgpy is missing, the facets would be too many, or MMG cannot mesh the surface.
+    """
+    given = facing_out(mesh) if len(mesh.faces) and mesh.is_watertight else None
+    if given is None:
+        return mesh
+    count = given.area / (FACET_AREA * size_m**2)
+    if count > step_mesher.MOST_FACETS:
+        raise InputError(
+            "the mesh would have too many facets",
+            file=path,
+            value=f"about {count:.3g}",
+            limit=f"at most {step_mesher.MOST_FACETS}",
+            remedy="use a larger facet_size_m: a fifth of a particle's diameter is fine",
+        )
+    content = {"points": (given.vertices / size_m).tolist(), "triangles": given.faces.tolist()}
+    meshed = answer_of(remesher.__file__, path, json.dumps(content), [1.0])
+    made = weld(surface(size_m * np.array(meshed["points"]), meshed["triangles"]))
+    made.metadata.update({REMESHED: deviation(given, made), CAD_VOLUME: given.volume})
     return made
 
 
 def _read_step(
     path: Path, unit: str | None, size_m: float | None, edge_size_m: float | None, widest_m: float
 ) -> Trimesh:
+    """Mesh the surface of the part in a STEP file; the same file gives the same mesh."""
     assert size_m is not None, "a study with a STEP part states the size of its facets"
     _refuse_missing(path)
-    unit_m = None if unit is None else UNITS[unit]
-    meshed = mesh_step(path, unit_m, size_m, edge_size_m or size_m, widest_m)
-    mesh = weld(surface(meshed["points"], meshed["triangles"]))
-    mesh.metadata[CAD_VOLUME] = meshed["volume"]
+    text = step_text(path, None if unit is None else UNITS[unit])
+    lengths_mm = [1e3 * length_m for length_m in (size_m, edge_size_m or size_m, widest_m)]
+    meshed = answer_of(step_mesher.__file__, path, text, lengths_mm)
+    mesh = weld(surface(1e-3 * np.array(meshed["points"]), meshed["triangles"]))
+    mesh.metadata[CAD_VOLUME] = 1e-9 * meshed["volume"]
     return mesh
 
 

@@ -14,16 +14,13 @@ from typing import Any
 from dragdeck.errors import InputError
 from dragdeck.mesh import step_mesher
 
-MOST_FACETS = step_mesher.MOST_FACETS
 
-
-def refused(path: Path, problem: str, value: str, limit: str, remedy: str) -> InputError:
-    """What is wrong with a part, for the user."""
+def _refused(path: Path, problem: str, value: str, limit: str, remedy: str) -> InputError:
     return InputError(problem, file=path, value=value, limit=limit, remedy=remedy)
 
 
-def answer_of(program: str, path: Path, before: Sequence[str], after: Sequence[str]) -> Any:
-    """What a mesher writes as JSON to the file that it is given between other arguments.
+def answer_of(program: str, path: Path, content: str, lengths: Sequence[float]) -> Any:
+    """What a mesher writes as JSON for the content of a file and some lengths.
 
     Raises
     ------
@@ -31,14 +28,15 @@ def answer_of(program: str, path: Path, before: Sequence[str], after: Sequence[s
         It refuses the part in the file `path`, or ends without an answer.
     """
     with TemporaryDirectory() as folder:
-        answer = Path(folder, "answer.json")
-        command = [sys.executable, "-P", program, *before, str(answer), *after]
+        given, answer = Path(folder, "part.step"), Path(folder, "answer.json")
+        given.write_text(content, encoding="latin-1")
+        command = [sys.executable, "-P", program, str(given), str(answer), *map(repr, lengths)]
         done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, check=False)
         if done.returncode or not answer.is_file():
             raise _broken(path, done.returncode, done.stderr.decode("ascii", "replace"))
         content = json.loads(answer.read_text(encoding="ascii"))
     if "refused" in content:
-        raise refused(path, *content["refused"])
+        raise _refused(path, *content["refused"])
     return content
 
 
@@ -47,6 +45,6 @@ def _broken(path: Path, code: int, said: str) -> InputError:
     if -code in (signal.SIGXCPU, signal.SIGKILL):
         limit = f"{step_mesher.CPU_LIMIT_S} s of CPU time"
         remedy = "use a larger facet_size_m and edge_facet_size_m"
-        return refused(path, "the part takes too long to mesh", value, limit, remedy)
+        return _refused(path, "the part takes too long to mesh", value, limit, remedy)
     kind = "STEP file" if path.suffix.lower() in (".step", ".stp") else "surface"
-    return refused(path, f"the {kind} is damaged", value, f"a whole {kind}", step_mesher.EXPORT)
+    return _refused(path, f"the {kind} is damaged", value, f"a whole {kind}", step_mesher.EXPORT)

@@ -5,6 +5,7 @@ Some errors no single field shows: names that do not exist, values that contradi
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
+from functools import partial
 from itertools import pairwise, product
 from pathlib import Path
 from typing import get_args
@@ -14,6 +15,7 @@ from pydantic_core import ErrorDetails
 
 from dragdeck.errors import Caution, InputError, RecordError, choices, near, together
 from dragdeck.study.base import Json, Model, flat
+from dragdeck.study.driven import directions
 from dragdeck.study.model import (
     BUILT_IN_FIDELITIES,
     OF_NO_RUN,
@@ -346,7 +348,12 @@ def _signal(study: Study, file: Path) -> Iterator[InputError]:
     transient_s = motion.uncounted_m / motion.nominal_speed_m_s + motion.ramp_s / 2
     field = "reference.signal.file"
     try:
-        measured_signal(recorded_file(signal.file, file, field), signal, motion, transient_s)
+        measured_signal(
+            recorded_file(signal.file, file, field),
+            signal,
+            partial(directions, motion),
+            transient_s,
+        )
     except RecordError as error:
         problem, value = f"({error.reason}) {error.problem}", error.value or signal.file
         yield InputError(problem, field=field, value=value, limit=error.limit, remedy=error.remedy)

@@ -1,7 +1,7 @@
 """Measured forces over time as CSV files: drop tests, and signals of a process."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -13,8 +13,6 @@ from scipy.signal import butter, correlate, sosfiltfilt
 from scipy.stats import theilslopes
 
 from dragdeck.errors import InputError, RecordError
-from dragdeck.study.driven import DrivenMotion
-from dragdeck.study.model import Motion
 from dragdeck.study.reference import Signal, Span
 from dragdeck.study.table import MOST_MISSING, Floats, Table, column_name, read_table
 
@@ -284,7 +282,6 @@ _MISSING_WEIGHT = 0.1
 """Part of the weight of the filter on missing samples above which a value is left out."""
 
 _SAME_DIRECTION_RAD = math.radians(1)
-_DIRECTION_STEPS = 1_000_000
 _OTHER_TURN = 0.1
 """By which part the turn of an angle in a file may differ from that of the study, beside 10 deg."""
 
@@ -350,7 +347,7 @@ def low_passed(time_s: Floats, force_n: Floats, low_pass_hz: float) -> tuple[Flo
 
 
 def measured_signal(
-    file: Path, signal: Signal, motion: Motion, transient_s: float
+    file: Path, signal: Signal, directions: Callable[[Floats], Floats], transient_s: float
 ) -> MeasuredSignal:
     """Read a measured force signal, and refuse one that no comparison can use.
 
@@ -359,8 +356,9 @@ def measured_signal(
     file : Path
         As for `read_record`, with the columns that `signal` names.
     signal : Signal
-    motion : Motion
-        Of the study: the direction of motion, in which the columns of a fixed sensor are turned.
+    directions : function
+        Direction of motion, (N,) in rad, at times from the start of the drag, (N,) in s, by which
+        the columns of a fixed sensor are turned (`dragdeck.study.driven.directions`).
     transient_s : float
         Time from the start of the drag that no statistic includes, s.
 
@@ -372,7 +370,6 @@ def measured_signal(
         ``angle``, ``axes``, ``columns``, ``missing``, ``time``, ``uneven``, ``short``, ``start``,
         ``clipped`` or ``slow``.
     """
-    _refuse_single_axis(signal, motion)
     table, angle = read_table(file), signal.angle_column
     time, values = _series(table, signal.columns, signal.rate_hz, angle, gaps=True)
     time, values, missing, interval = _gathered(time, values, table.lines, bool(angle))
@@ -394,7 +391,7 @@ def measured_signal(
     kept = time <= end
     since = time[kept] - start
     turned = values[-1, kept] if angle else None
-    force = _along(forces[:, kept], since, turned, signal, motion)
+    force = _along(forces[:, kept], turned, signal, directions(since))
     grid, filtered = low_passed(since, force, signal.low_pass_hz)
     if missing.any():
         weight = low_passed(since, missing[kept].astype(np.float64), signal.low_pass_hz)[1]
@@ -442,10 +439,9 @@ def _with_holes(time: Floats, values: Floats) -> tuple[Floats, Floats]:
     return np.interp(np.arange(count), place, time), filled
 
 
-def _refuse_single_axis(signal: Signal, motion: Motion) -> None:
+def _refuse_single_axis(signal: Signal, direction: Floats) -> None:
     """Refuse a single horizontal axis on a path that turns, unless the sensor turns with it."""
-    whole = np.linspace(0.0, 1.0, 400) * motion.path_length_m / motion.nominal_speed_m_s
-    if signal.fits(turning=bool(np.ptp(_directions(motion, whole)) > _SAME_DIRECTION_RAD)):
+    if signal.fits(turning=bool(np.ptp(direction) > _SAME_DIRECTION_RAD)):
         return
     problem = "it is not stated whether the axes of the sensor turn with the path"
     if signal.orientation:
@@ -458,30 +454,18 @@ def _refuse_single_axis(signal: Signal, motion: Motion) -> None:
     raise RecordError("axes", problem, value=signal.columns[0], limit=limit, remedy=remedy)
 
 
-def _directions(motion: Motion, since_s: Floats) -> Floats:
-    """Direction of motion, (N,), without jumps, at times from the start of the drag, s, rad."""
-    timestep_s = motion.path_length_m / motion.nominal_speed_m_s / _DIRECTION_STEPS
-    driven = DrivenMotion.of(motion, timestep_s, 1.0)
-    since = np.clip(since_s / timestep_s, 0.0, driven.drive.steps)
-    begun = np.array([*motion.path.start_point, motion.path.start_height_m])
-    places = driven.places(since, begun)
-    return np.asarray(np.unwrap(driven.directions(since, places[:, :2])))
-
-
-def _along(
-    forces: Floats, since: Floats, angle: Floats | None, signal: Signal, motion: Motion
-) -> Floats:
-    """The component of the force of all axes of a sensor, (k, N), at times from the start, (N,)."""
+def _along(forces: Floats, angle: Floats | None, signal: Signal, direction: Floats) -> Floats:
+    """The component of the force of all axes of a sensor, (k, N), at (N,) directions of motion."""
     if len(forces) == 1:
+        _refuse_single_axis(signal, direction)
         return np.asarray(forces[0])
     if signal.component == "vertical":
         return np.asarray(forces[2])
-    direction = np.zeros(len(since))
-    if signal.orientation != "follow_path":
-        direction = _directions(motion, since)
-        if angle is not None:
-            _refuse_other_turn(angle, direction)
-            direction = angle
+    if angle is not None:
+        _refuse_other_turn(angle, direction)
+        direction = angle
+    if signal.orientation == "follow_path":
+        direction = np.zeros_like(direction)
     direction = direction - math.radians(signal.x_axis_deg)
     (x, y), cosine, sine = forces[:2], np.cos(direction), np.sin(direction)
     ahead = signal.component == "drag"

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dragdeck.mesh.checks import Surroundings, check, findings
-from dragdeck.mesh.files import STEP, UNITS, read
+from dragdeck.mesh.files import FACET_AREA, STEP, UNITS, read
 from dragdeck.mesh.surface import facing_out, place, points_below, upright, volume_below
 from dragdeck.physics.rounding import rounded
 
@@ -207,7 +207,7 @@ def _facets(part: Path, unit: str | None, axis: str, scene: _Scene) -> tuple[flo
     if unit is not None:
         mesh = upright(read(part, unit), axis)
         problems = findings(mesh, surroundings=around)
-        size = max(size, rounded(math.sqrt(mesh.area / (0.433 * _MOST_FACETS)), up=True))
+        size = max(size, rounded(math.sqrt(mesh.area / (FACET_AREA * _MOST_FACETS)), up=True))
         if not any("facet_size_m" in problem.remedy for problem in problems):
             check(mesh, file=part, surroundings=around)
             if len(mesh.faces) <= 2 * _MOST_FACETS:
