@@ -34,10 +34,10 @@ def answer_of(program: str, path: Path, content: str, lengths: Sequence[float]) 
         done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, check=False)
         if done.returncode or not answer.is_file():
             raise _broken(path, done.returncode, done.stderr.decode("ascii", "replace"))
-        content = json.loads(answer.read_text(encoding="ascii"))
-    if "refused" in content:
-        raise _refused(path, *content["refused"])
-    return content
+        meshed: Any = json.loads(answer.read_text(encoding="ascii"))
+    if "refused" in meshed:
+        raise _refused(path, *meshed["refused"])
+    return meshed
 
 
 def _broken(path: Path, code: int, said: str) -> InputError:
