@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from dragchain.errors import SeriesError as SeriesError
     from dragchain.errors import TableError as TableError
     from dragchain.errors import UnknownNameError as UnknownNameError
+    from dragchain.network.foreign import NetworkOfDump as NetworkOfDump
+    from dragchain.network.foreign import network_of_dump as network_of_dump
     from dragchain.results import FinishedRun as FinishedRun
     from dragchain.results import Study as Study
     from dragchain.results import load as load
@@ -37,6 +39,7 @@ if TYPE_CHECKING:
 
 _MODULES = {
     "dragchain.errors": ("SeriesError", "TableError", "UnknownNameError"),
+    "dragchain.network.foreign": ("NetworkOfDump", "network_of_dump"),
     "dragchain.results": ("FinishedRun", "Study", "load"),
     "dragchain.run.run_parts": ("iter_frames", "iter_prints"),
     "dragchain.statistics.correlated": ("MeanEstimate", "estimate_mean"),

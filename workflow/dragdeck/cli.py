@@ -72,11 +72,13 @@ COMMANDS = (
             "shipped:files", ()),
     Command("new", "create a study",
             "Create studies/STUDY/study.yaml, which takes the fields that it does not set from "
-            "another study.",
+            "another study. From the file of a part, it is a study that runs: unit, axis, bowl, "
+            "path and facets follow from the size of the part, and are stated.",
             "commands:new", (
         Argument("study", metavar="STUDY", help="name of the new study, without spaces"),
         Argument("--from", default="uhlmann2015", metavar="STUDY", dest="base",
-                  help="study to extend (default: %(default)s)")),
+                  help="study to extend, or file of a part: STL, OBJ, PLY, VTK, VTU or STEP "
+                  "(default: %(default)s)")),
             "./run dragdeck new my-part --from uhlmann2015"),
     Command("cases", "list the cases of a study",
             "List the cases of a study with the run ids of their drop test, filling and process. "

@@ -60,6 +60,7 @@ from dragdeck.records.tradeoff import TradeoffRecord, measured_tradeoff
 from dragdeck.scenes.lead import with_leads
 from dragdeck.scenes.process import SCENES
 from dragdeck.scenes.scene import SceneType, StudyScene, read_bed
+from dragdeck.scenes.workpiece import remeshing
 from dragdeck.study.check import explained, warnings
 from dragdeck.study.contact_law import coefficients, modelled
 from dragdeck.study.recorded import recorded_file
@@ -120,14 +121,16 @@ def _check(study: str, fidelity: str | None, verbose: bool) -> None:
 
 
 def _records(case: Case) -> Iterator[str]:
-    """How the measured forces that a study names are read."""
+    """How the files that a study names are read: measured forces, and a surface meshed anew."""
     from dragdeck.study.force_record import in_words
 
     study, file = case.study, case.file
+    if deviation := remeshing(case):
+        yield f"workpiece.shape: {deviation}"
     signal = study.reference.signal if study.reference else None
     if signal:
         record = recorded_file(signal.file, file, "reference.signal.file")
-        yield f"reference.signal: {in_words(record, signal.column, signal.rate_hz)}"
+        yield f"reference.signal: {in_words(record, signal)}"
     if study.calibration and study.calibration.record:
         record = recorded_file(study.calibration.record, file, "calibration.record")
         yield f"calibration.record: {in_words(record)}"
@@ -299,7 +302,8 @@ def preview(study: str, fidelity: str | None, case: str | None) -> None:
     except InputError as error:
         raise located(error) from None
     file = project.results(study) / "preview.png"
-    write_bytes(file, picture(scene, _swept(scene), f"{study}, case {chosen.name}"))
+    title = "\n".join([f"{study}, case {chosen.name}", remeshing(chosen) or ""])
+    write_bytes(file, picture(scene, _swept(scene), title.strip()))
     print(f"{study}: case {chosen.name}" + (f", one of {len(every)} (--case)" if every[1:] else ""))
     print(file)
 

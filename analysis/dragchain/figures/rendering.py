@@ -20,6 +20,8 @@ from dragdeck.errors import DragdeckError
 Image = NDArray[np.uint8]
 """A picture, (H, W, 3)."""
 
+_WINDOW = "VTK_DEFAULT_OPENGL_WINDOW"
+
 
 class RenderError(DragdeckError):
     """Off-screen rendering does not work on this machine."""
@@ -68,9 +70,10 @@ def check_rendering() -> None:
 
 
 def _prefer_egl() -> None:
-    """Spare VTK the search for an X server where there is none."""
+    """Spare VTK the search for an X server where there is none; a user's own window is not used."""
+    os.environ.pop(_WINDOW, None)
     if sys.platform == "linux" and not os.environ.get("DISPLAY"):
-        os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+        os.environ[_WINDOW] = "vtkEGLRenderWindow"
 
 
 def new_plotter(width: int, height: int) -> Any:

@@ -79,6 +79,8 @@ def _workpiece(case: CaseOfRun) -> Iterator[str]:
         yield f"{material} cylinder, diameter {_mm(2 * radius)}"
     else:
         yield f"{material} part {shape.file}, up to {_mm(own.radius_m)} from its axis"
+    if own.remeshed:
+        yield own.remeshed
     if own.count > 1:
         yield f"number {own.number} of {own.count}"
 

@@ -9,6 +9,7 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -27,6 +28,7 @@ from dragchain.run.kinematics import needed, process_time
 from dragchain.statistics.correlated import MIN_SAMPLES, estimate_mean, estimates
 from dragchain.statistics.estimate import Estimate, flattened, t_interval
 from dragdeck.errors import DragdeckError
+from dragdeck.study.driven import directions
 from dragdeck.study.force_record import RATES_PER_BANDWIDTH as PER_HZ
 from dragdeck.study.force_record import MeasuredSignal, low_passed, measured_signal
 from dragdeck.study.reference import Signal
@@ -222,7 +224,8 @@ def compare_signal(case: ReportedCase, file: Path | None) -> SignalComparison | 
     factor = first.fidelity.speed_factor
     transient_s = factor * needed(first.statistics, "statistics").transient_s
     try:
-        measured = measured_signal(file, signal, transient_s)
+        heading = partial(directions, case.first.process.study.motion)
+        measured = measured_signal(file, signal, heading, transient_s)
         simulated = tuple(_simulated(study.process, signal) for study in case.studies)
         found = SignalComparison(case, signal, "", measured, simulated, transient_s)
         differences = compared(

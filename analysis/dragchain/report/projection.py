@@ -27,7 +27,7 @@ from dragchain.run.workpiece import Surface, read_surface
 from dragchain.statistics.correlated import slow_waves
 from dragdeck.errors import InputError
 from dragdeck.files import draft_of
-from dragdeck.mesh.files import read
+from dragdeck.mesh.files import STEP, read
 
 _BLOCK_ROWS = 20_000
 """Contacts of a block, which bounds the memory of the weights."""
@@ -147,7 +147,7 @@ def read_target(mesh: Path, unit: str, length_m: float) -> tuple[Target, Floats,
     if not 0.0 < length_m < np.inf:
         raise InputError("the smoothing length is not positive", field=field, value=length_m,
                          limit="a number above 0, m")  # fmt: skip
-    body = read(mesh, unit, length_m / 2)
+    body = read(mesh, unit, length_m / 2 if mesh.suffix.lower() in STEP else None)
     longest = float(np.max(body.edges_unique_length, initial=0.0))
     if body.is_empty or not longest < length_m:
         raise InputError(

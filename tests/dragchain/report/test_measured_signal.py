@@ -84,7 +84,7 @@ def process(tmp_path: Path) -> Path:
     coarse = np.arange(0.0, 31.0, 0.01)
     drags = [np.interp(time, coarse, synthetic(random, 31.0)) for _ in range(2)]
     own = {"file": "force.csv", "column": "fx_kn", "sign": -1, "starts_at_s": 2.0,
-           "low_pass_hz": 20.0}  # fmt: skip
+           "low_pass_hz": 20.0, "orientation": "follow_path"}  # fmt: skip
     reference = {"source": "SYNTHETIC", "signal": own}
     case = case_json("process", "workpiece-1", {"reference": reference}, timestep_s=step / 4,
                      phases=[{"name": "drag", "start_step": 4000, "end_step": 124000}])  # fmt: skip

@@ -267,3 +267,12 @@ def test_energy_ratio_of_particles_that_fell_their_diameter_is_one(filling: Path
     mass = 2500.0 * 4 / 3 * math.pi * R**3
     ratio = energy_ratio(np.array([2 * mass * 10.0 * 2 * R]), np.array([2.0]), case)
     assert ratio == pytest.approx([1.0])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("window", ["vtkNoSuchWindow", "vtkWin32OpenGLRenderWindow"])
+def test_a_window_in_the_environment_of_a_user_is_not_used(
+    window: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("VTK_DEFAULT_OPENGL_WINDOW", window)
+    check_rendering()

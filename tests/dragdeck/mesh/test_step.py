@@ -13,7 +13,7 @@ from trimesh import Trimesh
 
 from dragdeck.errors import InputError
 from dragdeck.mesh import checks, files, step_mesher
-from dragdeck.mesh.step import mesh_step
+from dragdeck.mesh.surface import CAD_VOLUME
 
 gmsh = pytest.importorskip("gmsh", reason="gmsh is not made for every machine")
 
@@ -104,19 +104,49 @@ def test_the_unit_of_the_file(cube: Path, tmp_path: Path, unit: str) -> None:
     other = inches(text) if unit == "in" else text.replace(".MILLI.", prefix[unit])
     (tmp_path / "other.step").write_text(other)
     one = files.UNITS[unit]
-    body = files.read(tmp_path / "other.step", unit, 5 * one)
-    assert body.extents / one == pytest.approx([10, 10, 10], rel=1e-9)
+    for stated in (unit, None):
+        body = files.read(tmp_path / "other.step", stated, 5 * one)
+        assert body.extents / one == pytest.approx([10, 10, 10], rel=1e-9)
+        assert body.metadata[CAD_VOLUME] == pytest.approx(1e3 * one**3)
     with pytest.raises(InputError, match="another unit") as caught:
         files.read(tmp_path / "other.step", "mm", 5 * one)
-    assert (caught.value.value, caught.value.limit) == ("mm", unit)
+    assert caught.value.value == "0.001 m"
+    assert f"({one:g} m)" in str(caught.value.limit)
     assert caught.value.remedy
 
 
-def test_an_unknown_unit_is_named(cube: Path, tmp_path: Path) -> None:
-    (tmp_path / "part.step").write_text(inches(cube.read_text()).replace("'INCH'", "'FOOT'"))
-    with pytest.raises(InputError, match="another unit") as caught:
-        files.read(tmp_path / "part.step", "in", 0.05)
-    assert caught.value.limit == "FOOT"
+@pytest.mark.parametrize(
+    ("name", "factor", "prefix", "length_m"),
+    [
+        ("FOOT", 304.8, ".MILLI.", 0.3048),
+        ("METRE", 1.0, "$", 1.0),
+        ("MILLIMETRE", 1.0, ".MILLI.", 1e-3),
+        ("thou", 0.0254, ".MILLI.", 2.54e-5),
+    ],
+)
+def test_any_unit_that_the_file_converts(
+    cube: Path, tmp_path: Path, name: str, factor: float, prefix: str, length_m: float
+) -> None:
+    text = inches(cube.read_text()).replace("'INCH'", f"'{name}'")
+    text = text.replace("LENGTH_MEASURE(25.4)", f"LENGTH_MEASURE({factor})")
+    (tmp_path / "part.step").write_text(text.replace(".MILLI.,.METRE.", f"{prefix},.METRE."))
+    body = files.read(tmp_path / "part.step", None, 5 * length_m)
+    assert body.extents == pytest.approx([10 * length_m] * 3, rel=1e-9)
+
+
+@pytest.mark.parametrize("coding", ["utf-8-sig", "utf-16"])
+def test_marks_of_encodings_are_passed_over(cube: Path, tmp_path: Path, coding: str) -> None:
+    (tmp_path / "part.step").write_text(cube.read_text(), encoding=coding)
+    assert files.read(tmp_path / "part.step", "mm", 0.005).volume == pytest.approx(1e-6)
+
+
+def test_a_part_too_large_for_the_bowl_is_told_so(cube: Path, tmp_path: Path) -> None:
+    text = cube.read_text().replace(".MILLI.", "$")
+    (tmp_path / "large.step").write_text(text)
+    with pytest.raises(InputError, match="too large for the bowl") as caught:
+        files.read(tmp_path / "large.step", None, 0.0015, None, 0.08)
+    assert caught.value.value == "10 x 10 x 10 m"
+    assert "0.08 m" in str(caught.value.limit)
 
 
 def test_facets_that_are_coarse_for_the_part_are_said() -> None:
@@ -238,7 +268,7 @@ def test_however_the_mesher_ends_the_file_is_named(
 
     monkeypatch.setattr(subprocess, "run", ended)
     with pytest.raises(InputError, match=problem) as caught:
-        mesh_step(cube, "mm", 1.0, 1.0)
+        files.read(cube, "mm", 1e-3)
     assert caught.value.value == (
         "last line" if code == 1 else f"the mesher ended with code {code}"
     )

@@ -91,8 +91,12 @@ def test_the_default_axis_names_no_new_run(dragged: Dragged) -> None:
     ("shape", "field", "words"),
     [
         ({"file": "a.STEP"}, "facet_size_m", "but the facet size is missing"),
-        ({"file": "a.stl", "facet_size_m": 0.001}, "facet_size_m", "a mesh already"),
-        ({"file": "a.obj", "edge_facet_size_m": 0.001}, "edge_facet_size_m", "a mesh already"),
+        ({"file": "a.stl", "unit": None}, "unit", "states no unit"),
+        (
+            {"file": "a.obj", "edge_facet_size_m": 0.001},
+            "edge_facet_size_m",
+            "is a mesh: its sharp edges",
+        ),
         (
             {"file": "a.stp", "facet_size_m": 0.001, "edge_facet_size_m": 0.002},
             "edge_facet_size_m",

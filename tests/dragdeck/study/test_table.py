@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from dragdeck.errors import InputError
 from dragdeck.study import table
 from dragdeck.study.force_record import in_words, read_samples
+from dragdeck.study.reference import Signal
 from dragdeck.study.table import read_table
 
 TIME, FORCE = [0.0, 0.005, 0.01, 0.015], [-0.06, 0.42, -1234.5, 2.0]
@@ -80,7 +81,8 @@ def test_exports_of_programs_give_the_same_numbers(program: str, tmp_path: Path)
 
 def test_the_reading_is_told_with_its_first_and_last_row(tmp_path: Path) -> None:
     content, column = EXPORTS["names and units"]
-    assert in_words(written(tmp_path, content), column) == (
+    signal = Signal(file="table.csv", column=column, low_pass_hz=1)
+    assert in_words(written(tmp_path, content), signal) == (
         "table.csv read as fx_n: 4 rows at 200 Hz, 0 s, -0.06 N (line 5) to 0.015 s, 2 N (line 8)"
     )
 

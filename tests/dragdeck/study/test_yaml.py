@@ -87,3 +87,37 @@ def test_a_byte_order_mark_is_no_trouble(tmp_path: Path) -> None:
     file = tmp_path / "study.yaml"
     file.write_bytes("title: Schüssel\n".encode("utf-8-sig"))
     assert read_yaml(file) == {"title": "Schüssel"}
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "words"),
+    [
+        ("bowl: {radius_m: 0,025, height_m: 0.1}", 1, "a decimal comma in 0,025: write 0.025"),
+        ("bowl: {radius_m: -1, 5}", 1, "a decimal comma in -1,5"),
+        ("motion:\n  speed_m_s: 0,01\n", 2, "'0,01' has a comma: write 0.01 with a decimal point"),
+        ('motion:\n  speed_m_s: "1,5e-2"\n', 2, "write 1.5e-2 with"),
+        ("motion:\n  speed_m_s: [0,1]\n", 2, "if its comma is a decimal comma"),
+        ("sweep:\n  motion.speed_m_s: [1,5]\n", 2, "motion.speed_m_s: [1,5]"),
+    ],
+)
+def test_decimal_commas_are_refused_with_a_word(
+    tmp_path: Path, small: dict[str, Any], text: str, line: int, words: str
+) -> None:
+    file = tmp_path / "study.yaml"
+    file.write_text(text)
+    with pytest.raises(InputError) as caught:
+        changes: Any = read_yaml(file)
+        for block, values in changes.items():
+            small[block] = {**small.get(block, {}), **values}
+        validate(small, file, whole=True)
+    assert words in str(caught.value) or words in f"{caught.value.field}: {caught.value.value}"
+    assert caught.value.line == line or caught.value.field == f"line {line}"
+
+
+@pytest.mark.parametrize("levels", ["[1, 5]", "[1,5,7]", "[0.1,0.5]"])
+def test_lists_that_are_no_decimal_commas_are_read(
+    tmp_path: Path, small: dict[str, Any], levels: str
+) -> None:
+    file = tmp_path / "study.yaml"
+    file.write_text(f"sweep:\n  seed: [1,2]\n  motion.speed_m_s: {levels}\n")
+    assert validate(small | read_yaml(file), file, whole=True).sweep

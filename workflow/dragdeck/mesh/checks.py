@@ -17,6 +17,7 @@ from dragdeck.mesh.surface import (
     CAD_VOLUME,
     MERGED,
     NODE_PRECISION_M,
+    REMESHED,
     Floats,
     Integers,
     are_lengths,
@@ -201,7 +202,7 @@ def _unit_remedy(mesh: Trimesh, scene: Surroundings) -> str:
 def _degenerate(mesh: Trimesh) -> list[Finding]:
     bad = ~mesh.nondegenerate_faces(height=NODE_PRECISION_M)
     limit = f"a height above the precision of LIGGGHTS, {NODE_PRECISION_M:g} m"
-    remedy = "remove degenerate facets in a mesh workpiece and export again"
+    remedy = "remove degenerate facets in a mesh workpiece and export again, or state facet_size_m"
     return _facets(bad, "a facet has no area", limit, remedy)
 
 
@@ -214,7 +215,10 @@ def _sharp_angles(mesh: Trimesh, sound: NDArray[np.bool_]) -> list[Finding]:
     smallest = np.where(sound, np.degrees(mesh.face_angles.min(axis=1)), np.inf)
     x, y, z = 1e3 * mesh.triangles_center[smallest.argmin()]
     at = f"at ({x:.4g}, {y:.4g}, {z:.4g}) mm, clamp upwards"
-    remedy, measured = "remesh with better shaped triangles", f"{smallest.min():.4g} degrees {at}; "
+    remedy = "state facet_size_m of a mesh workpiece: its surface is then meshed anew"
+    if REMESHED in mesh.metadata:
+        remedy = "use another facet_size_m, or remove tiny details of the part"
+    measured = f"{smallest.min():.4g} degrees {at}; "
     problem = "the angle of a facet is too sharp for LIGGGHTS"
     limit = f"above the curvature of the mesh, {_CURVATURE_DEG:g} degrees"
     errors = _facets(smallest <= _CURVATURE_DEG, problem, limit, remedy, measured)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,10 +12,22 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dragdeck.errors import InputError
-from dragdeck.mesh import formats
+from dragdeck.mesh import formats, remesher, step_mesher
+from dragdeck.mesh.deviation import deviation
 from dragdeck.mesh.formats import Polygons
-from dragdeck.mesh.step import mesh_step
-from dragdeck.mesh.surface import CAD_VOLUME, MERGED, Floats, Integers, obtuse_third, surface, weld
+from dragdeck.mesh.mesher import answer_of
+from dragdeck.mesh.step import step_text
+from dragdeck.mesh.surface import (
+    CAD_VOLUME,
+    MERGED,
+    REMESHED,
+    Floats,
+    Integers,
+    facing_out,
+    obtuse_third,
+    surface,
+    weld,
+)
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
@@ -24,33 +38,40 @@ UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
 STEP = (".step", ".stp")
 """Suffixes of CAD parts, which are meshed here."""
 
+FACET_AREA = 0.433
+"""Area of a facet whose edges have the length 1."""
+
 
 def read(
     path: Path | str,
-    unit: str,
+    unit: str | None,
     facet_size_m: float | None = None,
     edge_facet_size_m: float | None = None,
+    widest_m: float = math.inf,
 ) -> Trimesh:
     """Read a surface from STL (ASCII or binary), OBJ, PLY, legacy VTK or VTU, or mesh a STEP part.
 
     STL, OBJ and PLY are read by `formats`, the rest by meshio. VTK polygon data is refused: meshio
     does not know it, and VTK's own reader fills a file that was cut short with whatever the memory
-    holds. gmsh meshes STEP.
+    holds. gmsh meshes STEP; MMG meshes a closed surface anew for which a facet size is given.
 
     Parameters
     ----------
     path : Path or str
         The file; its suffix tells the format.
-    unit : str
-        What one is in the file: a key of `UNITS`.
+    unit : str, optional
+        What one is in the file: a key of `UNITS`; none: the unit that a STEP file states.
     facet_size_m, edge_facet_size_m : float, optional
-        Target edge length of a STEP part's facets, and of those at sharp edges, in metres.
+        Target edge length of the facets, and of those at sharp edges of a STEP part, in metres.
+    widest_m : float, optional
+        Width of the bowl, m, for the message on a part with too many facets.
 
     Returns
     -------
     Trimesh
         In metres, welded, where the file puts it. Its metadata have the nodes that were merged
-        (`MERGED`) and the volume of a STEP part (`CAD_VOLUME`, m3), for `findings`.
+        (`MERGED`), the volume of a part that was meshed here (`CAD_VOLUME`, m3) and the `Deviation`
+        of a surface that was meshed anew (`REMESHED`), for `findings`.
 
     Raises
     ------
@@ -59,12 +80,14 @@ def read(
         or holds cells that are no surface.
     """
     path = Path(path)
-    if unit not in UNITS:
+    step = path.suffix.lower() in STEP
+    if unit not in UNITS and not (step and unit is None):
         raise InputError(
             "unknown length unit", file=path, field="unit", value=unit, limit=", ".join(UNITS)
         )
-    if path.suffix.lower() in STEP:
-        return _read_step(path, unit, facet_size_m, edge_facet_size_m)
+    if step:
+        return _read_step(path, unit, facet_size_m, edge_facet_size_m, widest_m)
+    assert unit is not None
     with _damage(path):
         points, cells = _polygons(path)
         triangles = [_triangles(nodes, points) for nodes in cells]
@@ -73,16 +96,49 @@ def read(
         mesh = weld(body)
     if path.suffix.lower() != ".stl":  # each facet of an STL file has nodes of its own
         mesh.metadata[MERGED] = int(body.referenced_vertices.sum()) - len(mesh.vertices)
-    return mesh
+    if facet_size_m is None:
+        return mesh
+    return _meshed_anew(mesh, facet_size_m, path)
 
 
-def _read_step(path: Path, unit: str, size_m: float | None, edge_size_m: float | None) -> Trimesh:
+def _meshed_anew(mesh: Trimesh, size_m: float, path: Path) -> Trimesh:
+    """A closed surface with facets of a size; one that is open or has one side only as it is.
+
+    Raises
+    ------
+    InputError
+        mmgpy is missing, the facets would be too many, or MMG cannot mesh the surface.
+    """
+    given = facing_out(mesh) if len(mesh.faces) and mesh.is_watertight else None
+    if given is None:
+        return mesh
+    count = given.area / (FACET_AREA * size_m**2)
+    if count > step_mesher.MOST_FACETS:
+        raise InputError(
+            "the mesh would have too many facets",
+            file=path,
+            value=f"about {count:.3g}",
+            limit=f"at most {step_mesher.MOST_FACETS}",
+            remedy="use a larger facet_size_m: a fifth of a particle's diameter is fine",
+        )
+    content = {"points": (given.vertices / size_m).tolist(), "triangles": given.faces.tolist()}
+    meshed = answer_of(remesher.__file__, path, json.dumps(content), [1.0])
+    made = weld(surface(size_m * np.array(meshed["points"]), meshed["triangles"]))
+    made.metadata.update({REMESHED: deviation(given, made), CAD_VOLUME: given.volume})
+    return made
+
+
+def _read_step(
+    path: Path, unit: str | None, size_m: float | None, edge_size_m: float | None, widest_m: float
+) -> Trimesh:
+    """Mesh the surface of the part in a STEP file; the same file gives the same mesh."""
     assert size_m is not None, "a study with a STEP part states the size of its facets"
     _refuse_missing(path)
-    unit_m = UNITS[unit]
-    meshed = mesh_step(path, unit, size_m / unit_m, (edge_size_m or size_m) / unit_m)
-    mesh = weld(surface(unit_m * np.array(meshed["points"]), meshed["triangles"]))
-    mesh.metadata[CAD_VOLUME] = unit_m**3 * meshed["volume"]
+    text = step_text(path, None if unit is None else UNITS[unit])
+    lengths_mm = [1e3 * length_m for length_m in (size_m, edge_size_m or size_m, widest_m)]
+    meshed = answer_of(step_mesher.__file__, path, text, lengths_mm)
+    mesh = weld(surface(1e-3 * np.array(meshed["points"]), meshed["triangles"]))
+    mesh.metadata[CAD_VOLUME] = 1e-9 * meshed["volume"]
     return mesh
 
 
@@ -98,7 +154,7 @@ def _polygons(path: Path) -> Polygons:
             "unknown mesh format",
             file=path,
             value=path.suffix or "no suffix",
-            limit=", ".join([*_READERS, *STEP]),
+            limit=", ".join(FORMATS),
             remedy="export the surface as STL",
         )
     _refuse_missing(path)
@@ -134,6 +190,10 @@ _READERS: Mapping[str, Callable[[Path], Polygons]] = {
     ".vtk": _vtk,
     ".vtu": _vtk,
 }
+
+
+FORMATS = (*_READERS, *STEP)
+"""Suffixes of all files that are read."""
 
 
 @contextmanager

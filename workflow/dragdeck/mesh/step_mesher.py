@@ -18,7 +18,7 @@ import numpy as np
 CPU_LIMIT_S = 120
 """More CPU time than any sensible part needs, s."""
 
-_MOST_FACETS = 200_000
+MOST_FACETS = 200_000
 """More facets than any workpiece needs: a facet size in the wrong unit."""
 
 _SHARP_DEG = 30.0
@@ -56,22 +56,22 @@ class Refusal(Exception):
     """What is wrong with a part: problem, value, limit and remedy of the message."""
 
 
-def main(file: str, answer: str, unit: str, size: str, edge_size: str) -> None:
+def main(file: str, answer: str, size: str, edge_size: str, widest: str) -> None:
     """Write the mesh, or why there is none, as JSON.
 
     Parameters
     ----------
     file, answer : str
         The STEP file; the file to write.
-    unit : str
-        OpenCASCADE's name of the unit that the numbers shall be in.
     size, edge_size : str
-        Target edge length of the facets, and of those at sharp edges, in that unit.
+        Target edge length of the facets, and of those at sharp edges, mm.
+    widest : str
+        Width of the bowl, mm, in which a part of too many facets does not fit.
     """
     resource.setrlimit(resource.RLIMIT_CPU, (CPU_LIMIT_S, CPU_LIMIT_S))
     meshed: Meshed | dict[str, tuple[object, ...]]
     try:
-        meshed = _mesh(_gmsh(), file, unit, float(size), float(edge_size))
+        meshed = _mesh(_gmsh(), file, float(size), float(edge_size), float(widest))
     except Refusal as refusal:
         meshed = {"refused": refusal.args}
     Path(answer).write_text(json.dumps(meshed), encoding="ascii")
@@ -86,15 +86,15 @@ def _gmsh() -> Any:
     return gmsh
 
 
-def _mesh(gmsh: Any, file: str, unit: str, size: float, edge_size: float) -> Meshed:
-    """The mesh of the only solid of a file, in the unit."""
+def _mesh(gmsh: Any, file: str, size: float, edge_size: float, widest: float) -> Meshed:
+    """The mesh of the only solid of a file, in mm."""
     gmsh.initialize(readConfigFiles=False, interruptible=False)
     try:
         for name, value in _OPTIONS.items():
             gmsh.option.setNumber(name, value)
-        gmsh.option.setString("Geometry.OCCTargetUnit", unit)
+        gmsh.option.setString("Geometry.OCCTargetUnit", "MM")
         solid = _solid(gmsh, file)
-        _set_sizes(gmsh, size, edge_size)
+        _set_sizes(gmsh, size, edge_size, widest)
         points, triangles = _surface(gmsh)
         volume = gmsh.model.occ.getMass(3, solid)
         return {"points": points, "triangles": triangles, "volume": volume}
@@ -121,25 +121,33 @@ def _solid(gmsh: Any, file: str) -> int:
     raise Refusal("the STEP file contains several parts", value, limit, parts)
 
 
-def _refuse_too_many(gmsh: Any, size: float, edge_size: float, sharp: list[int]) -> None:
+def _refuse_too_many(
+    gmsh: Any, size: float, edge_size: float, widest: float, sharp: list[int]
+) -> None:
     """Refuse sizes that make too many facets; beside an edge, ``1 / size^2`` is integrated."""
     area, length = (
         sum(gmsh.model.occ.getMass(dimension, entity) for entity in ones)
         for dimension, ones in ((2, [face for _, face in gmsh.model.getEntities(2)]), (1, sharp))
     )
     facets = (area / size**2 + 2 * _GROWTH * length * (1 / edge_size - 1 / size)) / 0.433
-    if facets > _MOST_FACETS:
+    if facets > MOST_FACETS:
+        low, high = np.array(gmsh.model.getBoundingBox(-1, -1)).reshape(2, 3) / 1e3
+        if sorted(high - low)[1] > widest / 1e3:
+            value = " x ".join(f"{length:.4g}" for length in high - low) + " m"
+            limit = f"narrower than the bowl, {widest / 1e3:g} m, about one axis at least"
+            remedy = "correct the unit or the size of the part, or use a wider bowl"
+            raise Refusal("the part is too large for the bowl", value, limit, remedy)
         field = "facet_size_m" if edge_size >= size else "facet_size_m or edge_facet_size_m"
         remedy = f"use a larger {field}: a fifth of a particle's diameter is fine"
-        limit = f"at most {_MOST_FACETS}"
+        limit = f"at most {MOST_FACETS}"
         raise Refusal("the mesh would have too many facets", f"about {facets:.3g}", limit, remedy)
 
 
-def _set_sizes(gmsh: Any, size: float, edge_size: float) -> None:
+def _set_sizes(gmsh: Any, size: float, edge_size: float, widest: float) -> None:
     gmsh.option.setNumber("Mesh.MeshSizeMax", size)
     finer = edge_size < size
     sharp = [curve for _, curve in gmsh.model.getEntities(1) if finer and _is_sharp(gmsh, curve)]
-    _refuse_too_many(gmsh, size, edge_size, sharp)
+    _refuse_too_many(gmsh, size, edge_size, widest, sharp)
     if not sharp:
         return
     field = gmsh.model.mesh.field

@@ -16,7 +16,7 @@ Integers = NDArray[np.int64]
 NODE_PRECISION_M = 1e-8
 """Nodes closer than this are one node to the engine (its `precision`)."""
 
-MERGED, CAD_VOLUME = "merged_nodes", "cad_volume_m3"
+MERGED, CAD_VOLUME, REMESHED = "merged_nodes", "cad_volume_m3", "remeshed"
 """Keys of a mesh's metadata: what it was read from, for `findings`."""
 
 _FARTHEST_M = 1e100

@@ -56,6 +56,8 @@ class WorkpieceOfRun(Part):
     wake_from_m : float or None
         Path length after which its axis is where a workpiece has passed before; absent if that
         never happens, or if the path is not a circle.
+    remeshed : str or None
+        How its surface differs from that in the file; absent if it is that of the file.
     kind : str
         ``cylinder`` or ``mesh``.
     radius_m : float
@@ -76,6 +78,7 @@ class WorkpieceOfRun(Part):
     number: int = omitted(0)
     count: PositiveInt = omitted(1)
     wake_from_m: PositiveFloat | None = omitted(None)
+    remeshed: str | None = omitted(None)
 
 
 class AssumptionOfRun(Part):

@@ -36,6 +36,7 @@ from dragdeck.mesh.contacts import gap_fraction
 from dragdeck.mesh.files import read
 from dragdeck.mesh.shapes import cylinder, cylinder_facets, cylinder_radius
 from dragdeck.mesh.surface import (
+    REMESHED,
     facing_out,
     place,
     points_below,
@@ -141,6 +142,15 @@ def _postures(case: Case) -> Iterator[NDArray[np.float64]]:
         yield mesh.vertices @ rotation.T
 
 
+def remeshing(case: Case) -> str | None:
+    """How the surface of a workpiece that was meshed anew differs from that in its file."""
+    shape = case.study.workpiece.shape
+    if isinstance(shape, CylinderShape):
+        return None
+    deviation = _of_case(case, shape)[0].metadata.get(REMESHED)
+    return deviation and f"{shape.file}, {deviation}"
+
+
 def workpiece_warnings(case: Case) -> list[Caution]:
     """What is doubtful in the mesh of the user's, what was repaired, and what makes it slow."""
     shape, said = case.study.workpiece.shape, []
@@ -174,13 +184,10 @@ def _too_fine(case: Case) -> Iterator[Caution]:
     if facets <= enough:
         return
     coarser = 1.1 * math.sqrt(facets / enough)  # not all facets scale alike
-    size = shape.facet_size_m
-    along = " (facet_length_m in proportion)" if isinstance(shape, CylinderShape) else ""
-    remedy = (
-        f"mesh it with facets {coarser:.2g} times as long"
-        if size is None
-        else f"workpiece.shape.facet_size_m: {rounded(size * coarser, up=True):g} would do{along}"
-    )
+    of_file = isinstance(shape, MeshShape)
+    size = shape.facet_size_m or float(np.median(workpiece_mesh(case).edges_unique_length))
+    along = "" if of_file else " (facet_length_m in proportion)"
+    remedy = f"workpiece.shape.facet_size_m: {rounded(size * coarser, up=True):g} would do{along}"
     yield Caution(
         "facets",
         f"{facets:,} facets make a step about {1 + facets * FACET_STEP_S / particles_s:.2g} times "
@@ -310,17 +317,19 @@ def _workpiece(shape: CylinderShape, length_m: float) -> "Trimesh":
 def _from_file(
     file: Path, shape: MeshShape, surroundings: Surroundings
 ) -> "tuple[Trimesh, list[Finding]]":
-    mesh = _read(file, shape)
+    mesh = _read(file, shape, 2 * surroundings.bowl_radius_m)
     problems = check(mesh, file=file, field="workpiece.shape", surroundings=surroundings)
     turned = facing_out(mesh)
     assert turned is not None, "the check refuses a surface with one side"
-    return place(turned, shape.offset_m), problems
+    placed = place(turned, shape.offset_m)
+    placed.metadata.update(mesh.metadata)
+    return placed, problems
 
 
 @lru_cache(maxsize=8)
-def _read(file: Path, shape: MeshShape) -> "Trimesh":
+def _read(file: Path, shape: MeshShape, widest_m: float) -> "Trimesh":
     sizes = shape.facet_size_m, shape.edge_facet_size_m
-    return upright(read(file, shape.unit, *sizes), shape.axis)
+    return upright(read(file, shape.unit, *sizes, widest_m), shape.axis)
 
 
 # --- whether it fits -----------------------------------------------------------------------------

@@ -27,6 +27,10 @@ def _number(value: object) -> object:
     if isinstance(value, bool):
         raise ValueError("a number is required, not true or false")
     if isinstance(value, str):
+        if DECIMAL.fullmatch(value.replace(",", ".")) and value.count(",") == 1:
+            raise ValueError(
+                f"{value!r} has a comma: write {value.replace(',', '.')} with a decimal point"
+            )
         if not DECIMAL.fullmatch(value):
             raise ValueError(f"{value!r} is text, not a number: write it as 300, 0.5 or 5e6")
         return float(value)

@@ -5,6 +5,7 @@ Some errors no single field shows: names that do not exist, values that contradi
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
+from functools import partial
 from itertools import pairwise, product
 from pathlib import Path
 from typing import get_args
@@ -14,6 +15,7 @@ from pydantic_core import ErrorDetails
 
 from dragdeck.errors import Caution, InputError, RecordError, choices, near, together
 from dragdeck.study.base import Json, Model, flat
+from dragdeck.study.driven import directions
 from dragdeck.study.model import (
     BUILT_IN_FIDELITIES,
     OF_NO_RUN,
@@ -28,7 +30,7 @@ from dragdeck.study.recorded import Places, mesh_errors, recorded_file, with_rec
 from dragdeck.study.removal import disagreements
 from dragdeck.study.search import Search
 from dragdeck.study.workpiece import CylinderShape, Shape
-from dragdeck.study.yaml import located, shown
+from dragdeck.study.yaml import comma_lists, located, shown
 
 _LEAST_LEVELS = 3
 """Levels that a power law is fitted to: two would fit any."""
@@ -179,10 +181,11 @@ def _shape(study: Study) -> _Found:
             problem = "the facets at edges are larger than the others"
             yield f"{field}.edge_facet_size_m", problem, f"at most facet_size_m, {size:g}"
         return
-    for name, value in (("facet_size_m", size), ("edge_facet_size_m", edge)):
-        if value is not None:
-            problem = f"{shape.file} is a mesh already: its facets are used as they are"
-            yield f"{field}.{name}", problem, "a STEP file (.step, .stp); or remove the field"
+    if shape.unit is None:
+        yield f"{field}.unit", f"{shape.file} states no unit", "m, cm, mm, um or in"
+    if edge is not None:
+        problem = f"{shape.file} is a mesh: its sharp edges are kept, with facets of one size"
+        yield f"{field}.edge_facet_size_m", problem, "a STEP file (.step, .stp); or no such field"
 
 
 def _motion(study: Study) -> _Found:
@@ -345,12 +348,29 @@ def _signal(study: Study, file: Path) -> Iterator[InputError]:
     transient_s = motion.uncounted_m / motion.nominal_speed_m_s + motion.ramp_s / 2
     field = "reference.signal.file"
     try:
-        measured_signal(recorded_file(signal.file, file, field), signal, transient_s)
+        measured_signal(
+            recorded_file(signal.file, file, field),
+            signal,
+            partial(directions, motion),
+            transient_s,
+        )
     except RecordError as error:
         problem, value = f"({error.reason}) {error.problem}", error.value or signal.file
         yield InputError(problem, field=field, value=value, limit=error.limit, remedy=error.remedy)
     except InputError as error:
         yield error
+
+
+def _decimal_commas(study: Study, file: Path) -> Iterator[InputError]:
+    """Lists of a sweep that may be one number, ``[1,5]``; whole numbers have no fraction."""
+    values, written = flat(study.plain()), comma_lists(file) if study.sweep else {}
+    for name in study.sweep:
+        field = f"sweep.{name}"
+        if field in written and not isinstance(values.get(name), int):
+            limit = f"with a space for two values, {written[field].replace(',', ', ')}; or "
+            limit += f"with a decimal point for one, {written[field].replace(',', '.')}"
+            problem = "the comma may separate two values or be a decimal comma"
+            yield InputError(problem, field=field, value=written[field], limit=limit)
 
 
 def _level(value: object) -> float:
@@ -392,6 +412,7 @@ def validate(data: Json, file: Path | str, *, whole: bool = False) -> Study:
     problems += [error for error, _ in doubts]
     known = {error.field for error, refused in doubts if refused}
     others = [*contradictions(study, whole), *_signal(study, Path(file))] if study else []
+    others += _decimal_commas(study, Path(file)) if study and whole else ()
     more = [error for error in others if error.field not in known]
     if study is None or more or any(refused for _, refused in doubts):
         meshes = mesh_errors(data, Path(file)) if whole else ()
@@ -502,6 +523,8 @@ def _problem(issue: ErrorDetails) -> InputError:
             "unknown key",
             f"{hint}remove it, or see docs/reference/study.md for its spelling",
         )
+    elif kind in ("float_type", "int_type") and isinstance(value, list) and len(value) == 2:
+        remedy = "if its comma is a decimal comma, write a decimal point, without brackets"
     elif kind == "missing":
         what = "entry" if isinstance(issue["loc"][-1], int) else "key"
         problem, remedy, value = f"a required {what} is missing", "add it", None

@@ -158,3 +158,17 @@ class DrivenMotion:
         return [
             SuperposedEntry.model_validate(superposed.entry(self.drive)) for superposed in moving
         ]
+
+
+_STEPS = 1_000_000
+"""Of a drag whose directions are asked for at times."""
+
+
+def directions(motion: Motion, since_s: Floats) -> Floats:
+    """Direction of motion, (N,) in rad without jumps, at times from the start of the drag, s."""
+    timestep_s = motion.path_length_m / motion.nominal_speed_m_s / _STEPS
+    driven = DrivenMotion.of(motion, timestep_s, 1.0)
+    since = np.clip(since_s / timestep_s, 0.0, driven.drive.steps)
+    begun = np.array([*motion.path.start_point, motion.path.start_height_m])
+    places = driven.places(since, begun)
+    return np.asarray(np.unwrap(driven.directions(since, places[:, :2])))

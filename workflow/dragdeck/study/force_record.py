@@ -1,23 +1,27 @@
 """Measured forces over time as CSV files: drop tests, and signals of a process."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.signal import butter, correlate, sosfiltfilt
 from scipy.stats import theilslopes
 
 from dragdeck.errors import InputError, RecordError
 from dragdeck.study.reference import Signal, Span
-from dragdeck.study.table import Floats, Table, column_name, read_table
+from dragdeck.study.table import MOST_MISSING, Floats, Table, column_name, read_table
 
 TIME_COLUMNS = {"time_s": 1.0, "time_ms": 1e-3, "time_us": 1e-6}
 FORCE_COLUMNS = {"force_n": 1.0, "force_mn": 1e-3, "force_kn": 1e3}
 """Accepted column names and their units in SI; ``force_mn`` is millinewton."""
+
+FORCE_UNITS = {name.removeprefix("force"): unit for name, unit in FORCE_COLUMNS.items()}
+ANGLE_UNITS = {"_deg": math.radians(1), "_rad": 1.0}
 
 _LEAST_SAMPLES = 100
 _BLOCKS = 50
@@ -79,41 +83,67 @@ def read_samples(
     `column` names the force where it is not one of `FORCE_COLUMNS`; `rate_hz` stands in for times.
     """
     table = read_table(file)
-    forces = FORCE_COLUMNS
-    if column is not None:
-        column = column_name(column)
-        forces = {column: _unit(column)}
-    name = _column(table, forces)
+    name = _column(table, FORCE_COLUMNS) if column is None else column
+    time, forces = _series(table, [name], rate_hz)
+    return time, forces[0], table.lines
+
+
+def _series(
+    table: Table, columns: Sequence[str], rate_hz: float | None, angle: str | None = None, *,
+    gaps: bool = False,
+) -> tuple[Floats, Floats]:  # fmt: skip
+    """Times, (N,) in s, and columns, (k, N) in N, at last an angle in rad; with `gaps`, with NaN.
+
+    Raises
+    ------
+    InputError
+        As `Table.numbers`.
+    """
+    units = {name: _unit(name, FORCE_UNITS) for name in map(column_name, columns)}
+    if angle is not None:
+        units[column_name(angle)] = _unit(column_name(angle), ANGLE_UNITS)
+    names = [_column(table, {name: unit}) for name, unit in units.items()]
+    missing = names if gaps else ()
     if rate_hz is None or {*table.names} & {*TIME_COLUMNS}:
         time_name = _column(table, TIME_COLUMNS)
-        time, force = table.numbers([time_name, name])
+        time, *values = table.numbers([time_name, *names], missing)
         time *= TIME_COLUMNS[time_name]
     else:
         table.refuse_gaps()
-        (force,) = table.numbers([name])
-        time = np.arange(len(force)) / rate_hz
+        values = table.numbers(names, missing)
+        time = np.arange(len(values[0])) / rate_hz
     if rate_hz is not None:
-        _refuse_other_rate(time, rate_hz, file)
-    return time, force * forces[name], table.lines
+        _refuse_other_rate(time, rate_hz, table.file)
+    return time, np.array(values) * np.array([*units.values()])[:, None]
 
 
-def in_words(file: Path, column: str | None = None, rate_hz: float | None = None) -> str:
-    """How a record is read: its column, rate, and first and last row; see `read_samples`."""
-    time, force, lines = read_samples(file, column, rate_hz)
-    name = column_name(column) if column else "force"
+def in_words(file: Path, signal: Signal | None = None) -> str:
+    """How a record is read: columns, rate, first and last row, and what is missing of it."""
+    table, gaps = read_table(file), signal is not None
+    angle, rate_hz = (signal.angle_column, signal.rate_hz) if signal else (None, None)
+    columns = signal.columns if signal else [_column(table, FORCE_COLUMNS)]
+    time, values = _series(table, columns, rate_hz, angle, gaps=gaps)
     rate = (len(time) - 1) / (time[-1] - time[0]) if len(time) > 1 else math.nan
+    forces = values[: len(columns)]
     ends = " to ".join(
-        f"{time[row]:.6g} s, {force[row]:.6g} N (line {lines[row]})" for row in (0, -1)
+        ", ".join([f"{time[row]:.6g} s", *(f"{force:.6g} N" for force in forces[:, row])])
+        + f" (line {table.lines[row]})"
+        for row in (0, -1)
     )
-    return f"{file.name} read as {name}: {len(time):,} rows at {rate:.5g} Hz, {ends}"
+    names = ", ".join([column_name(name) for name in [*columns, *([angle] if angle else [])]])
+    _, filled = _with_holes(time, values) if gaps else (time, values)
+    missing = np.count_nonzero(~np.isfinite(filled).all(axis=0))
+    left_out = f"; {missing} of {filled.shape[1]:,} samples missing, left out" if missing else ""
+    where = f"{file.name} read as {names}: {len(time):,} rows at {rate:.5g} Hz, {ends}"
+    return where + left_out
 
 
-def _unit(column: str) -> float:
-    """The unit of a force column in N, by the end of its name."""
-    for name, unit in FORCE_COLUMNS.items():
-        if column.endswith(name.removeprefix("force")):
+def _unit(column: str, units: Mapping[str, float]) -> float:
+    """The unit of a column in N or rad, by the end of its name."""
+    for end, unit in units.items():
+        if column.endswith(end):
             return unit
-    problem, limit = "the force column has no unit", "a name that ends in _n, _mn or _kn"
+    problem, limit = "the column has no unit", f"a name that ends in {', '.join(units)}"
     raise RecordError("columns", problem, value=column, limit=limit, remedy="rename the column")
 
 
@@ -158,20 +188,7 @@ def check_samples(time_s: Floats, force_n: Floats, lines: Sequence[int] | None =
     RecordError
         ``short``, ``numbers``, ``time`` or ``uneven``.
     """
-    even, interval = _even(time_s, force_n, lines)
-    rest = force_n - np.polyval(quiet_line(even, force_n), even)
-    if -float(rest.min()) > float(rest.max()):
-        return Record(even, -force_n, interval, ("sign_turned",))
-    return Record(even, force_n, interval)
-
-
-def _even(time_s: Floats, force_n: Floats, lines: Sequence[int] | None) -> tuple[Floats, float]:
-    """Even times and their interval, s; errors are those of `check_samples`."""
-    if len(time_s) < _LEAST_SAMPLES:
-        raise RecordError(
-            "short", "too few samples", value=str(len(time_s)), limit=f"at least {_LEAST_SAMPLES}"
-        )
-    word, places = ("line", lines) if lines else ("sample", range(1, len(time_s) + 1))
+    word, places = _places(len(time_s), lines)
     bad = np.flatnonzero(~(np.isfinite(time_s) & np.isfinite(force_n)))
     if len(bad):
         raise RecordError(
@@ -180,6 +197,25 @@ def _even(time_s: Floats, force_n: Floats, lines: Sequence[int] | None) -> tuple
             value=f"{len(bad)} samples, the first is {word} {places[bad[0]]}",
             remedy="remove these samples, or record again",
         )
+    even, interval = _even(time_s, lines)
+    rest = force_n - np.polyval(quiet_line(even, force_n), even)
+    if -float(rest.min()) > float(rest.max()):
+        return Record(even, -force_n, interval, ("sign_turned",))
+    return Record(even, force_n, interval)
+
+
+def _places(count: int, lines: Sequence[int] | None) -> tuple[str, Sequence[int]]:
+    """What samples are called in messages, and their numbers; a few are refused."""
+    if count < _LEAST_SAMPLES:
+        raise RecordError(
+            "short", "too few samples", value=str(count), limit=f"at least {_LEAST_SAMPLES}"
+        )
+    return ("line", lines) if lines else ("sample", range(1, count + 1))
+
+
+def _even(time_s: Floats, lines: Sequence[int] | None) -> tuple[Floats, float]:
+    """Even times and their interval, s; errors are those of `check_samples`."""
+    word, places = _places(len(time_s), lines)
     back = np.flatnonzero(np.diff(time_s) <= 0.0)
     if len(back):
         row = int(back[0])
@@ -242,6 +278,13 @@ _RISE = 0.35
 _LEAST_LENGTHS = 20.0
 """Least duration of the counted signal, in its correlation times."""
 
+_MISSING_WEIGHT = 0.1
+"""Part of the weight of the filter on missing samples above which a value is left out."""
+
+_SAME_DIRECTION_RAD = math.radians(1)
+_OTHER_TURN = 0.1
+"""By which part the turn of an angle in a file may differ from that of the study, beside 10 deg."""
+
 _CLIPPED = 4, 0.125
 """Equal extreme samples in a row that no signal has: so many, and for so long times bandwidth."""
 
@@ -303,14 +346,19 @@ def low_passed(time_s: Floats, force_n: Floats, low_pass_hz: float) -> tuple[Flo
     return grid, np.asarray(CubicSpline(time_s, smooth, extrapolate=False)(grid))
 
 
-def measured_signal(file: Path, signal: Signal, transient_s: float) -> MeasuredSignal:
+def measured_signal(
+    file: Path, signal: Signal, directions: Callable[[Floats], Floats], transient_s: float
+) -> MeasuredSignal:
     """Read a measured force signal, and refuse one that no comparison can use.
 
     Parameters
     ----------
     file : Path
-        As for `read_record`, with the column that `signal` names.
+        As for `read_record`, with the columns that `signal` names.
     signal : Signal
+    directions : function
+        Direction of motion, (N,) in rad, at times from the start of the drag, (N,) in s, by which
+        the columns of a fixed sensor are turned (`dragdeck.study.driven.directions`).
     transient_s : float
         Time from the start of the drag that no statistic includes, s.
 
@@ -319,13 +367,16 @@ def measured_signal(file: Path, signal: Signal, transient_s: float) -> MeasuredS
     InputError
         The file is no such table.
     RecordError
-        ``columns``, ``time``, ``uneven``, ``short``, ``start``, ``clipped`` or ``slow``.
+        ``angle``, ``axes``, ``columns``, ``missing``, ``time``, ``uneven``, ``short``, ``start``,
+        ``clipped`` or ``slow``.
     """
-    time, raw, lines = read_samples(file, signal.column, signal.rate_hz)
-    time, interval = _even(time, raw, lines)
+    table, angle = read_table(file), signal.angle_column
+    time, values = _series(table, signal.columns, signal.rate_hz, angle, gaps=True)
+    time, values, missing, interval = _gathered(time, values, table.lines, bool(angle))
+    raws = values[: len(signal.columns)]
     rests = [_within(time, span, "rest_s") for span in signal.rest_s]
-    force = signal.sign * (raw - _baseline(time, raw, rests))
-    start, error = _start(time, force, signal, interval)
+    forces = np.array([signal.sign * (raw - _baseline(time, raw, rests)) for raw in raws])
+    start, error = _start(time, forces, signal, interval)
     end = float(time[-1]) if signal.ends_at_s is None else signal.ends_at_s
     if signal.ends_at_s is None and len(rests) > 1 and signal.rest_s[1][0] > start:
         end = signal.rest_s[1][0]
@@ -335,11 +386,105 @@ def measured_signal(file: Path, signal: Signal, transient_s: float) -> MeasuredS
         problem, value = "the drag overlaps a stretch without load", f"{start:.6g} to {end:.6g} s"
         remedy = "correct rest_s, starts_at_s or ends_at_s"
         raise RecordError("start", problem, value=value, remedy=remedy)
-    _check_clipped(raw[used], interval, signal.low_pass_hz)
+    for raw in raws:
+        _check_clipped(raw[used], interval, signal.low_pass_hz)
     kept = time <= end
-    grid, filtered = low_passed(time[kept] - start, force[kept], signal.low_pass_hz)
+    since = time[kept] - start
+    turned = values[-1, kept] if angle else None
+    force = _along(forces[:, kept], turned, signal, directions(since))
+    grid, filtered = low_passed(since, force, signal.low_pass_hz)
+    if missing.any():
+        weight = low_passed(since, missing[kept].astype(np.float64), signal.low_pass_hz)[1]
+        filtered[np.abs(weight) > _MISSING_WEIGHT] = np.nan
     _check_length(filtered[(grid >= transient_s) & np.isfinite(filtered)], signal.low_pass_hz)
     return MeasuredSignal(grid, filtered, start, error)
+
+
+def _gathered(
+    time: Floats, values: Floats, lines: Sequence[int], has_angle: bool
+) -> tuple[Floats, Floats, NDArray[np.bool_], float]:
+    """Even times, (N,) in s; columns, (k, N), missing samples interpolated; where; interval, s."""
+    filled_time, filled = _with_holes(time, values)
+    holes = len(filled_time) > len(time)
+    even, interval = _even(filled_time, None if holes else lines)
+    missing = np.asarray(~np.isfinite(filled).all(axis=0))
+    if np.count_nonzero(missing) > MOST_MISSING * len(missing):
+        value = f"{np.count_nonzero(missing)} of {len(missing)} samples"
+        limit, remedy = f"at most {100 * MOST_MISSING:g} %", "record again, or export every sample"
+        raise RecordError("missing", "samples are missing", value=value, limit=limit, remedy=remedy)
+    rows = [row[~missing] for row in filled]
+    if has_angle:
+        rows[-1] = np.unwrap(rows[-1])
+    joined = np.array([np.interp(even, even[~missing], row) for row in rows])
+    return even, joined, missing, interval
+
+
+def _with_holes(time: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Times, (N,) in s, and columns, (k, N), with NaN for absent rows between others.
+
+    Times that are even, or that are no multiples of an interval, are returned as they are.
+    """
+    step = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+    if not step > 0:
+        return time, values
+    place = np.rint((time - time[0]) / step)
+    count = int(place[-1]) + 1
+    if not 0 < count - len(time) <= MOST_MISSING * count or (np.diff(place) < 1).any():
+        return time, values
+    off = np.abs(time - time[0] - (time[-1] - time[0]) / (count - 1) * place)
+    if off.max() > _JITTER * step:
+        return time, values
+    filled = np.full((len(values), count), np.nan)
+    filled[:, place.astype(int)] = values
+    return np.interp(np.arange(count), place, time), filled
+
+
+def _refuse_single_axis(signal: Signal, direction: Floats) -> None:
+    """Refuse a single horizontal axis on a path that turns, unless the sensor turns with it."""
+    if signal.fits(turning=bool(np.ptp(direction) > _SAME_DIRECTION_RAD)):
+        return
+    problem = "it is not stated whether the axes of the sensor turn with the path"
+    if signal.orientation:
+        problem = "the path turns: the force along one fixed axis is not that along the motion"
+    limit = "the columns of two horizontal axes, or one axis that turns with the path"
+    remedy = (
+        "name the columns of both horizontal axes of a fixed sensor, such as column: [fx_n, fy_n]; "
+        "or state orientation: follow_path, if the axis of the sensor turns with the path"
+    )
+    raise RecordError("axes", problem, value=signal.columns[0], limit=limit, remedy=remedy)
+
+
+def _along(forces: Floats, angle: Floats | None, signal: Signal, direction: Floats) -> Floats:
+    """The component of the force of all axes of a sensor, (k, N), at (N,) directions of motion."""
+    if len(forces) == 1:
+        _refuse_single_axis(signal, direction)
+        return np.asarray(forces[0])
+    if signal.component == "vertical":
+        return np.asarray(forces[2])
+    if angle is not None:
+        _refuse_other_turn(angle, direction)
+        direction = angle
+    if signal.orientation == "follow_path":
+        direction = np.zeros_like(direction)
+    direction = direction - math.radians(signal.x_axis_deg)
+    (x, y), cosine, sine = forces[:2], np.cos(direction), np.sin(direction)
+    ahead = signal.component == "drag"
+    return np.asarray(x * cosine + y * sine if ahead else y * cosine - x * sine)
+
+
+def _refuse_other_turn(angle: Floats, direction: Floats) -> None:
+    """Refuse an angle that turns otherwise than the path of the study."""
+    moving = np.flatnonzero(np.diff(direction, prepend=direction[0]) != 0.0)
+    first, last = (moving[0], moving[-1]) if len(moving) else (0, -1)
+    ours, theirs = (math.degrees(a[last] - a[first]) for a in (direction, angle))
+    if abs(theirs - ours) > _OTHER_TURN * abs(ours) + 10.0:
+        problem = "the angles in the file turn otherwise than the path of the study"
+        value, limit = f"{theirs:.4g} degrees", f"about {ours:.4g} degrees"
+        remedy = (
+            "an angle counts counter-clockwise seen from above; correct motion.path or "
+            "starts_at_s, or leave out angle_column: the motion of the study is used then"
+        )
+        raise RecordError("angle", problem, value=value, limit=limit, remedy=remedy)
 
 
 def _within(time: Floats, span: Span, field: str) -> slice:
@@ -364,10 +509,10 @@ def _baseline(time: Floats, force: Floats, rests: Sequence[slice]) -> Floats:
     return np.asarray(np.polyval(np.polyfit(at, level, len(rests) - 1), time))
 
 
-def _start(time: Floats, force: Floats, signal: Signal, interval: float) -> tuple[float, float]:
+def _start(time: Floats, forces: Floats, signal: Signal, interval: float) -> tuple[float, float]:
     """When the drag starts, and the uncertainty of that, s.
 
-    The force leaves the noise where it first exceeds six standard deviations of the rest. The
+    A force leaves the noise where it first exceeds six standard deviations of the rest. The
     uncertainty is the time since it was last below three of them, at least the rise time of the
     filter. The filter itself, which spreads a step to both sides, is not applied before.
     """
@@ -376,14 +521,18 @@ def _start(time: Floats, force: Floats, signal: Signal, interval: float) -> tupl
     remedy = "add starts_at_s: the time in the file at which the drag starts"
     if not signal.rest_s:
         raise RecordError("start", "neither starts_at_s nor rest_s is given", remedy=remedy)
-    rest = force[(time >= signal.rest_s[0][0]) & (time <= signal.rest_s[0][1])]
-    size, after = np.abs(force), time > signal.rest_s[0][1]
-    onset = np.flatnonzero(after & (size > _ONSET_STDS * rest.std()))
+    rest = (time >= signal.rest_s[0][0]) & (time <= signal.rest_s[0][1])
+    noise, after = forces[:, rest].std(axis=1), time > signal.rest_s[0][1]
+
+    def beyond(stds: float) -> NDArray[np.bool_]:
+        return np.asarray((np.abs(forces) > stds * noise[:, None]).any(axis=0))
+
+    onset = np.flatnonzero(after & beyond(_ONSET_STDS))
     if not len(onset):
-        value = f"standard deviation {rest.std():.3g} N"
+        value = f"standard deviation {', '.join(f'{std:.3g}' for std in noise)} N"
         problem = "the force never leaves the noise of rest_s"
         raise RecordError("start", problem, value=value, remedy=remedy)
-    quiet = np.flatnonzero(size[: onset[0]] < _QUIET_STDS * rest.std())
+    quiet = np.flatnonzero(~beyond(_QUIET_STDS)[: onset[0]])
     last = time[quiet[-1]] if len(quiet) else time[0]
     return float(time[onset[0]]), max(float(time[onset[0]] - last), _RISE / signal.low_pass_hz)
 

@@ -1,8 +1,9 @@
 """Published figures to compare the results with."""
 
-from typing import Annotated, Literal
+from collections.abc import Sequence
+from typing import Annotated, Literal, Self
 
-from pydantic import Field
+from pydantic import Discriminator, Field, Tag, model_validator
 
 from dragdeck.study.base import Line, Model, NonNegative, Number, Positive
 
@@ -26,7 +27,31 @@ class Signal(Model):
     """A measured force signal, with which that of the simulation is compared."""
 
     file: Line = Field(pattern=r"^[^{}]*$", description="CSV file of force against time, <= 64 MB")
-    column: Line = Field(description="name of the force column; ends in `_n`, `_mn` or `_kn`")
+    column: Annotated[
+        Annotated[Line, Tag("a-name")]
+        | Annotated[list[Line], Field(min_length=2, max_length=3), Tag("a-list")],
+        Discriminator(lambda value: "a-list" if isinstance(value, list) else "a-name"),
+    ] = Field(
+        description="name of the force column, which ends in `_n`, `_mn` or `_kn`; or a list of "
+        "those along x, y and perhaps z of a sensor, counter-clockwise seen from above, from which "
+        "`component` is computed"
+    )
+    orientation: Literal["follow_path", "fixed"] | None = Field(
+        default=None,
+        description="follow_path: the axes of the sensor turn with the path; fixed: they do not, "
+        "as below a bowl or table; none: fixed, and refused for a single column on a path that "
+        "turns",
+    )
+    x_axis_deg: Number = Field(
+        default=0.0,
+        description="direction of the sensor's x axis, degrees: in the bowl; with "
+        "`angle_column`, where this counts from; with `follow_path`, from the direction of motion",
+    )
+    angle_column: Line | None = Field(
+        default=None,
+        description="name of a column with the direction of motion, counter-clockwise seen from "
+        "above, which ends in `_deg` or `_rad`; none: from the motion of the study",
+    )
     rate_hz: Positive | None = Field(
         default=None, description="sampling rate, Hz; none: a column `time_s`, `_ms` or `_us`"
     )
@@ -54,6 +79,25 @@ class Signal(Model):
     margin: Annotated[Number, Field(gt=0, lt=1)] = Field(
         default=0.1, description="largest relative difference that is called equivalent"
     )
+
+    @model_validator(mode="after")
+    def _axes(self) -> Self:
+        axes = len(self.columns)
+        if axes == 2 and self.component == "vertical":
+            raise ValueError("two columns have no vertical force: give that column, or all three")
+        if self.angle_column and (axes == 1 or self.orientation == "follow_path"):
+            raise ValueError("angle_column is for two or three columns of a fixed sensor")
+        return self
+
+    @property
+    def columns(self) -> Sequence[str]:
+        """The columns of the force."""
+        return self.column if isinstance(self.column, list) else [self.column]
+
+    def fits(self, *, turning: bool) -> bool:
+        """Whether it has the force in the frame of a path that turns or not."""
+        single = len(self.columns) == 1 and self.component != "vertical"
+        return not (turning and single and self.orientation != "follow_path")
 
 
 class Reference(Model):

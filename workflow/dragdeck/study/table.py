@@ -6,7 +6,7 @@ programs write a head before the names of the columns, and units below them or i
 
 import csv
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import islice, zip_longest
 from pathlib import Path
@@ -29,9 +29,14 @@ _GROUPED = re.compile(r"[-+]?[1-9]\d{0,2}(,\d{3})+", re.ASCII)
 
 _UNITS = {
     "s": "s", "ms": "ms", "us": "us", "\u00b5s": "us", "\u03bcs": "us", "N": "n", "mN": "mn",
-    "kN": "kn", "m": "m", "mm": "mm", "kg": "kg", "g": "g", "deg": "deg", "\u00b0": "deg",
+    "kN": "kn", "m": "m", "mm": "mm", "kg": "kg", "g": "g",
+    "deg": "deg", "\u00b0": "deg", "rad": "rad",
 }  # fmt: skip
 """Units as programs write them, and as names of columns end with them."""
+
+_MISSING = ("", "nan", "n/a", "#n/a", "#nv", "null")
+MOST_MISSING = 0.01
+"""Part of the values of a column that may be missing where its reader can do without them."""
 
 _BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]")
 _LABVIEW_TIME = "x_value"
@@ -71,8 +76,8 @@ class Table:
     lines: Sequence[int]
     rows: Sequence[Sequence[str]]
 
-    def numbers(self, names: Iterable[str]) -> list[Floats]:
-        """Columns as numbers, (N,) each, by their names.
+    def numbers(self, names: Iterable[str], gaps: Collection[str] = ()) -> list[Floats]:
+        """Columns as numbers, (N,) each, by their names; up to 1 % of those in `gaps` as NaN.
 
         Raises
         ------
@@ -90,10 +95,16 @@ class Table:
             }
         values, errors = [], []
         for name, cells in wanted.items():
-            texts = [row for row, cell in enumerate(cells) if not _NUMBER.fullmatch(cell)]
+            absent = {row for row, cell in enumerate(cells) if cell.lower() in _MISSING}
+            if name not in gaps or len(absent) > MOST_MISSING * len(cells):
+                absent = set()
+            texts = [row for row, cell in enumerate(cells)
+                     if row not in absent and not _NUMBER.fullmatch(cell)]  # fmt: skip
             errors += [self._wrong(row, name, _said(cells[row])) for row in texts]
-            column = np.array(["0" if texts else cell for cell in cells], dtype=np.float64)
-            large = np.flatnonzero(~np.isfinite(column)).tolist()
+            readable = ["nan" if row in absent else "0" if texts else cell
+                        for row, cell in enumerate(cells)]  # fmt: skip
+            column = np.array(readable, dtype=np.float64)
+            large = np.flatnonzero(np.isinf(column)).tolist()
             errors += [self._wrong(row, name, _said(cells[row])) for row in large]
             values.append(column)
         if errors:

@@ -29,13 +29,16 @@ class MeshShape(Model):
         description="file in STL, OBJ, PLY, VTK, VTU or STEP format, relative to the study or to "
         "meshes/"
     )
-    unit: Literal["m", "cm", "mm", "um", "in"] = Field(description="unit of length in the file")
+    unit: Literal["m", "cm", "mm", "um", "in"] | None = Field(
+        default=None, description="unit of length in the file; none: that which a STEP file states"
+    )
     facet_size_m: Positive | None = Field(
         default=None,
-        description="target edge length of the mesh of a STEP part, m; required for STEP only",
+        description="target edge length of the facets, m; required for STEP; none: the facets of "
+        "the file, otherwise a closed surface is meshed anew",
     )
     edge_facet_size_m: Positive | None = Field(
-        default=None, description="the same at sharp edges, m; none: `facet_size_m`"
+        default=None, description="the same at sharp edges of a STEP part, m; none: `facet_size_m`"
     )
     axis: Literal["+x", "-x", "+y", "-y", "+z", "-z"] = Field(
         default="+z",

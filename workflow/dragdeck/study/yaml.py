@@ -33,7 +33,9 @@ class _Loader(yaml.SafeLoader):
 
 def _mapping(loader: _Loader, node: yaml.MappingNode) -> dict[Any, Any]:
     seen: set[Any] = set()
-    for key_node, _ in node.value:
+    for number, (key_node, value_node) in enumerate(node.value):
+        if number and key_node.value.isdecimal() and not value_node.value:
+            _refuse_decimal_comma(node.value[number - 1][1], key_node)
         key = loader.construct_object(key_node)
         if key in seen:
             raise yaml.constructor.ConstructorError(
@@ -41,6 +43,13 @@ def _mapping(loader: _Loader, node: yaml.MappingNode) -> dict[Any, Any]:
             )
         seen.add(key)
     return loader.construct_mapping(node, deep=True)
+
+
+def _refuse_decimal_comma(before: yaml.Node, key: yaml.ScalarNode) -> None:
+    """Refuse ``{radius_m: 0,025}``, whose second part is a key without a value."""
+    if isinstance(before, yaml.ScalarNode) and before.value.lstrip("+-").isdecimal():
+        problem = f"a decimal comma in {before.value},{key.value}: write {before.value}.{key.value}"
+        raise yaml.constructor.ConstructorError(None, None, problem, before.start_mark)
 
 
 def _refused(_: _Loader, node: yaml.Node) -> None:
@@ -256,25 +265,39 @@ def _line_tables(file: Path) -> Iterator[tuple[Path, Mapping[str, int]]]:
         yield place, _line_table(place.read_bytes())
 
 
+def comma_lists(file: Path) -> Mapping[str, str]:
+    """Fields of a study whose list may be a number with a decimal comma, ``[1,5]``, as written."""
+    if not file.is_file():
+        return {}
+    content = file.read_bytes()
+    text, lists = content.decode(), dict[str, str]()
+    for name, _, node in _fields(_composed(content), ""):
+        written = text[node.start_mark.index : node.end_mark.index]
+        if re.fullmatch(r"\[[+-]?\d+,\d+\]", written):
+            lists[name] = written
+    return lists
+
+
 @lru_cache(maxsize=4)
 def _line_table(content: bytes) -> Mapping[str, int]:
     """The lines of a study's fields; none of a file that is no study."""
     try:
-        return dict(_lines(_composed(content), ""))
+        fields = _fields(_composed(content), "")
+        return {name: place.start_mark.line + 1 for name, place, _ in fields}
     except (yaml.YAMLError, UnicodeDecodeError, RecursionError):
         return {}
 
 
-def _lines(node: yaml.Node | None, prefix: str) -> Iterator[tuple[str, int]]:
-    """The line of every dotted field, counted from 1."""
+def _fields(node: yaml.Node | None, prefix: str) -> Iterator[tuple[str, yaml.Node, yaml.Node]]:
+    """Every dotted field, with the nodes of its key and its value."""
     items: list[tuple[str, yaml.Node, yaml.Node]] = []
     if isinstance(node, yaml.MappingNode):
         items = [(str(key.value), key, value) for key, value in node.value]
     elif isinstance(node, yaml.SequenceNode):
         items = [(str(index), item, item) for index, item in enumerate(node.value)]
     for name, place, value in items:
-        yield f"{prefix}{name}", place.start_mark.line + 1
-        yield from _lines(value, f"{prefix}{name}.")
+        yield f"{prefix}{name}", place, value
+        yield from _fields(value, f"{prefix}{name}.")
 
 
 def shown(value: object) -> str | None:

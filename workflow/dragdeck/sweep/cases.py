@@ -18,6 +18,7 @@ Fields are those of the study by their dotted names, or the settings of a scene 
 import copy
 import itertools
 import math
+import shutil
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -27,11 +28,13 @@ from pydantic import Field, JsonValue, ValidationError
 
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError, choices, together
+from dragdeck.mesh.files import FORMATS
 from dragdeck.study.base import NAME, NAME_LIMIT, STUDY_FILE, Json, Model
 from dragdeck.study.check import explained, validate
 from dragdeck.study.model import Tolerance
 from dragdeck.study.search import Search, SearchRecord
 from dragdeck.study.yaml import read_study, read_yaml, studies_called
+from dragdeck.sweep.own_part import study_of_part
 
 Settings = Mapping[str, Any]
 """Dotted name of a field to its value."""
@@ -328,14 +331,18 @@ reference: null  # measured or published values to compare with, if any
 
 
 def new_study(studies: Path, name: str, base: str) -> Path:
-    """Write the file of a study that extends another, and return it.
+    """Write the file of a study that extends another or is of a part, and return it.
 
     Raises
     ------
     InputError
-        The name cannot be one or is taken, or there is no such study to extend.
+        The name cannot be one or is taken, there is no such study to extend, or the part cannot
+        be used.
     """
-    study_file(studies, base)
+    part = Path(base)
+    of_part = part.suffix.lower() in FORMATS and not studies_called(studies, base)
+    if not of_part:
+        study_file(studies, base)
     folder, problem = studies / name, None
     if not NAME.fullmatch(name):
         problem = "this name cannot be used for a study"
@@ -349,9 +356,12 @@ def new_study(studies: Path, name: str, base: str) -> Path:
             limit=f"a name has {NAME_LIMIT}",
             remedy="choose another",
         )
+    text = study_of_part(part) if of_part else _NEW_STUDY.format(name=name, base=base)
     folder.mkdir()
+    if of_part:
+        shutil.copy(part, folder / part.name)
     file = folder / STUDY_FILE
-    file.write_text(_NEW_STUDY.format(name=name, base=base), encoding="utf-8")
+    file.write_text(text, encoding="utf-8")
     return file
 
 
