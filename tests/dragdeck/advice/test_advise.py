@@ -16,7 +16,7 @@ from paths import ROOT
 from dragdeck import commands
 from dragdeck.advice.advise import advised_settings, consistent, plain_option, resolve, with_option
 from dragdeck.advice.forecast import question
-from dragdeck.advice.work import Work, step_cost
+from dragdeck.advice.ways import Work, step_cost
 from dragdeck.cases.bed import full_stiffness_number
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError

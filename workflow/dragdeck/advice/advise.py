@@ -10,8 +10,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import chain
 
-from dragdeck.advice.ways import Way, Ways
-from dragdeck.advice.work import Work
+from dragdeck.advice.ways import Way, Ways, Work
 from dragdeck.cases.bed import expected_surface, full_stiffness_number, softest_scale, widest_skin
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError

@@ -109,7 +109,8 @@ def columns_of_numbers(cells: Cells, names: Sequence[str]) -> Columns:
 def _whole_if_it_is(column: Cells, name: str) -> Any:
     if not is_integer_column(name) or not np.isfinite(column).all():
         return column
-    whole = column.astype(np.int64)
+    with np.errstate(invalid="ignore"):
+        whole = column.astype(np.int64)
     return whole if (whole == column).all() else column
 
 
