@@ -39,7 +39,6 @@ def main(given: str, answer: str, size: str) -> None:
     size : str
         Target edge length of the facets.
     """
-    resource.setrlimit(resource.RLIMIT_CPU, (CPU_LIMIT_S, CPU_LIMIT_S))
     content = json.loads(Path(given).read_text(encoding="ascii"))
     points, triangles = np.array(content["points"]), np.array(content["triangles"], dtype=np.int32)
     meshed: dict[str, object]
@@ -87,4 +86,5 @@ def _smallest_angle(nodes: Any, facets: Any) -> float:
 
 
 if __name__ == "__main__":
+    resource.setrlimit(resource.RLIMIT_CPU, (CPU_LIMIT_S, CPU_LIMIT_S))
     main(*sys.argv[1:])
