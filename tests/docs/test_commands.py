@@ -57,7 +57,7 @@ def clone(project: Path, pytestconfig: pytest.Config) -> Path:
     """
     if not pytestconfig.getoption("--long"):
         study = project / "studies" / STUDY / "study.yaml"
-        put(plain := read_yaml(study), {"motion.path.revolutions": 0.12})
+        put(plain := read_yaml(study), {"motion.path.revolutions": 0.2})
         study.write_text(yaml.safe_dump(plain))
     runs(f"./run all --cores 1 --config study={STUDY}", project)
     for program in programs()[0].glob("[ds]*"):

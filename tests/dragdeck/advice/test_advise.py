@@ -86,11 +86,11 @@ def moved(case: Case, **motion: float) -> Case:
 def test_a_soft_run_with_windows_costs_less_than_the_plain_run(
     paper: Case, tradeoff: TradeoffRecord
 ) -> None:
-    found = advised_settings(paper, asked(0.07, quantity=SEVERAL), tradeoff)
+    found = advised_settings(paper, asked(0.1, quantity=SEVERAL), tradeoff)
     chosen = found.chosen.fidelity
     assert chosen.youngs_modulus_scale < 0.01 and chosen.soft_start is None
     assert chosen.windows is not None
-    assert (chosen.windows.tolerance, chosen.windows.quantities) == (0.07, SEVERAL)
+    assert (chosen.windows.tolerance, chosen.windows.quantities) == (0.1, SEVERAL)
     assert chosen.windows.timestep_fraction > 0.64
     assert found.chosen.relative_cost < found.chosen.largest_cost < 1
     assert found.reference == plain_option(paper)
