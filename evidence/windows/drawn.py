@@ -22,7 +22,7 @@ from dragchain.windows.rounds import measured_window
 from dragdeck.project import project_here
 from dragdeck.records.case import load_case
 from dragdeck.scenes.lead import windows_of
-from dragdeck.scenes.process import SCENES
+from dragdeck.scenes.process import PROCESS
 
 MATERIALS = {
     "glass": (63e9, 0.22, 2500.0),
@@ -114,11 +114,11 @@ def draw_scenes(seed: int, scenes: int, fidelity: str) -> str:
     fidelity : str
         Block of each study, as YAML.
     """
-    random = np.random.default_rng(seed)
+    random, studies = np.random.default_rng(seed), project_here().studies
     names = []
     for number in range(scenes):
         name = f"drawn-{seed}-{number:02d}"
-        folder = project_here().studies / name
+        folder = studies / name
         folder.mkdir(parents=True)
         study = {**drawn(random, number), "fidelity": yaml.safe_load(fidelity)}
         (folder / "study.yaml").write_text(yaml.safe_dump(study, sort_keys=False))
@@ -134,10 +134,8 @@ def window_targets(study: str) -> str:
     study : str
     """
     project = project_here()
-    cases = project.cases(study)
-    process = SCENES["process"]
-    runs = [run for case in cases for run in (case, *windows_of(case))]
-    folders = (project.run_folder(run, process).relative_to(project.root) for run in runs)
+    runs = [run for case in project.cases(study) for run in (case, *windows_of(case))]
+    folders = (project.run_folder(run, PROCESS).relative_to(project.root) for run in runs)
     return " ".join(str(folder / MEASURED_FILE) for folder in folders)
 
 

@@ -295,7 +295,14 @@ def _of_windows(quantity: Quantity, pairs: Sequence[Pairs]) -> dict[str, float]:
         math.log(of.about(slope) / of.variance) - _log_bias(of.windows) + _log_bias(of.stretches)
         for of in pairs
     ]
-    by_chance = float(np.mean([_by_chance(of.windows) + _by_chance(of.stretches) for of in pairs]))
+    by_chance = float(
+        np.mean(
+            [
+                _log_variance(len(of.windows) - 1) + _log_variance(len(of.stretches) - 1)
+                for of in pairs
+            ]
+        )
+    )
     return {
         "ratio_log": ratio,
         "ratio_log_std": ratio_std,
@@ -321,7 +328,7 @@ def _of_whole_runs(scenes: Sequence[Sequence[QuantityOfRun]]) -> dict[str, float
     noise = float(np.mean([sum(map(_variance_of_mean, pair)) for pair in pairs]))
     between = max(float(np.var(ratios, ddof=1)) - noise, 0.0) + noise / len(pairs)
     logs = [math.log(_mean(stiff, "variance") / _mean(soft, "variance")) for stiff, soft in pairs]
-    by_chance = float(np.mean([sum(map(_log_variance, pair)) for pair in pairs]))
+    by_chance = float(np.mean([sum(map(_log_variance, map(_degrees_of, pair))) for pair in pairs]))
     return {
         "ratio_log": float(np.mean(ratios)),
         "ratio_log_std": math.sqrt(between * (1 + 1 / len(pairs))),
@@ -337,20 +344,20 @@ def _is_soft(run: SceneRun) -> bool:
     return math.isclose(run.fidelity.youngs_modulus_scale, _SOFT, rel_tol=0.1)
 
 
-def _log_variance(runs: Sequence[QuantityOfRun]) -> float:
+def _degrees_of(runs: Sequence[QuantityOfRun]) -> int:
+    """Degrees of freedom of the variance of their blocks."""
+    return sum(len(run.blocks) - 1 for run in runs)
+
+
+def _log_variance(degrees: int) -> float:
     """Variance of the logarithm of a variance with so many degrees of freedom."""
-    return float(polygamma(1, sum(len(run.blocks) - 1 for run in runs) / 2))
+    return float(polygamma(1, degrees / 2))
 
 
 def _log_bias(values: Floats) -> float:
     """Of the logarithm of the variance of N normal values, whose mean is estimated, too."""
     half = (len(values) - 1) / 2
     return float(digamma(half) - math.log(half))
-
-
-def _by_chance(values: Floats) -> float:
-    """Variance of that logarithm."""
-    return float(polygamma(1, (len(values) - 1) / 2))
 
 
 def _runs_with(quantity: Quantity, runs: Sequence[SceneRun]) -> list[QuantityOfRun]:

@@ -114,9 +114,8 @@ def judged(
     pairs = dict(_paired(soft, good, record))
     values = {quantity.name: pair.estimate(len(good)) for quantity, pair in pairs.items()}
     values = {name: value for name, value in values.items() if value.known}
-    widths = [values[name].relative_half_width if name in values else math.inf
-              for name in asked.quantities]  # fmt: skip
-    reached = len(good) >= _FEWEST and max(widths) <= asked.tolerance
+    widest = _widest(values, asked.quantities)
+    reached = len(good) >= _FEWEST and widest <= asked.tolerance
     concerned = [pair for quantity, pair in pairs.items() if quantity.name in asked.quantities]
     needs = [windows_needed(pair, len(good), asked.tolerance, asked.most) for pair in concerned]
     need = Need(*(max(numbers) for numbers in zip(Need(_FEWEST, 1), *needs, strict=True)))
@@ -181,11 +180,14 @@ def with_drag(before: Round, drag: RunQuantities, asked: Asked) -> Round:
     )
 
 
+def _widest(values: Mapping[str, Estimate], asked: Sequence[str]) -> float:
+    """The largest relative half-width of some quantities; infinite where one has no value."""
+    return max(values[name].relative_half_width if name in values else math.inf for name in asked)
+
+
 def reached_by(run: RunQuantities, tolerance: float, asked: Sequence[str]) -> Reached:
     """Whether a run at the physical modulus gives what was asked for."""
-    values = run.values_of_run
-    widths = [values[name].relative_half_width if name in values else math.inf for name in asked]
-    worst = max(widths) / tolerance
+    worst = _widest(run.values_of_run, asked) / tolerance
     return Reached(
         tolerance=tolerance,
         asked=tuple(asked),

@@ -7,7 +7,7 @@ import pytest
 from made_tradeoff import made_tradeoff
 from paths import ROOT
 
-from dragdeck.advice.advise import process_option, ways_of
+from dragdeck.advice.advise import advised_settings, ways_of
 from dragdeck.advice.ways import Ways
 from dragdeck.project import Project
 from dragdeck.records.windows import Known, WindowsRecord
@@ -77,6 +77,6 @@ def test_the_option_is_that_of_the_ways(monkeypatch: pytest.MonkeyPatch) -> None
     (case,) = Project(ROOT).cases("uhlmann2015")
     for pay in (True, False):
         monkeypatch.setattr(Ways, "windows_pay", pay)
-        option = process_option(case, Tolerance(tolerance=0.1), made_tradeoff())
+        option = advised_settings(case, Tolerance(tolerance=0.1), made_tradeoff()).chosen
         assert (option.fidelity.windows is not None) == pay
         assert (option.fidelity.soft_start is None) == pay

@@ -6,7 +6,7 @@ beforehand. Nothing here runs LIGGGHTS.
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import chain
 
@@ -160,37 +160,6 @@ def _step(stable: float) -> float:
     return min(rounded(stable, up=False), LARGEST_TIMESTEP_FRACTION)
 
 
-def process_option(case: Case, requested: Tolerance, tradeoff: TradeoffRecord) -> Option:
-    """The settings with which a tolerance is met in a case's own scene.
-
-    A soft run over the whole path, and windows at the physical modulus until the tolerance is met;
-    where the whole drag at that modulus is expected to cost less, that, after a soft start.
-
-    Raises
-    ------
-    InputError
-        Particles may jam between workpiece and bowl: a few events decide the means then, and
-        neither the soft run nor the windows need contain one.
-    """
-    if may_jam(_with(case), expected_surface(case.study)):
-        raise InputError(
-            "a tolerance cannot be promised where particles may jam",
-            file=case.file,
-            field="fidelity.tolerance",
-            value=requested.tolerance,
-            limit=f"a gap of at least {JAMMING_GAP:g} particle diameters between workpiece and "
-            "bowl, wall and floor",
-            remedy="use a larger gap, or fidelity: {youngs_modulus_scale: 1} with several seeds",
-        )
-    ways = ways_of(case, requested, tradeoff)
-    if ways is not None and ways.windows_pay:
-        costs = (ways.with_windows(count).relative_cost for count in (FIRST_WINDOWS, ways.most))
-        return Option(ways.soft, *costs)
-    stiff, work = stiff_settings(case), Work.of(case, tradeoff)
-    cost = work.cpu_time(stiff) / work.cpu_time(plain_option(case).fidelity)
-    return Option(stiff, cost, cost)
-
-
 def ways_of(case: Case, requested: Tolerance, tradeoff: TradeoffRecord) -> Ways | None:
     """The ways to a tolerance; None where a softer run saves nothing, or no windows fit."""
     stiff = stiff_settings(case)
@@ -254,7 +223,7 @@ class Advice:
         That costs are compared with; of a drop test, the finest.
     fallback : str or None
         Why the reference was chosen.
-    ways : tuple of Way
+    ways : iterable of Way
         What could be done instead; none for a drop test, or where a softer run saves nothing.
     """
 
@@ -262,7 +231,7 @@ class Advice:
     chosen: Option
     reference: Option
     fallback: str | None = None
-    ways: tuple[Way, ...] = ()
+    ways: Iterable[Way] = ()
 
     @property
     def for_case(self) -> AdvisedSettings:
@@ -314,9 +283,7 @@ def advised_settings(case: Case, requested: Tolerance, tradeoff: TradeoffRecord)
         The quantities do not go together.
     """
     if RESTITUTION not in requested.quantities:
-        ways = ways_of(case, requested, tradeoff) or ()
-        option = process_option(case, requested, tradeoff)
-        return Advice(requested, option, plain_option(case), ways=tuple(ways))
+        return _process_advice(case, requested, tradeoff)
     if len(requested.quantities) > 1:
         raise InputError(
             "the restitution is a quantity of the drop test, others are of the process",
@@ -340,6 +307,42 @@ def advised_settings(case: Case, requested: Tolerance, tradeoff: TradeoffRecord)
         f"{shown_share(finest.error or 0.0)}"
     )
     return Advice(requested, finest, finest, why)
+
+
+def _process_advice(case: Case, requested: Tolerance, tradeoff: TradeoffRecord) -> Advice:
+    """The settings with which a tolerance is met in a case's own scene.
+
+    A soft run over the whole path, and windows at the physical modulus until the tolerance is met;
+    where the whole drag at that modulus is expected to cost less, that, after a soft start.
+
+    Raises
+    ------
+    InputError
+        Particles may jam between workpiece and bowl: a few events decide the means then, and
+        neither the soft run nor the windows need contain one.
+    """
+    if may_jam(_with(case), expected_surface(case.study)):
+        raise InputError(
+            "a tolerance cannot be promised where particles may jam",
+            file=case.file,
+            field="fidelity.tolerance",
+            value=requested.tolerance,
+            limit=f"a gap of at least {JAMMING_GAP:g} particle diameters between workpiece and "
+            "bowl, wall and floor",
+            remedy="use a larger gap, or fidelity: {youngs_modulus_scale: 1} with several seeds",
+        )
+    plain, ways = plain_option(case), ways_of(case, requested, tradeoff)
+    if ways is None:
+        stiff, work = stiff_settings(case), Work.of(case, tradeoff)
+        cost = work.cpu_time(stiff) / work.cpu_time(plain.fidelity)
+        return Advice(requested, Option(stiff, cost, cost), plain)
+    if ways.windows_pay:
+        counts = FIRST_WINDOWS, ways.most
+        option = Option(ways.soft, *(ways.with_windows(count).relative_cost for count in counts))
+    else:
+        cost = ways.whole.relative_cost
+        option = Option(ways.stiff, cost, cost)
+    return Advice(requested, option, plain, ways=ways)
 
 
 def shown_share(fraction: float) -> str:

@@ -181,9 +181,12 @@ class Ways:
 
     def with_windows(self, count: int) -> Way:
         """The soft run and so many windows."""
-        blocks, sample = self._blocks
-        half = self._largest(lambda known: known.windows_half_width(count, sample, blocks))
+        half = self._windows_half_width(count)
         return self._way(f"soft run and {count} windows", half, self.soft, count)
+
+    def _windows_half_width(self, count: int) -> float:
+        blocks, sample = self._blocks
+        return self._largest(lambda known: known.windows_half_width(count, sample, blocks))
 
     @property
     def whole(self) -> Way:
@@ -196,11 +199,13 @@ class Ways:
         cost = self.work.cpu_time(fidelity, windows) / self.plain
         return Way(name, windows, half_width, cost)
 
-    @property
+    @cached_property
     def enough_windows(self) -> Way | None:
         """With the fewest windows that are expected to do; None if none are."""
-        ways = map(self.with_windows, range(FIRST_WINDOWS, self.most + 1))
-        return next((way for way in ways if way.half_width <= self.asked.tolerance), None)
+        for count in range(FIRST_WINDOWS, self.most + 1):
+            if self._windows_half_width(count) <= self.asked.tolerance:
+                return self.with_windows(count)
+        return None
 
     def __iter__(self) -> Iterator[Way]:
         yield self.of_other_scenes

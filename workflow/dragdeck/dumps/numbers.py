@@ -107,11 +107,12 @@ def columns_of_numbers(cells: Cells, names: Sequence[str]) -> Columns:
 
 
 def _whole_if_it_is(column: Cells, name: str) -> Any:
-    if not is_integer_column(name) or not np.isfinite(column).all():
+    if not is_integer_column(name):
         return column
-    with np.errstate(invalid="ignore"):
-        whole = column.astype(np.int64)
-    return whole if (whole == column).all() else column
+    try:
+        return whole_numbers(column, name)
+    except WrongRow:
+        return column
 
 
 def first_rows(text: bytes, count: int) -> bytes:
@@ -131,12 +132,19 @@ def named_columns(cells: Cells, names: Sequence[str]) -> Columns:
         row, column = np.argwhere(~np.isfinite(cells.T))[0]
         raise WrongRow(int(row), f"{names[column]} is {cells[column, row]}", "a finite number")
     return {
-        name: _whole(column, name) if is_integer_column(name) else column
+        name: whole_numbers(column, name) if is_integer_column(name) else column
         for name, column in zip(names, cells, strict=True)
     }
 
 
-def _whole(column: Cells, name: str) -> NDArray[np.int64]:
+def whole_numbers(column: Cells, name: str) -> NDArray[np.int64]:
+    """A column, (N,), as int64.
+
+    Raises
+    ------
+    WrongRow
+        At the first number that is not whole.
+    """
     with np.errstate(invalid="ignore"):
         whole = column.astype(np.int64)
     if (whole != column).any():

@@ -11,7 +11,7 @@ import numpy as np
 from dragdeck.dumps.content import Cursor
 from dragdeck.dumps.frame import Columns, Frame, Layout
 from dragdeck.dumps.grammar import binary_names, frame_columns, print_rows
-from dragdeck.dumps.numbers import WrongRow, first_rows, named_columns
+from dragdeck.dumps.numbers import WrongRow, first_rows, named_columns, whole_numbers
 from dragdeck.errors import DumpError
 
 _KINDS = {"ENTRIES": "local", "ATOMS": "custom"}
@@ -70,12 +70,9 @@ def _like(first: Any, column: Any, name: str) -> Any:
     """
     if first is None or column.dtype == first.dtype or not column.size:
         return column
-    with np.errstate(invalid="ignore"):
-        alike = column.astype(first.dtype)
-    if (alike != column).any():
-        row = int(np.flatnonzero(alike != column)[0])
-        raise WrongRow(row, f"{name} is {column[row]}", "a whole number, as before")
-    return alike
+    if first.dtype.kind == "i":
+        return whole_numbers(column, name)
+    return column.astype(first.dtype)
 
 
 def read_prints(file: Path, layout: Layout, *, block_rows: int = 20_000) -> Iterator[Columns]:

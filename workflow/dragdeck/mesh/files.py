@@ -38,9 +38,6 @@ UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
 STEP = (".step", ".stp")
 """Suffixes of CAD parts, which are meshed here."""
 
-FACET_AREA = 0.433
-"""Area of a facet whose edges have the length 1."""
-
 
 def read(
     path: Path | str,
@@ -112,7 +109,7 @@ def _meshed_anew(mesh: Trimesh, size_m: float, path: Path) -> Trimesh:
     given = facing_out(mesh) if len(mesh.faces) and mesh.is_watertight else None
     if given is None:
         return mesh
-    count = given.area / (FACET_AREA * size_m**2)
+    count = given.area / (step_mesher.FACET_AREA * size_m**2)
     if count > step_mesher.MOST_FACETS:
         raise InputError(
             "the mesh would have too many facets",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import resource
 import signal
 import subprocess
 import sys
@@ -14,9 +15,12 @@ from typing import Any
 from dragdeck.errors import InputError
 from dragdeck.mesh import step_mesher
 
+_CPU_LIMIT_S = 120
+"""More CPU time than any sensible part needs, s."""
 
-def _refused(path: Path, problem: str, value: str, limit: str, remedy: str) -> InputError:
-    return InputError(problem, file=path, value=value, limit=limit, remedy=remedy)
+
+def _limit_time() -> None:
+    resource.setrlimit(resource.RLIMIT_CPU, (_CPU_LIMIT_S, _CPU_LIMIT_S))
 
 
 def answer_of(program: str, path: Path, content: str, lengths: Sequence[float]) -> Any:
@@ -31,20 +35,34 @@ def answer_of(program: str, path: Path, content: str, lengths: Sequence[float]) 
         given, answer = Path(folder, "part.step"), Path(folder, "answer.json")
         given.write_text(content, encoding="latin-1")
         command = [sys.executable, "-P", program, str(given), str(answer), *map(repr, lengths)]
-        done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, check=False)
+        done = subprocess.run(
+            command,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            check=False,
+            preexec_fn=_limit_time,
+        )
         if done.returncode or not answer.is_file():
             raise _broken(path, done.returncode, done.stderr.decode("ascii", "replace"))
         meshed: Any = json.loads(answer.read_text(encoding="ascii"))
     if "refused" in meshed:
-        raise _refused(path, *meshed["refused"])
+        problem, value, limit, remedy = meshed["refused"]
+        raise InputError(problem, file=path, value=value, limit=limit, remedy=remedy)
     return meshed
 
 
 def _broken(path: Path, code: int, said: str) -> InputError:
     value = (said.splitlines() or [f"the mesher ended with code {code}"])[-1]
     if -code in (signal.SIGXCPU, signal.SIGKILL):
-        limit = f"{step_mesher.CPU_LIMIT_S} s of CPU time"
-        remedy = "use a larger facet_size_m and edge_facet_size_m"
-        return _refused(path, "the part takes too long to mesh", value, limit, remedy)
+        return InputError(
+            "the part takes too long to mesh",
+            file=path,
+            value=value,
+            limit=f"{_CPU_LIMIT_S} s of CPU time",
+            remedy="use a larger facet_size_m and edge_facet_size_m",
+        )
     kind = "STEP file" if path.suffix.lower() in (".step", ".stp") else "surface"
-    return _refused(path, f"the {kind} is damaged", value, f"a whole {kind}", step_mesher.EXPORT)
+    limit = f"a whole {kind}"
+    return InputError(
+        f"the {kind} is damaged", file=path, value=value, limit=limit, remedy=step_mesher.EXPORT
+    )

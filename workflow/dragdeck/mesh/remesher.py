@@ -6,15 +6,11 @@ A program of its own that imports nothing of the package: MMG can end the interp
 from __future__ import annotations
 
 import json
-import resource
 import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-CPU_LIMIT_S = 120
-"""More CPU time than any sensible part needs, s."""
 
 _SHARP_DEG = 30.0, 45.0, 60.0
 """Angles between normals from which an edge is kept: the first with facets that are no needles."""
@@ -86,5 +82,4 @@ def _smallest_angle(nodes: Any, facets: Any) -> float:
 
 
 if __name__ == "__main__":
-    resource.setrlimit(resource.RLIMIT_CPU, (CPU_LIMIT_S, CPU_LIMIT_S))
     main(*sys.argv[1:])

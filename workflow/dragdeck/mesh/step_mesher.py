@@ -8,18 +8,17 @@ scripts and configuration files, and without the other files that a STEP file ma
 from __future__ import annotations
 
 import json
-import resource
 import sys
 from pathlib import Path
 from typing import Any, TypedDict
 
 import numpy as np
 
-CPU_LIMIT_S = 120
-"""More CPU time than any sensible part needs, s."""
-
 MOST_FACETS = 200_000
 """More facets than any workpiece needs: a facet size in the wrong unit."""
+
+FACET_AREA = 0.433
+"""Area of a facet whose edges have the length 1."""
 
 _SHARP_DEG = 30.0
 """Smallest angle between the normals of two faces at a sharp edge."""
@@ -68,7 +67,6 @@ def main(file: str, answer: str, size: str, edge_size: str, widest: str) -> None
     widest : str
         Width of the bowl, mm, in which a part of too many facets does not fit.
     """
-    resource.setrlimit(resource.RLIMIT_CPU, (CPU_LIMIT_S, CPU_LIMIT_S))
     meshed: Meshed | dict[str, tuple[object, ...]]
     try:
         meshed = _mesh(_gmsh(), file, float(size), float(edge_size), float(widest))
@@ -129,7 +127,7 @@ def _refuse_too_many(
         sum(gmsh.model.occ.getMass(dimension, entity) for entity in ones)
         for dimension, ones in ((2, [face for _, face in gmsh.model.getEntities(2)]), (1, sharp))
     )
-    facets = (area / size**2 + 2 * _GROWTH * length * (1 / edge_size - 1 / size)) / 0.433
+    facets = (area / size**2 + 2 * _GROWTH * length * (1 / edge_size - 1 / size)) / FACET_AREA
     if facets > MOST_FACETS:
         low, high = np.array(gmsh.model.getBoundingBox(-1, -1)).reshape(2, 3) / 1e3
         if sorted(high - low)[1] > widest / 1e3:

@@ -84,11 +84,13 @@ def windows_of(case: Case) -> list[Case]:
     and samples a stretch. Any number of the first ones is spread over the path. Those of a further
     workpiece are those of the run, seen from it.
     """
-    count, lead = window_count(case.study), with_lead(case.all_workpieces)
-    length = window_fraction(case.study) if count else 0.0
+    lead = with_lead(case.all_workpieces)
+    if lead.study.chosen_fidelity().windows is None:
+        return []
+    study, length = _window_study(lead.study), window_fraction(lead.study)
     return [
-        _from_mark(lead, case.number, mark, length, f"window-{mark + 1}", rank)
-        for rank, mark in enumerate(spread_out(count), 1)
+        _from_mark(lead, study, case.number, mark, length, f"window-{mark + 1}", rank)
+        for rank, mark in enumerate(spread_out(len(lead.stretch.marks)), 1)
     ]
 
 
@@ -98,19 +100,23 @@ def whole_drag(case: Case) -> list[Case]:
     It begins at the first mark of the case's own run, which is its soft start. A list of one case,
     or of none if the fidelity asks for no windows.
     """
-    count, lead = window_count(case.study), with_lead(case.all_workpieces)
-    rank = FIRST_WINDOWS + count + 1
-    return [_from_mark(lead, case.number, 0, 1.0, "whole-drag", rank)] if count else []
+    lead = with_lead(case.all_workpieces)
+    if lead.study.chosen_fidelity().windows is None:
+        return []
+    rank = FIRST_WINDOWS + len(lead.stretch.marks) + 1
+    study = _window_study(lead.study)
+    return [_from_mark(lead, study, case.number, 0, 1.0, "whole-drag", rank)]
 
 
-def _from_mark(lead: Case, number: int, mark: int, length: float, part: str, rank: int) -> Case:
+def _from_mark(
+    lead: Case, study: Study, number: int, mark: int, length: float, part: str, rank: int
+) -> Case:
     """A run at the physical modulus that goes on at a mark of a softer one; seen from a workpiece.
 
     The number of the workpiece is 0 for that of all.
     """
     begin = lead.stretch.marks[mark]
     stretch = Stretch(begin, min(begin + length, 1.0))
-    study = _window_study(lead.study)
     run = replace(lead, study=study, stretch=stretch, lead=lead, part=part, rank_of_window=rank)
     return of_each_workpiece(run)[number - 1] if number else run
 

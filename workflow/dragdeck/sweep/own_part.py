@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dragdeck.mesh.checks import Surroundings, check, findings
-from dragdeck.mesh.files import FACET_AREA, STEP, UNITS, read
+from dragdeck.mesh.files import STEP, UNITS, read
+from dragdeck.mesh.step_mesher import FACET_AREA
 from dragdeck.mesh.surface import facing_out, place, points_below, upright, volume_below
 from dragdeck.physics.rounding import rounded
 
