@@ -140,7 +140,7 @@ def window_targets(study: str) -> str:
 
 
 def collect_windows(archive: Path, results: Sequence[Path]) -> str:
-    """Write an archive with the quantities of soft runs and of their windows, a folder a soft run.
+    """Write an archive with the quantities of soft runs and windows, one folder per soft run.
 
     Windows that a study would refuse, and those that were not run, are left out.
 

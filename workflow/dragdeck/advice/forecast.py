@@ -158,8 +158,8 @@ def ways_in_words(case: Case, tradeoff: TradeoffRecord) -> str:
     ]
     what = f"{', '.join(requested.quantities)} within {shown_share(requested.tolerance)}"
     return (
-        f"ways to {what}, with the half-width to be expected and the cost over that of a plain "
-        f"run: {', '.join(shown)}"
+        f"ways to {what}, with the expected half-width and the cost relative to a plain run: "
+        f"{', '.join(shown)}"
     )
 
 
@@ -169,7 +169,9 @@ def _half_width(half_width: float | None) -> str:
 
 def _ways_table(ways: Sequence[WayEntry], requested: Tolerance) -> Table:
     """What each way is expected to give, and to cost."""
-    table = Table(title="ways, as other scenes let expect", title_justify="left")
+    table = Table(
+        title="ways, with the half-width expected from other scenes", title_justify="left"
+    )
     for name in ("way", "half-width", "cost"):
         table.add_column(name)
     for way in ways:

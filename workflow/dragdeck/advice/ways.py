@@ -135,7 +135,7 @@ class Way:
         Expected relative half-width of the 95 % interval, the largest of the quantities; infinite
         where other scenes say nothing of one.
     relative_cost : float
-        CPU time over that of the plain run.
+        CPU time relative to that of the plain run.
     """
 
     name: str
