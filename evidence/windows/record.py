@@ -12,7 +12,7 @@ runs give ratio and scatter, too, and the slope is 0.
 import math
 import tarfile
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -20,24 +20,28 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import brentq, least_squares
 from scipy.special import digamma, polygamma
+from scipy.stats import binom
 
 from dragchain.arrays import Floats
 from dragchain.errors import SeriesError
 from dragchain.quantities.blocks import neighbour_correlation
 from dragchain.quantities.document import RunQuantities
 from dragchain.quantities.registry import MEASURED, Quantity
-from dragchain.statistics.estimate import NORMAL_QUANTILE
+from dragchain.statistics.estimate import CONFIDENCE, NORMAL_QUANTILE, student_quantile
 from dragchain.windows.estimate import WindowOfRun
 from dragchain.windows.rounds import beside, of_windows, stretches, window_of
 from dragdeck.physics.contact_mechanics import damping_ratio
 from dragdeck.records.stability import StableStepLaw, StableStepRecord
 from dragdeck.records.tradeoff import SixDigits
-from dragdeck.records.windows import UNKNOWN, Known, WindowsRecord
+from dragdeck.records.windows import UNKNOWN, Known, WindowsRecord, softness
 
 _SOFT = 1e-3
 _FEWEST_SCENES = 5
 _LARGEST_STD = 0.08
-"""A ratio that differs more than this from scene to scene says too little to save windows."""
+"""A ratio that differs by more than this from scene to scene says too little."""
+
+_BY_CHANCE = 0.01
+"""Probability of so many misses of scenes that are left out below which intervals do not cover."""
 
 _MOST_DEGREES = 10.0
 """Windows' worth of evidence on a variance: never more, whatever the scenes agree on."""
@@ -144,12 +148,10 @@ class Windowed:
         along = stretches(self.soft, quantity.name, self.windows[0].arc_m)
         blocks = self.soft.of_blocks(quantity.name).values
         known = blocks[np.isfinite(blocks)]
-        ratio = abs(windows.mean() / soft.mean())
         return Pairs(
             windows / windows.mean() - 1.0,
             soft / soft.mean() - 1.0,
             along / along.mean() - 1.0,
-            math.log(ratio) / (1 + quantity.squared),
             float(np.var(known / known.mean(), ddof=1)) / (1 + quantity.squared) ** 2,
         )
 
@@ -164,8 +166,6 @@ class Pairs:
         Relative to the means.
     stretches : (B,) ndarray
         The soft run's stretches, relative to the mean of it.
-    ratio_log : float
-        Logarithm of the mean of the windows over that of the soft run beside them.
     of_block : float
         Relative variance of a block of the soft run; of the root of a mean square.
     """
@@ -173,7 +173,6 @@ class Pairs:
     windows: Floats
     beside: Floats
     stretches: Floats
-    ratio_log: float
     of_block: float
 
     @property
@@ -196,12 +195,6 @@ class Pairs:
         """Of the slope of the windows."""
         degrees = len(self.windows) - 1
         return self.about(self.slope) * degrees / (degrees - 1) / float(self.beside @ self.beside)
-
-    @property
-    def ratio_variance(self) -> float:
-        """Of the logarithm of the ratio."""
-        rest = self.windows - self.beside
-        return float(rest @ rest) / (len(rest) - 1) / len(rest)
 
 
 _FEWEST_WINDOWS = 5
@@ -272,10 +265,13 @@ def _known(quantity: Quantity, scenes: Scenes, windowed: Sequence[Windowed]) -> 
         return None
     else:
         said = whole
-    std = said["ratio_log_std"] if not quantity.signed else math.inf
+    softened = [softened for runs in measured if (softened := Softened.of(runs))]
+    per_softness, std = (0.0, math.inf) if quantity.signed else _ratio(softened)
     return Known(
-        **{name: round(value, 4) for name, value in said.items() if name != "ratio_log_std"},
-        ratio_log_std=round(std, 4) if std <= _LARGEST_STD else math.inf,
+        **{name: round(value, 4) for name, value in said.items()},
+        per_softness=round(per_softness, 4),
+        per_softness_std=round(std, 4),
+        scenes=len(softened),
         packing_std=round(_between_packings(measured), 4),
         correlation=round(_correlation(measured), 2),
     )
@@ -283,9 +279,6 @@ def _known(quantity: Quantity, scenes: Scenes, windowed: Sequence[Windowed]) -> 
 
 def _of_windows(quantity: Quantity, pairs: Sequence[Pairs]) -> dict[str, float]:
     """What soft runs and their windows say."""
-    ratio, _, ratio_std = _between_scenes(
-        [of.ratio_log for of in pairs], [of.ratio_variance for of in pairs]
-    )
     slope, error, slope_std = _between_scenes(
         [of.slope for of in pairs], [of.slope_variance for of in pairs]
     )
@@ -304,8 +297,6 @@ def _of_windows(quantity: Quantity, pairs: Sequence[Pairs]) -> dict[str, float]:
         )
     )
     return {
-        "ratio_log": ratio,
-        "ratio_log_std": ratio_std,
         "slope": slope,
         "slope_std": slope_std,
         "variance_ratio": math.exp(float(np.mean(logs))),
@@ -324,20 +315,95 @@ def _of_whole_runs(scenes: Sequence[Sequence[QuantityOfRun]]) -> dict[str, float
     ]
     if len(pairs) < _FEWEST_SCENES:
         return None
-    ratios = [math.log(_mean(stiff, "value") / _mean(soft, "value")) for stiff, soft in pairs]
-    noise = float(np.mean([sum(map(_variance_of_mean, pair)) for pair in pairs]))
-    between = max(float(np.var(ratios, ddof=1)) - noise, 0.0) + noise / len(pairs)
     logs = [math.log(_mean(stiff, "variance") / _mean(soft, "variance")) for stiff, soft in pairs]
     by_chance = float(np.mean([sum(map(_log_variance, map(_degrees_of, pair))) for pair in pairs]))
     return {
-        "ratio_log": float(np.mean(ratios)),
-        "ratio_log_std": math.sqrt(between * (1 + 1 / len(pairs))),
         "slope": 0.0,
         "slope_std": 0.0,
         "variance_ratio": math.exp(float(np.mean(logs))),
         "degrees": _degrees(float(np.var(logs, ddof=1)) - by_chance),
         "block_std": math.sqrt(float(np.mean([_mean(soft, "variance") for _, soft in pairs]))),
     }
+
+
+@dataclass(frozen=True)
+class Softened:
+    """A quantity of a scene at the physical modulus and at reduced ones.
+
+    Attributes
+    ----------
+    stiff : sequence of QuantityOfRun
+    soft : sequence of sequence of QuantityOfRun
+        The packings at each reduced modulus, (M,).
+    differences : (M,) ndarray
+        By how much their `softness` is above that of the physical modulus.
+    """
+
+    stiff: Sequence[QuantityOfRun]
+    soft: Sequence[Sequence[QuantityOfRun]]
+    differences: Floats
+
+    @classmethod
+    def of(cls, runs: Sequence[QuantityOfRun]) -> "Softened | None":
+        """Of all packings of a scene; None if a modulus is missing."""
+        by_scale = defaultdict[float, list[QuantityOfRun]](list)
+        for run in runs:
+            by_scale[run.run.fidelity.youngs_modulus_scale].append(run)
+        stiff = by_scale.pop(1.0, [])
+        if not stiff or not by_scale:
+            return None
+        number = stiff[0].run.numbers["stiffness_number"]
+        soft = [softness(number * scale ** (2 / 3)) - softness(number) for scale in by_scale]
+        return cls(stiff, list(by_scale.values()), np.array(soft))
+
+    @cached_property
+    def per_softness(self) -> float:
+        """The logarithm of the ratio per difference of softness, by least squares."""
+        soft = np.array([_mean(runs, "value") for runs in self.soft])
+        logs = np.log(_mean(self.stiff, "value") / soft)
+        return float(self.differences @ logs / (self.differences @ self.differences))
+
+    @cached_property
+    def variance(self) -> float:
+        """Of that, by the scatter along the paths."""
+        x, of_stiff = self.differences, _variance_of_mean(self.stiff)
+        of_soft = np.array([_variance_of_mean(runs) for runs in self.soft])
+        return float(of_stiff * x.sum() ** 2 + x**2 @ of_soft) / float(x @ x) ** 2
+
+    def misses(self, per_softness: float, std: float, degrees: int) -> Iterator[bool]:
+        """Of each soft run, whether its estimate and the stiff runs exclude each other."""
+        stiff, of_stiff = math.log(_mean(self.stiff, "value")), _variance_of_mean(self.stiff)
+        for runs, difference in zip(self.soft, self.differences, strict=True):
+            for run in runs:
+                along = student_quantile(len(run.blocks) - 1) ** 2 * run.variance_of_mean
+                between = (student_quantile(degrees) * std * difference) ** 2
+                half = math.sqrt(along + between + NORMAL_QUANTILE**2 * of_stiff)
+                yield abs(math.log(run.value) + per_softness * difference - stiff) > half
+
+
+def _ratio(scenes: Sequence[Softened]) -> tuple[float, float]:
+    """Logarithm of the ratio per difference of softness, and its standard deviation.
+
+    That is infinite where the intervals of single scenes that the others give do not cover.
+    """
+    if len(scenes) < _FEWEST_SCENES:
+        return 0.0, math.inf
+    mean, std = _over(scenes)
+    missed = [
+        miss
+        for number, scene in enumerate(scenes)
+        for miss in scene.misses(*_over([*scenes[:number], *scenes[number + 1 :]]), len(scenes) - 2)
+    ]
+    by_chance = binom.sf(sum(missed) - 1, len(missed), 1.0 - CONFIDENCE)
+    useful = std <= _LARGEST_STD and by_chance >= _BY_CHANCE
+    return mean, std if useful else math.inf
+
+
+def _over(scenes: Sequence[Softened]) -> tuple[float, float]:
+    mean, _, std = _between_scenes(
+        [scene.per_softness for scene in scenes], [scene.variance for scene in scenes]
+    )
+    return mean, std
 
 
 def _is_soft(run: SceneRun) -> bool:
@@ -361,8 +427,8 @@ def _log_bias(values: Floats) -> float:
 
 
 def _runs_with(quantity: Quantity, runs: Sequence[SceneRun]) -> list[QuantityOfRun]:
-    """The runs at the speed of their scene in which every block has the quantity."""
-    plain = [run for run in runs if run.fidelity.speed_factor == 1]
+    """The accepted runs at the speed of their scene in which every block has the quantity."""
+    plain = [run for run in runs if run.fidelity.speed_factor == 1 and run.complete]
     blocks = [run.of_blocks(quantity.name).values for run in plain]
     rows = [
         QuantityOfRun(run, np.sqrt(of) if quantity.squared else of)

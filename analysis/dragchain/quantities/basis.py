@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import NamedTuple
 
+from dragchain.quantities.other_scenes import OtherScenes, other_scenes
 from dragchain.quantities.registry import Quantity
 from dragchain.statistics.estimate import Estimate
 from dragdeck.records.case import CaseOfRun, FidelityOfRun
@@ -51,6 +52,8 @@ class Standing:
         Why it is not available, or what it is not corrected for; empty if nothing is to be said.
     windows : int
         Number of windows that the value is from; 0 if it is from the whole drag.
+    other_scenes : OtherScenes or None
+        What other scenes say of the value at the physical modulus, where the run has another one.
     """
 
     quantity: Quantity
@@ -59,6 +62,12 @@ class Standing:
     basis: Basis
     reason: str = ""
     windows: int = 0
+    other_scenes: OtherScenes | None = None
+
+    @property
+    def estimated(self) -> Estimate | None:
+        """The value at the physical modulus as other scenes suggest it; never a measurement."""
+        return self.other_scenes.estimate(self.run) if self.other_scenes else None
 
     @property
     def reliable(self) -> bool:
@@ -111,9 +120,10 @@ def judge(
     reason = f"not corrected for {' and '.join(doubts)}"
     if case.marks:
         reason += f": {_why_not(case)}"
+    others = other_scenes(quantity, case)
     if quantity.robust:
-        return Standing(quantity, run, run, scaled, reason)
-    return Standing(quantity, run, None, Basis.NONE, reason)
+        return Standing(quantity, run, run, scaled, reason, other_scenes=others)
+    return Standing(quantity, run, None, Basis.NONE, reason, other_scenes=others)
 
 
 def changed_settings(fidelity: FidelityOfRun) -> dict[str, str]:

@@ -27,7 +27,6 @@ from dragchain.report.summary import summary
 from dragchain.report.tolerance import answers
 from dragchain.run.case import upstream_folders
 from dragchain.run.workpiece import read_surface
-from dragchain.statistics.correlated import RELIABLE_TIMES
 from dragchain.statistics.noisy_map import LARGEST_ERROR
 from dragdeck.errors import DragdeckError
 from dragdeck.files import write_bytes
@@ -322,7 +321,6 @@ def _render(
         signals=[(one, data_uri(one.picture()) if one.differences else None) for one in signals],
         overview=_overview(cases) if len(cases) > 1 else None,
         shown=_SHOWN,
-        reliable_times=RELIABLE_TIMES,
         asked=[(one, answer) for one in cases for answer in answers(one)],
         removed=removed,
         largest_error=LARGEST_ERROR,

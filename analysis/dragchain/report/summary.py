@@ -98,12 +98,14 @@ def _of_run(standings: Sequence[Standing]) -> Row:
 
 
 def _corrected(standings: Sequence[Standing]) -> Row:
-    """The values at the physical Young's modulus, where windows give them."""
+    """The values at the physical Young's modulus, from windows or from other scenes."""
     row: Row = {}
     for standing in standings:
+        name, unit = standing.quantity.name, standing.quantity.unit
         if standing.corrected:
-            name = f"extrapolated_{standing.quantity.name}"
-            row |= _interval(name, standing.quantity.unit, standing.shown)
+            row |= _interval(f"extrapolated_{name}", unit, standing.shown)
+        if standing.estimated:
+            row |= _interval(f"estimated_{name}", unit, standing.estimated)
     return row
 
 

@@ -66,6 +66,11 @@ class Values:
         """Whether any value is from windows at the physical Young's modulus."""
         return any(one.corrected for one in self.standings)
 
+    @property
+    def estimated(self) -> bool:
+        """Whether other scenes suggest any value at the physical Young's modulus."""
+        return any(one.estimated for one in self.standings)
+
     @cached_property
     def notes(self) -> list[str]:
         """What each setting does to the numbers, one sentence each."""
@@ -178,4 +183,8 @@ def _plain(one: Standing) -> str:
     text = f"{name} {found.value:#.3g}{unit}" + (f" ({ends})" if found.known else "")
     if one.corrected:
         return f"{text} {one.rests_on}, {one.run.value:#.3g}{unit} as simulated"
-    return ", ".join(filter(None, (text, "" if one.value else "this run only", what)))
+    estimated = ""
+    if one.estimated and one.other_scenes:
+        ends = f"{one.estimated.ci95_low:#.3g} to {one.estimated.ci95_high:#.3g}{unit}"
+        estimated = f"at the physical one {ends} by {one.other_scenes.scenes} other scenes"
+    return ", ".join(filter(None, (text, "" if one.value else "this run only", what, estimated)))

@@ -7,9 +7,10 @@ import pytest
 from report_files import case_json
 
 from dragchain.quantities.basis import Basis, Correction, judge, notes
-from dragchain.quantities.registry import Quantity
-from dragchain.statistics.estimate import Estimate
+from dragchain.quantities.registry import REPORTED, Quantity
+from dragchain.statistics.estimate import Estimate, student_quantile
 from dragdeck.records.case import CaseOfRun
+from dragdeck.records.windows import WindowsRecord
 
 OWN = Estimate(10.0, 8.0, 12.0)
 WINDOWS = Correction(Estimate(0.8, 0.6, 1.0), 5)
@@ -92,3 +93,45 @@ def test_a_step_that_was_accepted_though_unstable_is_said_to_be() -> None:
     text = " ".join(notes(case(unsafe_timestep="to see it break")))
     assert "may be unstable" in text and "to see it break" in text
     assert "no effect" not in text
+
+
+DRAG, CONTACTS = (
+    next(quantity for quantity in REPORTED if quantity.name == name)
+    for name in ("drag_mean", "workpiece_contacts")
+)
+NUMBERS = {"numbers": {"stiffness_number": 64_000.0}}
+
+
+def test_other_scenes_give_an_estimate_beside_the_value_of_a_soft_run() -> None:
+    """At E x 0.001 and a stiffness number of 64,000 the ratio has a power of 1.118 - 0.354."""
+    drag = judge(DRAG, Estimate(-2.0, -2.2, -1.8), case(1e-3, **NUMBERS), None)
+    known = WindowsRecord.shipped().quantities["drag_mean"]
+    assert drag.value == drag.run == Estimate(-2.0, -2.2, -1.8)
+    assert drag.estimated is not None and drag.other_scenes is not None
+    difference = (1.0 / 0.64) ** 0.25 - (1.0 / 64.0) ** 0.25
+    assert drag.estimated.value == pytest.approx(-2.0 * math.exp(known.per_softness * difference))
+    half = math.hypot(0.1, student_quantile(known.scenes - 2) * known.per_softness_std * difference)
+    ends = drag.estimated.ci95_low, drag.estimated.ci95_high
+    assert ends == pytest.approx([drag.estimated.value * math.exp(sign * half) for sign in (1, -1)])
+
+
+@pytest.mark.parametrize(
+    ("quantity", "settings", "more"),
+    [
+        (DRAG, (1.0, 1.0), NUMBERS),  # nothing to estimate
+        (DRAG, (1e-3, 2.0), NUMBERS),
+        (DRAG, (1e-3, 1.0), {}),  # a softness that is not known
+        (DRAG, (1e-3, 1.0), NUMBERS | {"added_forces": ["cohesion sjkr2"]}),
+        (DRAG, (1e-3, 1.0), NUMBERS | {"changed_law": ["pair_style gran model hooke"]}),
+        (CONTACTS, (1e-3, 1.0), NUMBERS),  # differs from scene to scene
+        (PLAIN, (1e-3, 1.0), NUMBERS),
+    ],
+)
+def test_other_scenes_give_no_estimate_where_they_are_no_measure(
+    quantity: Quantity, settings: tuple[float, float], more: dict[str, Any]
+) -> None:
+    assert judge(quantity, OWN, case(*settings, **more), None).estimated is None
+
+
+def test_a_value_from_windows_needs_no_estimate() -> None:
+    assert judge(DRAG, OWN, case(1e-3, **NUMBERS), WINDOWS).estimated is None

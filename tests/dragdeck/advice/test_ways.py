@@ -15,8 +15,8 @@ from dragdeck.scenes.lead import FIRST_WINDOWS
 from dragdeck.study.model import Tolerance
 
 KNOWN = Known(
-    ratio_log=0.1, ratio_log_std=0.05, slope=0.6, slope_std=0.1, variance_ratio=0.5, degrees=10.0,
-    packing_std=0.02, correlation=0.1, block_std=0.2,
+    per_softness=0.1, per_softness_std=0.05, scenes=20, slope=0.6, slope_std=0.1,
+    variance_ratio=0.5, degrees=10.0, packing_std=0.02, correlation=0.1, block_std=0.2,
 )  # fmt: skip
 
 
@@ -33,10 +33,10 @@ def ways(tolerance: float, quantity: str = "drag_mean", **known: float) -> Ways:
 def test_each_way_has_its_own_sources_of_error() -> None:
     """Blocks of the path scatter in all, windows sample a few, ratios differ between scenes."""
     blocks, sample, packing = 40.0, 2.0, 0.02**2
-    soft = math.sqrt(0.2**2 / blocks + 0.05**2 + packing)
+    soft = math.sqrt(0.2**2 / blocks + (0.05 * 0.5) ** 2 + packing)
     windows = math.sqrt(0.2**2 * (0.5 / (3 * sample) + 0.6**2 / blocks) + packing)
     whole = math.sqrt(0.2**2 * (0.5 + 0.6**2) / blocks + packing)
-    assert KNOWN.soft_half_width(blocks) == pytest.approx(1.96 * soft)
+    assert KNOWN.soft_half_width(blocks, 0.5) == pytest.approx(1.96 * soft)
     assert KNOWN.windows_half_width(3, sample, blocks) == pytest.approx(1.96 * windows)
     assert KNOWN.whole_half_width(blocks) == pytest.approx(1.96 * whole)
 

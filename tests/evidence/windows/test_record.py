@@ -4,6 +4,8 @@ import io
 import math
 import re
 import tarfile
+from collections.abc import Sequence
+from itertools import groupby
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +18,7 @@ from dragchain.quantities.document import RunCost, RunQuantities
 from dragdeck.physics.contact_mechanics import damping_ratio
 from dragdeck.records.case import FidelityOfRun
 from dragdeck.records.stability import StableStepRecord
-from dragdeck.records.windows import WindowsRecord
+from dragdeck.records.windows import WindowsRecord, softness
 from dragdeck.study.model import Study
 from evidence.__main__ import COMMANDS, main
 from evidence.windows.record import SceneRun, Windowed, read_scenes, read_windows, windows_record
@@ -27,15 +29,25 @@ COST = RunCost(steps=1, wall_time_s=1, cpu_time_s=1, ranks=1, timestep_s=1e-6, a
 LAW = {"stiffness": 80.0, "damping": 40.0, "spread": -1.5}
 
 
+PER_SOFTNESS = 0.1
+
+
 def made_run(
-    scene: int, scale: float, seed: int, *, ratio: float, packing: float = 0.0, speed: float = 1.0
+    scene: int,
+    scale: float,
+    seed: int,
+    *,
+    per_softness: float = PER_SOFTNESS,
+    packing: float = 0.0,
+    speed: float = 1.0,
 ) -> SceneRun:
-    """A run whose drag is 2 N at the physical modulus over `ratio` at a reduced one."""
+    """A run whose drag is 2 N at the physical modulus, and by the law of softness otherwise."""
     rng = np.random.default_rng([scene, seed, round(1 / scale)])
-    mean = 2.0 / (1.0 if scale == 1.0 else ratio) * math.exp(packing * rng.normal())
+    kappa = 1e4 * (1 + scene)
+    softer = softness(kappa * scale ** (2 / 3)) - softness(kappa)
+    mean = 2.0 * math.exp(packing * rng.normal() - per_softness * softer)
     mean *= 10.0 if speed != 1.0 else 1.0
     restitution, spread, fraction = 0.4 + 0.02 * scene, 0.02 * (scene % 3), 0.3 + 0.05 * (seed % 3)
-    kappa = 1e4 * (1 + scene)
     u = fraction * (kappa * scale ** (2 / 3)) ** -0.25
     squared = LAW["stiffness"] * u**2 + LAW["damping"] * damping_ratio(restitution) * u
     return SceneRun(
@@ -69,11 +81,14 @@ def numbered(runs: list[SceneRun]) -> dict[str, RunQuantities]:
     return {f"made/{number:03}": run for number, run in enumerate(runs)}
 
 
-def scenes(packing: float = 0.0, number: int = 6, seeds: int = 2) -> list[SceneRun]:
+def scenes(
+    packing: float = 0.0, number: int = 6, seeds: int = 2,
+    ratios: Sequence[float] = (PER_SOFTNESS,), scales: Sequence[float] = (1.0, 0.001),
+) -> list[SceneRun]:  # fmt: skip
     return [
-        made_run(scene, scale, seed, ratio=1.1, packing=packing)
+        made_run(scene, scale, seed, per_softness=ratios[scene % len(ratios)], packing=packing)
         for scene in range(number)
-        for scale in (1.0, 0.001)
+        for scale in scales
         for seed in range(seeds)
     ]
 
@@ -82,19 +97,19 @@ SLOPE, ABOUT, WINDOWS = 0.7, 0.5, 12
 """Of windows on the soft run; variance about it over that of the soft run's stretches."""
 
 
-def with_windows(ratios: list[float]) -> dict[str, RunQuantities]:
+def with_windows(number: int) -> dict[str, RunQuantities]:
     """A soft run of so many blocks and as many windows in each scene, by their names."""
     runs = dict[str, RunQuantities]()
-    for scene, ratio in enumerate(ratios):
+    for scene in range(number):
         rng = np.random.default_rng([7, scene])
         noise, rest = 0.1 * rng.normal(size=(2, WINDOWS))
-        base = made_run(scene, 0.001, 0, ratio=ratio).model_copy(update={"stability_number": None})
+        base = made_run(scene, 0.001, 0).model_copy(update={"stability_number": None})
         soft = base.model_copy(
             update={"arc_m": float(WINDOWS), "block_m": 1.0,
                     "blocks": {"drag_mean": tuple(-2.0 * (1 + noise))}}
         )  # fmt: skip
         runs[f"{scene}/soft"] = soft
-        for place, value in enumerate(-2.0 * ratio * (1 + SLOPE * noise + ABOUT**0.5 * rest)):
+        for place, value in enumerate(-2.2 * (1 + SLOPE * noise + ABOUT**0.5 * rest)):
             runs[f"{scene}/{place}"] = base.model_copy(
                 update={"run": f"{place}", "begin_m": float(place), "arc_m": 1.0, "block_m": 1.0,
                         "blocks": {"drag_mean": (value,)}}
@@ -102,15 +117,15 @@ def with_windows(ratios: list[float]) -> dict[str, RunQuantities]:
     return runs
 
 
-def windowed(ratios: list[float], folder: Path) -> list[Windowed]:
-    return read_windows(archive(folder / "windows.tar.xz", with_windows(ratios)))
+def windowed(folder: Path) -> list[Windowed]:
+    return read_windows(archive(folder / "windows.tar.xz", with_windows(6)))
 
 
 def test_the_command_makes_records_that_the_product_reads(tmp_path: Path) -> None:
     """Of small made-up inputs of which ratio, slope and law are known."""
-    runs = [*scenes(), made_run(0, 1.0, 9, ratio=1.1, speed=2.0)]
+    runs = [*scenes(), made_run(0, 1.0, 9, speed=2.0)]
     half = len(runs) // 2
-    drawn = archive(tmp_path / "drawn.tar.xz", with_windows([1.1] * 12))
+    drawn = archive(tmp_path / "drawn.tar.xz", with_windows(12))
     files = [
         archive(tmp_path / "a.tar.xz", numbered(runs[:half])),
         archive(tmp_path / "b.tar.xz", numbered(runs[half:])),
@@ -122,8 +137,8 @@ def test_the_command_makes_records_that_the_product_reads(tmp_path: Path) -> Non
     assert record.measured == "2026-01-21"
     assert record.source.endswith(": drawn.tar.xz, a.tar.xz, b.tar.xz")
     drag = record.quantities["drag_mean"]
-    assert drag.ratio_log == pytest.approx(math.log(1.1), abs=0.02)
-    assert 0 < drag.ratio_log_std < 0.03
+    assert drag.per_softness == pytest.approx(PER_SOFTNESS, abs=0.02) and drag.scenes == 6
+    assert 0 < drag.per_softness_std < 0.03
     assert drag.slope == pytest.approx(SLOPE, abs=2 * drag.slope_std)
     assert 0 < drag.slope_std < 0.25
     assert drag.variance_ratio == pytest.approx(ABOUT, rel=0.4) and drag.degrees > 5
@@ -133,14 +148,31 @@ def test_the_command_makes_records_that_the_product_reads(tmp_path: Path) -> Non
     assert law.runs == len(runs) and law.scatter < 1e-4
 
 
+def scene_by_scene(runs: Sequence[SceneRun]) -> list[list[SceneRun]]:
+    return [list(same) for _, same in groupby(runs, key=lambda run: run.run.split("-")[0])]
+
+
 @pytest.mark.parametrize(
-    ("ratios", "std"), [([1.0, 1.1] * 3, (0.04, 0.08)), ([1.0, 1.5] * 3, (math.inf, math.inf))]
+    ("ratios", "std"), [((0.05, 0.15), (0.04, 0.08)), ((0.0, 0.5), (math.inf, math.inf))]
 )
 def test_a_ratio_that_scatters_between_scenes_says_little(
-    ratios: list[float], std: tuple[float, float], tmp_path: Path
+    ratios: tuple[float, ...], std: tuple[float, float]
 ) -> None:
-    drag = windows_record([], windowed(ratios, tmp_path), []).quantities["drag_mean"]
-    assert std[0] <= drag.ratio_log_std <= std[1]
+    runs = scene_by_scene(scenes(ratios=ratios))
+    drag = windows_record(runs, [], []).quantities["drag_mean"]
+    assert std[0] <= drag.per_softness_std <= std[1]
+
+
+@pytest.mark.parametrize(("wrong", "useful"), [(0.0, True), (0.1, False)])
+def test_a_ratio_that_is_not_that_of_the_scene_left_out_is_not_used(
+    wrong: float, useful: bool
+) -> None:
+    """Of one modulus the ratio is by the law, of another by another."""
+    runs = scenes(number=12, seeds=4)
+    more = scenes(number=12, seeds=4, ratios=(PER_SOFTNESS - 4 * wrong,), scales=(0.01,))
+    by_scene = [a + b for a, b in zip(*map(scene_by_scene, (runs, more)), strict=True)]
+    drag = windows_record(by_scene, [], []).quantities["drag_mean"]
+    assert math.isfinite(drag.per_softness_std) == useful
 
 
 @pytest.mark.parametrize(("packing", "between"), [(0.0, (0.0, 0.01)), (0.1, (0.07, 0.13))])
@@ -150,8 +182,7 @@ def test_scatter_between_packings_is_that_beyond_the_path(
     """Seeds at one time step are compared, 0 with 3."""
     number = 20 if packing else 6
     runs = scenes(packing, number, seeds=4)
-    by_scene = [[run for run in runs if run.run.startswith(f"{k}-")] for k in range(number)]
-    drag = windows_record(by_scene, windowed([1.1] * 6, tmp_path), []).quantities["drag_mean"]
+    drag = windows_record(scene_by_scene(runs), windowed(tmp_path), []).quantities["drag_mean"]
     assert between[0] <= drag.packing_std <= between[1]
 
 
@@ -159,7 +190,7 @@ def test_too_few_scenes_make_no_record(tmp_path: Path) -> None:
     few = read_scenes([archive(tmp_path / "few.tar.xz", numbered(scenes(number=4)))])
     assert len(few) == 4
     with pytest.raises(SeriesError, match="5 scenes"):
-        windows_record(few, windowed([1.1] * 4, tmp_path), [])
+        windows_record(few, read_windows(archive(tmp_path / "four.tar.xz", with_windows(4))), [])
 
 
 @pytest.mark.slow

@@ -7,10 +7,10 @@ from functools import cached_property
 
 import numpy as np
 
-from dragdeck.cases.bed import bed_timestep, expected_surface
+from dragdeck.cases.bed import bed_timestep, expected_surface, full_stiffness_number
 from dragdeck.cases.case import Case, of_each_workpiece
 from dragdeck.records.tradeoff import TradeoffRecord
-from dragdeck.records.windows import Known, WindowsRecord
+from dragdeck.records.windows import Known, WindowsRecord, softness
 from dragdeck.scenes.filling import FILLING, expected_time
 from dragdeck.scenes.lead import (
     FIRST_WINDOWS,
@@ -176,7 +176,10 @@ class Ways:
     def of_other_scenes(self) -> Way:
         """The soft run alone, times the ratio of other scenes: an estimate, no measurement."""
         blocks, _ = self._blocks
-        half = self._largest(lambda known: known.soft_half_width(blocks))
+        full = full_stiffness_number(self._study)
+        scale = self.soft.youngs_modulus_scale
+        difference = softness(full * scale ** (2 / 3)) - softness(full)
+        half = self._largest(lambda known: known.soft_half_width(blocks, difference))
         return self._way("soft run times the ratio of other scenes", half, self.soft)
 
     def with_windows(self, count: int) -> Way:

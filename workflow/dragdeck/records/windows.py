@@ -14,6 +14,15 @@ _NORMAL_QUANTILE = 1.96
 """Of 95 % of a normal distribution."""
 
 
+def softness(stiffness_number: float) -> float:
+    """Measure of how soft particles are; 1 at a stiffness number of 1000, 0 of rigid ones.
+
+    Logarithms of ratios of quantities at two moduli are nearly proportional to the difference of
+    this (docs/evidence/windows.md).
+    """
+    return math.sqrt(math.sqrt(1000.0 / stiffness_number))
+
+
 def _infinite(number: object) -> object:
     return math.inf if number is None else number
 
@@ -23,9 +32,12 @@ class Known(Part):
 
     Attributes
     ----------
-    ratio_log, ratio_log_std : float
-        Logarithm of the value at the physical modulus over that of the soft run: its mean, and its
-        standard deviation from scene to scene; infinite if they say nothing.
+    per_softness, per_softness_std : float
+        Logarithm of the value of a stiff run over that of a soft one, per difference of their
+        `softness`: its mean, and its standard deviation from scene to scene; infinite if that is
+        too large to be of use.
+    scenes : int
+        Of which that is known.
     slope, slope_std : float
         How far a window is above the mean of all, relative to it, where the soft run beside it is
         above its mean by the same; and its standard deviation from scene to scene.
@@ -40,8 +52,9 @@ class Known(Part):
         Relative standard deviation of such a block of a soft run.
     """
 
-    ratio_log: float
-    ratio_log_std: Annotated[float, AllowInfNan(True), BeforeValidator(_infinite)]
+    per_softness: float
+    per_softness_std: Annotated[float, AllowInfNan(True), BeforeValidator(_infinite)]
+    scenes: int
     slope: float
     slope_std: float
     variance_ratio: float
@@ -50,9 +63,13 @@ class Known(Part):
     correlation: float
     block_std: Annotated[float, AllowInfNan(True)]
 
-    def soft_half_width(self, blocks: float) -> float:
-        """Expected relative half-width of the soft run of so many blocks, times the ratio."""
-        return self._half_width(self.block_std**2 / blocks + self.ratio_log_std**2)
+    def soft_half_width(self, blocks: float, difference: float) -> float:
+        """Expected relative half-width of the soft run of so many blocks, times the ratio.
+
+        ``difference`` is that of the `softness` of soft and stiff particles.
+        """
+        ratio = self.per_softness_std * difference
+        return self._half_width(self.block_std**2 / blocks + ratio**2)
 
     def windows_half_width(self, windows: int, sample: float, blocks: float) -> float:
         """Expected relative half-width of windows that sample so many blocks each."""
@@ -68,8 +85,8 @@ class Known(Part):
 
 
 UNKNOWN = Known(
-    ratio_log=0.0, ratio_log_std=math.inf, slope=0.0, slope_std=0.0, variance_ratio=0.0,
-    degrees=0.0, packing_std=0.0, correlation=0.3, block_std=math.inf,
+    per_softness=0.0, per_softness_std=math.inf, scenes=0, slope=0.0, slope_std=0.0,
+    variance_ratio=0.0, degrees=0.0, packing_std=0.0, correlation=0.3, block_std=math.inf,
 )  # fmt: skip
 """Of a quantity of which nothing is known; few quantities have a larger correlation."""
 
