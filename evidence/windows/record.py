@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import brentq, least_squares
 from scipy.special import digamma, polygamma
-from scipy.stats import binom
+from scipy.stats import binom, truncnorm
 
 from dragchain.arrays import Floats
 from dragchain.errors import SeriesError
@@ -52,6 +52,9 @@ class SceneRun(RunQuantities):
 
     stability_number: float | None = None
 
+
+_LARGEST_VARIANCE = 0.05
+"""Relative, of means whose scatter between packings is of use: not of those that may be zero."""
 
 Scenes = Sequence[Sequence[SceneRun]]
 """The runs of each scene."""
@@ -266,12 +269,13 @@ def _known(quantity: Quantity, scenes: Scenes, windowed: Sequence[Windowed]) -> 
     else:
         said = whole
     softened = [softened for runs in measured if (softened := Softened.of(runs))]
-    per_softness, std = (0.0, math.inf) if quantity.signed else _ratio(softened)
+    per_softness, std, covered = _ratio([] if quantity.signed else softened)
     return Known(
         **{name: round(value, 4) for name, value in said.items()},
         per_softness=round(per_softness, 4),
         per_softness_std=round(std, 4),
         scenes=len(softened),
+        covered=round(covered, 3),
         packing_std=round(_between_packings(measured), 4),
         correlation=round(_correlation(measured), 2),
     )
@@ -381,13 +385,14 @@ class Softened:
                 yield abs(math.log(run.value) + per_softness * difference - stiff) > half
 
 
-def _ratio(scenes: Sequence[Softened]) -> tuple[float, float]:
-    """Logarithm of the ratio per difference of softness, and its standard deviation.
+def _ratio(scenes: Sequence[Softened]) -> tuple[float, float, float]:
+    """Logarithm of the ratio per difference of softness, its standard deviation, and coverage.
 
-    That is infinite where the intervals of single scenes that the others give do not cover.
+    The coverage is that of scenes that are left out by what the others give. Where that is too low
+    by more than chance, the standard deviation is infinite.
     """
     if len(scenes) < _FEWEST_SCENES:
-        return 0.0, math.inf
+        return 0.0, math.inf, 0.0
     mean, std = _over(scenes)
     missed = [
         miss
@@ -396,7 +401,7 @@ def _ratio(scenes: Sequence[Softened]) -> tuple[float, float]:
     ]
     by_chance = binom.sf(sum(missed) - 1, len(missed), 1.0 - CONFIDENCE)
     useful = std <= _LARGEST_STD and by_chance >= _BY_CHANCE
-    return mean, std if useful else math.inf
+    return mean, std if useful else math.inf, 1.0 - sum(missed) / len(missed)
 
 
 def _over(scenes: Sequence[Softened]) -> tuple[float, float]:
@@ -462,20 +467,29 @@ def _degrees(excess: float) -> float:
 
 
 def _between_packings(measured: Sequence[Sequence[QuantityOfRun]]) -> float:
-    """Relative standard deviation of a mean between packings beyond that along the path."""
-    squares, degrees = 0.0, 0
+    """Relative standard deviation of a mean between packings beyond that along the path.
+
+    The variance is the mean of its distribution above zero, where the estimate is normal: one that
+    is zero or below within its error is no proof of packings that do not differ.
+    """
+    squares = square_error = degrees = 0.0
     for runs in measured:
         groups = defaultdict[object, list[QuantityOfRun]](list)
         for run in runs:
             fidelity = run.run.fidelity
             groups[fidelity.youngs_modulus_scale, fidelity.timestep_fraction].append(run)
         for group in groups.values():
-            values = np.array([one.value for one in group]) / _mean(group, "value")
-            if len(group) > 1:
-                excess = float(values.var(ddof=1)) - _mean(group, "variance_of_mean")
-                squares += excess * (len(group) - 1)
-                degrees += len(group) - 1
-    return math.sqrt(max(squares / degrees, 0.0)) if degrees else 0.0
+            values, free = np.array([run.value for run in group]), len(group) - 1
+            along = _mean(group, "variance_of_mean")
+            if free and along < _LARGEST_VARIANCE:
+                excess = float((values / values.mean()).var(ddof=1)) - along
+                squares += excess * free
+                square_error += 2.0 * (along + max(excess, 0.0)) ** 2 * free
+                degrees += free
+    if not degrees:
+        return 0.0
+    error = math.sqrt(square_error)
+    return math.sqrt(truncnorm.mean(-squares / error, math.inf, squares, error) / degrees)
 
 
 # --- stable_step.json ----------------------------------------------------------------------------

@@ -15,7 +15,7 @@ from dragdeck.scenes.lead import FIRST_WINDOWS
 from dragdeck.study.model import Tolerance
 
 KNOWN = Known(
-    per_softness=0.1, per_softness_std=0.05, scenes=20, slope=0.6, slope_std=0.1,
+    per_softness=0.1, per_softness_std=0.05, scenes=20, covered=0.95, slope=0.6, slope_std=0.1,
     variance_ratio=0.5, degrees=10.0, packing_std=0.02, correlation=0.1, block_std=0.2,
 )  # fmt: skip
 

@@ -38,6 +38,9 @@ class Known(Part):
         too large to be of use.
     scenes : int
         Of which that is known.
+    covered : float
+        Share of the soft runs whose estimate, if their own scene is left out, includes the value at
+        the physical modulus in its 95 % interval.
     slope, slope_std : float
         How far a window is above the mean of all, relative to it, where the soft run beside it is
         above its mean by the same; and its standard deviation from scene to scene.
@@ -55,6 +58,7 @@ class Known(Part):
     per_softness: float
     per_softness_std: Annotated[float, AllowInfNan(True), BeforeValidator(_infinite)]
     scenes: int
+    covered: float
     slope: float
     slope_std: float
     variance_ratio: float
@@ -85,7 +89,7 @@ class Known(Part):
 
 
 UNKNOWN = Known(
-    per_softness=0.0, per_softness_std=math.inf, scenes=0, slope=0.0, slope_std=0.0,
+    per_softness=0.0, per_softness_std=math.inf, scenes=0, covered=0.0, slope=0.0, slope_std=0.0,
     variance_ratio=0.0, degrees=0.0, packing_std=0.0, correlation=0.3, block_std=math.inf,
 )  # fmt: skip
 """Of a quantity of which nothing is known; few quantities have a larger correlation."""
