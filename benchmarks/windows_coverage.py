@@ -123,7 +123,7 @@ def _judged(
         )
         for place in spread_out(STRETCHES)
     ]  # fmt: skip
-    asked = Asked(process.tolerance, ("drag_mean",), STRETCHES, LENGTHS)
+    asked = Asked(process.tolerance, ("drag_mean",), STRETCHES, LENGTHS, process.seeds)
     number, cost = FIRST_WINDOWS, float(FIRST_WINDOWS)
     while True:
         last = judged(run, windows[:number], asked, process.record)

@@ -14,6 +14,9 @@ OUT_DIR = Argument("--out", type=Path, required=True, metavar="DIR", dest="out_d
                     help="folder for the results; required")  # fmt: skip
 MADE_BY = Argument("--command", metavar="TEXT",
                     help="command that made the runs, to be recorded with the results")  # fmt: skip
+PACKINGS = Argument("--packings", type=int, default=1, metavar="N",
+                    help="packings of the case, whose mean is to be inside the tolerance "
+                    "(default: 1)")  # fmt: skip
 MEASURES = Argument("measures", type=Path, nargs="+", metavar="MEASURES",
                      help="quantities.json of each run: ./run dragchain quantities")  # fmt: skip
 
@@ -135,6 +138,7 @@ STEPS = (
             "has any. It writes extrapolated.json to RUN_DIR/tables.",
             "windows.extrapolate:extrapolate_run", (
                 RUN_DIR,
+                PACKINGS,
                 Argument("--round", type=Path, metavar="FILE", dest="round_file",
                           help="last round of windows of the run: ./run dragchain step windows"))),
     Command("windows", "what windows say of a run at the physical Young's modulus",
@@ -153,6 +157,7 @@ STEPS = (
                           help="largest number of windows; required"),
                 Argument("--lengths", type=float, required=True, metavar="X",
                           help="how many windows cost as much as the whole drag; required"),
+                PACKINGS,
                 Argument("--drag", type=Path, metavar="RUN_DIR",
                           help="folder of the whole drag at the physical Young's modulus, if run"),
                 Argument("--out", type=Path, required=True, metavar="FILE",

@@ -85,14 +85,18 @@ def test_a_round_judges_as_many_windows_as_the_one_before_wanted(tmp_path: Path)
     study.mkdir(parents=True)
     text = "extends: uhlmann2015\nfidelity: {youngs_modulus_scale: 0.01, timestep_fraction: 0.5, "
     text += "windows: {tolerance: 0.1, quantities: [drag_mean], most: 9}}\n"
+    text += "sweep: {seed: [1, 2, 3], motion.speed_m_s: [0.01, 0.02]}\n"
     (study / "study.yaml").write_text(text)
     for name in ("uhlmann2015",):
         (tmp_path / "studies" / name).symlink_to(ROOT / "studies" / name)
     for name in ("templates", "workflow"):
         (tmp_path / name).symlink_to(ROOT / name)
     ours = Workflow(Project(tmp_path), "windows", "", "default", "paper", judged)
-    (run,) = (folder.rpartition("/")[2] for folder in ours.every_folder("process"))
+    run, *others = (folder.rpartition("/")[2] for folder in ours.every_folder("process"))
+    assert len(others) == 5
     second = SimpleNamespace(study="windows", run=run, round="2")
     assert len(ours.windows_of_round(second)) == 2
     assert ours.last_round(second).endswith("-3.json")  # type: ignore[union-attr]
-    assert "--tolerance 0.1 --quantities drag_mean --most" in ours.windows_options(second)
+    options = ours.windows_options(second)
+    assert "--tolerance 0.1 --quantities drag_mean --most" in options
+    assert "--packings 3" in options and ours.packings_option(second) == "--packings 3"

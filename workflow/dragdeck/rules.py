@@ -527,6 +527,16 @@ class Workflow:
             file = self.judged(wildcards.study, wildcards.run, number)
         return file
 
+    def packings_option(self, wildcards: Wildcards) -> str:
+        """How many of the cases differ from that of a process run in their packing alone."""
+        study = self.case_of("process", wildcards.run).study
+        same = [
+            case
+            for case in self.cases
+            if case.study.model_copy(update={"seed": study.seed}) == study
+        ]
+        return f"--packings {max(1, len(same))}"
+
     def windows_options(self, wildcards: RoundOfRun) -> str:
         """What the windows of a run are asked for, as options of the command line."""
         study = self.case_of("process", wildcards.run).study
@@ -537,5 +547,5 @@ class Workflow:
         return (
             f"--tolerance {asked.tolerance} --quantities {quantities}"
             f" --most {len(self.windows_of_run(wildcards))}"
-            f" --lengths {whole_lengths(study):.6g}{drag}"
+            f" --lengths {whole_lengths(study):.6g} {self.packings_option(wildcards)}{drag}"
         )

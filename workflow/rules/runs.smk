@@ -202,10 +202,12 @@ rule extrapolate_process:
         of_run("process", "tables/extrapolated.json"),
     localrule: True
     params:
+        packings=WORK.packings_option,
         windows=lambda wildcards, input: f"--round {input.windows}" if input.windows else "",
         source=source_hash("dragchain.windows.extrapolate"),
     shell:
-        "dragchain step extrapolate $(dirname $(dirname {output})) {params.windows} > {log} 2>&1"
+        "dragchain step extrapolate $(dirname $(dirname {output})) {params.packings}"
+        " {params.windows} > {log} 2>&1"
 
 
 # Load, sliding and friction work on the workpiece, facet by facet.

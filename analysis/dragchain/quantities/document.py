@@ -164,7 +164,9 @@ class Reached(Part):
     Attributes
     ----------
     tolerance : float
-        Relative half-width of the 95 % interval at which no further window is run.
+        Relative half-width of the 95 % interval that was asked for.
+    packings : int
+        Whose mean is to be inside it; in each, no further window is run at its root times that.
     asked : tuple of str
         Quantities to which it applies, by name.
     reached : bool
@@ -180,6 +182,7 @@ class Reached(Part):
     """
 
     tolerance: float
+    packings: int = 1
     asked: tuple[str, ...]
     reached: bool
     needed: Need
@@ -246,7 +249,11 @@ class Extrapolated(Document):
             return ""
         labels = [f"the {_LABELS.get(name, name)}" for name in reached.asked]
         what = " and ".join(filter(None, (", ".join(labels[:-1]), labels[-1])))
-        asked = f"{what} to within {100 * reached.tolerance:.3g} %"
+        of_each = reached.tolerance * math.sqrt(reached.packings)
+        asked = f"{what} to within {100 * of_each:.3g} %"
+        if reached.packings > 1:
+            mean = f"{100 * reached.tolerance:.3g} % for the mean over {reached.packings} packings"
+            asked = f"{asked} in this packing, which makes {mean}"
         who, verb = "The run at the physical Young's modulus", ("gives", "does not give")
         if reached.whole:
             who = "The whole drag at the physical Young's modulus, which began softer,"

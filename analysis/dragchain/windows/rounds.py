@@ -53,6 +53,7 @@ def judge_windows(
     quantities: Sequence[str],
     most: int,
     lengths: float,
+    packings: int,
     drag: Path | None,
     out: Path,
 ) -> None:
@@ -72,6 +73,8 @@ def judge_windows(
         Number of windows that there can be.
     lengths : float
         How many windows cost as much as the whole drag.
+    packings : int
+        Of the case, whose mean is to be inside the tolerance: each of them may be further off.
     drag : Path or None
         Folder of the whole drag at the physical modulus, if it was run.
     out : Path
@@ -84,7 +87,7 @@ def judge_windows(
     """
     soft = RunQuantities.read(run_dir / MEASURED_FILE)
     measured = [measured_window(folder) for folder in windows]
-    asked = Asked(tolerance, tuple(quantities), most, lengths)
+    asked = Asked(tolerance, tuple(quantities), most, lengths, packings)
     judged_round = judged(soft, measured, asked, WindowsRecord.shipped())
     if drag is not None:
         judged_round = with_drag(judged_round, RunQuantities.read(drag / MEASURED_FILE), asked)
@@ -97,8 +100,14 @@ class Asked:
 
     tolerance: float
     quantities: tuple[str, ...]
-    most: int
-    lengths: float
+    most: int = 0
+    lengths: float = math.inf
+    packings: int = 1
+
+    @property
+    def of_each(self) -> float:
+        """The tolerance of one packing."""
+        return self.tolerance * math.sqrt(self.packings)
 
 
 def judged(
@@ -115,9 +124,9 @@ def judged(
     values = {quantity.name: pair.estimate(len(good)) for quantity, pair in pairs.items()}
     values = {name: value for name, value in values.items() if value.known}
     widest = _widest(values, asked.quantities)
-    reached = len(good) >= _FEWEST and widest <= asked.tolerance
+    reached = len(good) >= _FEWEST and widest <= asked.of_each
     concerned = [pair for quantity, pair in pairs.items() if quantity.name in asked.quantities]
-    needs = [windows_needed(pair, len(good), asked.tolerance, asked.most) for pair in concerned]
+    needs = [windows_needed(pair, len(good), asked.of_each, asked.most) for pair in concerned]
     need = Need(*(max(numbers) for numbers in zip(Need(_FEWEST, 1), *needs, strict=True)))
     more = max(1, need.windows - len(good))
     by_windows, by_drag = _expected(concerned, need.windows, asked, len(good))
@@ -129,9 +138,10 @@ def judged(
         values=values,
         tolerance=Reached(
             tolerance=asked.tolerance,
+            packings=asked.packings,
             asked=asked.quantities,
             reached=reached,
-            needed=need,
+            needed=Need(need.windows, need.packings * asked.packings),
             runs=tuple(window.run for window in good),
             refused={window.run: window.refused for window in windows if window.refused},
         ),
@@ -155,7 +165,7 @@ def _expected(pairs: Sequence[Paired], windows: int, asked: Asked, good: int) ->
         return False, False
     widths = [pair.relative_half_width(windows, scatter=_DOUBT) for pair in pairs]
     of_drag = [pair.whole_half_width(_DOUBT) for pair in pairs]
-    return max(widths) <= asked.tolerance, max(of_drag) <= asked.tolerance
+    return max(widths) <= asked.of_each, max(of_drag) <= asked.of_each
 
 
 def with_drag(before: Round, drag: RunQuantities, asked: Asked) -> Round:
@@ -170,7 +180,7 @@ def with_drag(before: Round, drag: RunQuantities, asked: Asked) -> Round:
         return before.model_copy(update={"tolerance": tolerance, "whole": False, "last": True})
     return Round(
         values={name: value for name, value in drag.values_of_run.items() if value.known},
-        tolerance=reached_by(drag, asked.tolerance, asked.quantities).model_copy(
+        tolerance=reached_by(drag, asked).model_copy(
             update={"runs": (drag.run,), "whole": True, "refused": before.tolerance.refused}
         ),
         windows=before.windows,
@@ -185,14 +195,16 @@ def _widest(values: Mapping[str, Estimate], asked: Sequence[str]) -> float:
     return max(values[name].relative_half_width if name in values else math.inf for name in asked)
 
 
-def reached_by(run: RunQuantities, tolerance: float, asked: Sequence[str]) -> Reached:
+def reached_by(run: RunQuantities, asked: Asked) -> Reached:
     """Whether a run at the physical modulus gives what was asked for."""
-    worst = _widest(run.values_of_run, asked) / tolerance
+    worst = _widest(run.values_of_run, asked.quantities) / asked.of_each
+    packings = math.ceil(worst**2) if math.isfinite(worst) else 1
     return Reached(
-        tolerance=tolerance,
-        asked=tuple(asked),
+        tolerance=asked.tolerance,
+        packings=asked.packings,
+        asked=asked.quantities,
         reached=worst <= 1.0,
-        needed=Need(0, math.ceil(worst**2) if math.isfinite(worst) else 1),
+        needed=Need(0, packings * asked.packings),
     )
 
 

@@ -60,7 +60,7 @@ def test_windows_give_the_values_they_have_and_say_which_they_are(tmp_path: Path
     windows = tuple(WindowOfRun(run=f"w-{n}", cpu_time_s=9.0) for n in (1, 2, 3))
     last = Round(tolerance=asked, wanted=3, last=True, windows=windows, values={"drag_mean": drag})
     last.write(tmp_path / "round-1.json")
-    extrapolate_run(tmp_path, tmp_path / "round-1.json")
+    extrapolate_run(tmp_path, round_file=tmp_path / "round-1.json")
     said = Extrapolated.read(tmp_path / EXTRAPOLATED)
     assert said.values == {"drag_mean": drag} and said.tolerance == asked
     assert "windows" not in json.loads((tmp_path / EXTRAPOLATED).read_text())

@@ -1,13 +1,14 @@
 """Rounds of windows: when they stop, how many more they ask for, what they refuse."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from dragchain.quantities.document import PathQuantities, RunQuantities
+from dragchain.quantities.document import Extrapolated, PathQuantities, RunQuantities
 from dragchain.statistics.estimate import Estimate
 from dragchain.windows.estimate import Round, WindowOfRun
 from dragchain.windows.rounds import Asked, judged, unsettled, with_drag
@@ -63,6 +64,17 @@ def test_the_last_window_is_the_last() -> None:
         and found.wanted == 3
         and found.tolerance.needed.packings > 1
     )
+
+
+def test_each_of_several_packings_may_be_further_off_than_their_mean() -> None:
+    values = [15.0, 16.5, 13.5]
+    alone = judge(values, 0.08)
+    of_four = judged(SOFT, windows(values), replace(asked(0.08), packings=4), RECORD)
+    assert not alone.tolerance.reached and of_four.tolerance.reached
+    assert alone.values == of_four.values
+    assert (of_four.tolerance.tolerance, of_four.tolerance.packings) == (0.08, 4)
+    said = Extrapolated(tolerance=of_four.tolerance).said
+    assert "to within 16 % in this packing, which makes 8 % for the mean over 4 packings" in said
 
 
 @pytest.mark.parametrize(("lengths", "whole"), [(0.5, True), (99.0, False)])
