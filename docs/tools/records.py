@@ -19,6 +19,7 @@ from typing import Any, TypedDict
 
 import pandas as pd
 from pydantic import JsonValue
+from ways import ways_table
 
 from dragdeck.project import Project
 from dragdeck.study.base import Json
@@ -51,6 +52,8 @@ RECORDS = {
 @cache
 def record_table(name: str) -> pd.DataFrame:
     """A record, or a part of one, as a table; KeyError if there is none."""
+    if name == "ways":
+        return ways_table(Project(ROOT))
     if name.startswith("study/"):
         study = Project(ROOT).cases(name.removeprefix("study/"))[0].study
         return pd.DataFrame(_rows(study.model_dump(mode="json")))

@@ -274,6 +274,27 @@ def _draw_windows() -> Figure:
 _CI = ("ci95_low", "ci95_high")
 
 
+def _draw_ways() -> Figure:
+    """Half-width to be expected against CPU time, of the ways to drag and to contacts."""
+    figure, panels = _panels(7.6, 3.2, 2, sharey=True)
+    table = record_table("ways")
+    titles = {"drag_mean": "mean drag", "workpiece_contacts": "contacts on the workpiece"}
+    for axes, (asked, title) in zip(panels, titles.items(), strict=True):
+        ways = table[table["asked"] == asked]
+        windows, others = ways[ways["windows"] > 0], ways[ways["windows"] == 0]
+        axes.plot(windows["relative_cost"], windows["half_width"], "o-", color=BLUE, ms=3,
+                  label=f"3 to {windows['windows'].max()} windows")  # fmt: skip
+        for way, marker, colour in zip(others.itertuples(), "sD", (ORANGE, GREEN), strict=True):
+            if np.isfinite(way.half_width):
+                axes.plot(way.relative_cost, way.half_width, marker, color=colour, label=way.way)
+        axes.axhline(0.1, color=GREY, lw=0.7, ls=":")
+        axes.set(xlabel="CPU time / plain run", title=title, xlim=(0, None), ylim=(0, None))
+        axes.yaxis.set_major_formatter(matplotlib.ticker.PercentFormatter(1.0, decimals=0))
+    panels[0].set_ylabel("expected half-width of the 95 % CI")
+    panels[0].legend()
+    return figure
+
+
 CHARTS = {
     name.removeprefix("_draw_"): draw
     for name, draw in list(globals().items())
