@@ -24,6 +24,7 @@ from scipy.spatial import cKDTree
 
 from dragdeck.physics.contact_mechanics import effective_modulus, rayleigh_time, wedge_ratio
 from dragdeck.physics.packing import pour
+from dragdeck.physics.walls import round_container
 from dragdeck.study.workpiece import Material
 
 CERAMIC = Material(youngs_modulus_pa=77e9, poissons_ratio=0.19, density_kg_m3=2656)
@@ -177,7 +178,9 @@ def bed(folder: Path, ratio: float, friction: float, fraction: float) -> dict[st
     large, small = LARGE_M, LARGE_M / ratio
     n_large = min(120, round(_MOST_SMALL * (1 - _SMALL_SHARE) / _SMALL_SHARE / ratio**3))
     n_small = max(1, round(n_large * ratio**3 * _SMALL_SHARE / (1 - _SMALL_SHARE)))
-    particles = pour([np.full(n_large, large), np.full(n_small, small)], _BOWL_M, seed=1)
+    particles = pour(
+        [np.full(n_large, large), np.full(n_small, small)], round_container(_BOWL_M), seed=1
+    )
     script, dt = _script(small, 1e-3, fraction, friction)
     script += _WALL.format(name="floor", where="zplane 0.0")
     script += _WALL.format(name="side", where=f"zcylinder {_BOWL_M} 0.0 0.0")

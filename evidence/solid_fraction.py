@@ -9,7 +9,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from dragdeck.cases.bed import bed_radii, bed_volume, expected_surface
@@ -51,12 +50,12 @@ def row(shape: str, case: Case, bed: Packing) -> dict[str, Any]:
         "spread": around.std(),
         "size_ratio": radii.max() / radii.min(),
         "friction": study.pairs["ceramic-ceramic"].friction,
-        "bowl_m": study.bowl.radius_m,
+        "bowl_m": study.bowl.container.clear_m,
         "particles": len(radii),
         "seed": study.seed,
         "bed_height_m": bed.bed_height_m,
         "solid_fraction": bed.solid_fraction,
-        "expected": bed_volume(study) / expected_surface(study) / np.pi / study.bowl.radius_m**2,
+        "expected": bed_volume(study) / study.bowl.container.volume_m3(expected_surface(study)),
     }
 
 

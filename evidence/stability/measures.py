@@ -232,7 +232,7 @@ def _measure_resting(point: PointRun, run: Run) -> Row:
 
 def _bed(point: PointRun, case: CaseOfRun, frame: Frame) -> Row:
     radius = frame.radii
-    bodies, normal, overlap = touching(frame.centres, radius, case.bowl.radius_m)
+    bodies, normal, overlap = touching(frame.centres, radius, case.bowl)
     partner = np.where(bodies[1] == len(radius), BOWL, PARTICLE)
     contacts = Contacts(bodies, normal, overlap, partner)
     return {
@@ -420,9 +420,8 @@ def _engine_contacts(
     frame: Frame, pairs: Frame, workpiece: WorkpieceFrames, case: CaseOfRun
 ) -> Contacts:
     """The contacts of one frame as the engine wrote them, with bowl and workpiece."""
-    bowl_radius = case.bowl.radius_m
     walls = workpiece.workpiece, workpiece.bowl
-    rows = contact_rows(frame, pairs, *walls, bowl_radius, friction_with(case, "particle"))
+    rows = contact_rows(frame, pairs, *walls, case.bowl.walls, friction_with(case, "particle"))
     ids = np.asarray(frame.columns["particle_id"], dtype=np.int64)
     a = np.searchsorted(ids, rows.a_id)
     b = np.where(rows.b_id > 0, np.searchsorted(ids, rows.b_id), len(ids))

@@ -17,6 +17,7 @@ from dragdeck.physics.contact_mechanics import (
 )
 from dragdeck.physics.rounding import timestep
 from dragdeck.physics.run_limits import RunLimits, run_limits
+from dragdeck.physics.walls import Container, round_container
 from dragdeck.records.bed import BowlOfRun, MediaOfRun
 from dragdeck.records.case import CaseOfRun
 from dragdeck.records.run import Phase
@@ -235,7 +236,7 @@ class _ColumnDeck(Deck):
 
     stack: bool
     bowl_type: int
-    bowl_radius_m: float
+    bowl: Container
     load_timestep_s: float
     load_steps: int
     test_steps: int
@@ -271,7 +272,8 @@ def column_scene(
     dt, load_dt = timestep(rayleigh, fraction), timestep(rayleigh, _LOAD_FRACTION)
     load_steps = math.ceil(_LOAD_S / load_dt)
     count = _STACK if stack else study.particle_count
-    tube = (1 + _TUBE_CLEARANCE) * radius if stack else study.bowl.radius_m
+    tube = (1 + _TUBE_CLEARANCE) * radius
+    bowl = round_container(tube) if stack else study.bowl.container
     top = 2 * radius * (_STACK + 4) if stack else box_top(study)
     types = study.type_names()
     gravity, mass = load.load_factor * study.gravity_m_s2, particle_mass(material, radius)
@@ -288,13 +290,13 @@ def column_scene(
         timestep_s=dt,
         outputs=(
             outputs.thermo(_FRAME_STEPS, _TEST_STEPS),
-            outputs.particles(_TEST_STEPS, 0, _TEST_STEPS, False),
+            outputs.particles(_TEST_STEPS, 0, _TEST_STEPS, [wall.name for wall in bowl.walls]),
             outputs.contacts(_TEST_STEPS, 0, _TEST_STEPS),
         ),
         thermo_steps=_FRAME_STEPS,
         stack=stack,
         bowl_type=types.index(study.bowl.material) + 1,
-        bowl_radius_m=tube,
+        bowl=bowl,
         load_timestep_s=load_dt,
         load_steps=load_steps,
         test_steps=_TEST_STEPS,
@@ -314,7 +316,7 @@ def column_scene(
             radius_std_m=media.typical_std_m,
             density_kg_m3=material.density_kg_m3,
         ),
-        bowl=BowlOfRun(radius_m=tube, walls="primitive"),
+        bowl=BowlOfRun(**dict(bowl)),
         column=load,
         limits=run_limits(count, mass, gravity, top, 0.0),
     )

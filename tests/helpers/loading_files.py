@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from bowls import bowl_of_run
 from made_run import line, made_case, output, phases, stl, touching, write_documents
 from matplotlib.figure import Figure
 
@@ -33,7 +34,7 @@ def case_json(study: Mapping[str, Any] | None = None, **motion: Any) -> dict[str
     """Content of ``case.json``; `motion` changes that along a line, `study` other fields."""
     return made_case(
         "process", "made-process", study, timestep_s=STEP_S, rayleigh_time_s=2e-4,
-        contact_moduli=touching(MU, 0.01 * 2e11 / (2 * (1 - 0.3**2))), bowl={"radius_m": 0.1},
+        contact_moduli=touching(MU, 0.01 * 2e11 / (2 * (1 - 0.3**2))), bowl=bowl_of_run(0.1),
         surface_m=SURFACE, motion=line(SPEED) | motion,
         workpiece={"kind": "mesh", "radius_m": 0.01, "length_m": SIZE, "immersion_depth_m": SIZE},
         phases=phases(START, LAST), statistics={"transient_s": 0.0},

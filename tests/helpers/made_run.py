@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from bowls import bowl_of_run
 from made_study import plain_study
 from run_files import OF_EVERY_RUN
 
@@ -58,7 +59,7 @@ _FIDELITY = {"name": "draft", "youngs_modulus_scale": 0.01, "timestep_fraction":
 _BLOCKS = {
     "fidelity": _FIDELITY,
     "media": {"count": 4, "radius_mean_m": 3e-3, "radius_std_m": 0.0, "density_kg_m3": 2500.0},
-    "bowl": {"radius_m": 0.02, "walls": "primitive"},
+    "bowl": bowl_of_run(0.02),
     "workpiece": {"kind": "cylinder", "radius_m": 5e-3, "length_m": 0.06, "mesh": "workpiece.stl",
                   "immersion_depth_m": 0.02},
 }  # fmt: skip

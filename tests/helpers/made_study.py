@@ -14,7 +14,7 @@ Made = Callable[..., Case]
 
 
 def put(data: dict[str, Any], changes: Mapping[str, Any]) -> None:
-    """Set fields by their dotted names; a whole block keeps what it is not given."""
+    """Set fields by their dotted names; a block of the same kind keeps what it is not given."""
     for name, value in changes.items():
         *above, last = name.split(".")
         block = data
@@ -22,6 +22,7 @@ def put(data: dict[str, Any], changes: Mapping[str, Any]) -> None:
             block = block.setdefault(part, {})
         old = block.get(last)
         merged = not above and isinstance(old, dict) and isinstance(value, Mapping)
+        merged = merged and value.get("kind") == old.get("kind")
         block[last] = {**old, **value} if merged else value
 
 

@@ -64,7 +64,7 @@ class PlainRun:
         self.outputs = json.loads((self.folder / "columns.json").read_text())["outputs"]
         motion = self.case["motion"]
         assert (motion["kind"], motion["orientation"]) == ("circle", "follow_path")
-        assert self.case["bowl"]["walls"] == "primitive" and not self.case.get("superposed")
+        assert not self.case["bowl"].get("meshed") and not self.case.get("superposed")
         self.dt = self.case["timestep_s"]
         drag = next(phase for phase in self.case["phases"] if phase["name"] == "drag")
         self.start, self.end = drag["start_step"], drag["end_step"]

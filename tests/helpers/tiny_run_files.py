@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from bowls import bowl_of_run
 from made_run import Raw, line, made_case, phases, touching, write_documents
 
 from dragdeck.decks import outputs
@@ -30,7 +31,7 @@ OUTPUTS = {
         *(outputs.thermo(20, LAST), outputs.workpiece_force(2, LAST, "workpiece")),
         *(outputs.workpiece_particles(10, 0, LAST), outputs.contacts(20, 0, LAST)),
         outputs.workpiece_contacts(10, 0, LAST, several=False),
-        outputs.particles(20, 0, LAST, bowl_facets=False),
+        outputs.particles(20, 0, LAST, ("floor", "side")),
     )
 }
 COLUMNS = {name: [column.name for column in output.columns] for name, output in OUTPUTS.items()}
@@ -106,7 +107,7 @@ def case_json(**values: Any) -> dict[str, Any]:
         "study_name": "tiny", "case": "tiny", "timestep_s": TIMESTEP_S, "surface_m": SURFACE_M,
         "upstream": {"filling": "filling-00000000", "drop_test": "drop-00000000"},
         "fidelity": {"ranks": 2}, "media": {"radius_mean_m": RADIUS_M},
-        "contact_moduli": touching(FRICTION), "bowl": {"radius_m": BOWL_RADIUS_M},
+        "contact_moduli": touching(FRICTION), "bowl": bowl_of_run(BOWL_RADIUS_M),
         "workpiece": {"immersion_depth_m": 0.03},
         "motion": line(SPEED_M_S), "phases": phases(DRAG_START, LAST),
         "statistics": {"transient_s": 0.02},

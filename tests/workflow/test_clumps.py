@@ -129,7 +129,7 @@ def test_a_clump_of_one_sphere_is_the_sphere(fill: Fill) -> None:
     filled.run(text)
     clump = [one.take(one.ids("particle_id") == 1) for one in filled.frames() if one.rows]
     start = clump[0]
-    side = filled.scene.deck.bowl_radius_m * 2  # type: ignore[attr-defined]
+    side = filled.scene.deck.bowl.reach_m * 2  # type: ignore[attr-defined]
     vectors = [tuple(start.vectors(*names)[0].tolist()) for names in (CENTRE, VELOCITY, SPIN)]
     types = len(filled.scene.deck.materials.names)
     sphere = Body(1, 3e-3, 2656.0, *vectors)

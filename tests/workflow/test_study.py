@@ -155,8 +155,8 @@ def unbalanced(folder: Path, friction: float) -> np.ndarray:
             continue
         particles = particles.take(np.argsort(particles.ids("particle_id")))
         touching = beside[contacts.step].join()
-        limit = FrictionLimit(friction, wall=False)
-        rows = contact_rows(particles, contacts, touching.workpiece, touching.bowl, 0.025, limit)
+        limit, walls = FrictionLimit(friction, wall=False), run.case.bowl.walls
+        rows = contact_rows(particles, contacts, touching.workpiece, touching.bowl, walls, limit)
         weight = 2656 * 4 / 3 * np.pi * particles.columns["radius_m"] ** 3 * 9.81
         force = np.column_stack([0 * weight, 0 * weight, -weight]) - moving[contacts.step]
         between = rows.b_id > 0

@@ -16,8 +16,6 @@ import {
 import { COLOURS, STEEL, rgb } from "./colours.js";
 import { facetMaterial } from "./shading.js";
 
-const PARTS = 96;
-const UP = new Vector3(0, 0, 1);
 
 /** A geometry of this colour. */
 export function tinted(geometry, colour) {
@@ -113,16 +111,21 @@ function arrow(radius) {
 
 /** The lines of bowl, surface and path. */
 export function outline({ bowl, surface, workpieces }) {
-  const at = (turn, height) => new Vector3(bowl.radius, 0, height).applyAxisAngle(UP, 2 * Math.PI * turn),
-    circle = (height) => Array.from({ length: PARTS + 1 }, (_, k) => at(k / PARTS, height)),
+  const at = (outline, height) => outline.map(([x, y]) => new Vector3(x, y, height)),
     line = (points, color, Kind = Line) =>
       new Kind(new BufferGeometry().setFromPoints(points), new LineBasicMaterial({ color }));
-  const edges = [0, 0.25, 0.5, 0.75].flatMap((turn) => [at(turn, 0), at(turn, bowl.height)]);
+  const upright = (outline) =>
+    [0, 0.25, 0.5, 0.75].map((turn) => outline[Math.round(turn * (outline.length - 1))]).flatMap((point) => [
+      ...at([point], 0),
+      ...at([point], bowl.height),
+    ]);
   const lines = [
-    line(circle(0), COLOURS.bowl),
-    line(circle(surface), STEEL),
-    line(circle(bowl.height), COLOURS.bowl),
-    line(edges, COLOURS.bowl, LineSegments),
+    ...bowl.outlines.flatMap((outline) => [
+      line(at(outline, 0), COLOURS.bowl),
+      line(at(outline, surface), STEEL),
+      line(at(outline, bowl.height), COLOURS.bowl),
+      line(upright(outline), COLOURS.bowl, LineSegments),
+    ]),
     ...workpieces.map(({ poses }) =>
       line(
         poses.map(([x, y]) => new Vector3(x, y, surface)),

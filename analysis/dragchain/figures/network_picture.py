@@ -131,7 +131,7 @@ def window(case: CaseOfRun, scene: NetworkScene, view: View) -> Window:
     Only contacts whose point lies in the surroundings are then drawn: `WINDOW_DIAMETERS` to
     either side of the workpiece and, seen from the side, `DEPTH_DIAMETERS` before and behind it.
     """
-    bowl_m = case.bowl.radius_m + _MARGIN_M
+    bowl_m = np.array(case.bowl.half_widths_m) + _MARGIN_M
     floor = (-_MARGIN_M, 1.25 * needed(case.surface_m, "surface_m"))
     diameter, whole = 2.0 * case.media.radius_mean_m, _shows_all(case)
     middle = np.zeros(2) if whole else scene.workpiece_m[:2]
@@ -149,7 +149,7 @@ def window(case: CaseOfRun, scene: NetworkScene, view: View) -> Window:
 
 def _shows_all(case: CaseOfRun) -> bool:
     """Whether pictures of a case show its whole bowl."""
-    reach = case.bowl.radius_m + _MARGIN_M
+    reach = max(case.bowl.half_widths_m) + _MARGIN_M
     return reach <= WINDOW_DIAMETERS * 2.0 * case.media.radius_mean_m
 
 
@@ -190,7 +190,7 @@ def render_view(
 
 
 def _camera(middle: Floats, view: View, case: CaseOfRun) -> Camera:
-    away = max(1.0, 2.0 * case.bowl.radius_m)
+    away = max(1.0, 2.0 * case.bowl.reach_m)
     x, other = middle
     if view == "xy":
         return Camera((x, other, away), (x, other, 0.0), (0.0, 1.0, 0.0))
@@ -200,16 +200,15 @@ def _camera(middle: Floats, view: View, case: CaseOfRun) -> Camera:
 def _add_bowl(plotter: Any, case: CaseOfRun, view: View) -> None:
     import pyvista as pv
 
-    radius, height = case.bowl.radius_m, 1.2 * needed(case.surface_m, "surface_m")
-    wall = pv.Cylinder(
-        center=(0, 0, height / 2), direction=(0, 0, 1), radius=radius, height=height,
-        resolution=120, capping=False,
-    )  # fmt: skip
-    floor = pv.Disc(inner=0.0, outer=radius, c_res=120)
-    ring = pv.Disc(inner=radius, outer=radius + 0.0006, c_res=120)
-    plotter.add_mesh(wall, color="#7a8694", opacity=0.04)
+    height = 1.2 * needed(case.surface_m, "surface_m")
+    lines = [np.insert(outline, 2, 0.0, axis=1) for outline in case.bowl.outlines()]
+    walls = [pv.MultipleLines(line).extrude((0, 0, height), capping=False) for line in lines]
+    floor = pv.PolyData(lines[0][:-1]).delaunay_2d()
+    for wall in walls:
+        plotter.add_mesh(wall, color="#7a8694", opacity=0.04)
     plotter.add_mesh(floor, color="#7a8694", opacity=0.06 if view == "xy" else 0.5)
-    plotter.add_mesh(ring, color="#4a5561")
+    for line in lines:
+        plotter.add_mesh(pv.MultipleLines(line).tube(radius=0.0003), color="#4a5561")
 
 
 def _add_contacts(

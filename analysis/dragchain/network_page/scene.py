@@ -250,7 +250,11 @@ def page_scene(run: Run) -> PageScene:
         "scales": _scales(shown, case),
         "paths": _dominant_paths(run, series.steps),
         "bodies": {BODIES + body: name for body, name in KINDS.items() if body != PARTICLE},
-        "bowl": {"radius": 1e3 * bowl.radius_m, "height": 1.2 * surface},
+        "bowl": {
+            "radius": 1e3 * bowl.reach_m,
+            "height": 1.2 * surface,
+            "outlines": [(1e3 * outline).round(3).tolist() for outline in bowl.outlines()],
+        },
         "surface": surface,
         "media": {
             "radius": 1e3 * case.media.radius_mean_m,

@@ -161,7 +161,7 @@ def _class(one: ClassOfRun, case: CaseOfRun, findings: Sequence[ProcessFindings]
 
 def _bowl(case: CaseOfRun, filling: FillingFindings | None) -> Iterator[str]:
     study = study_of(case)
-    yield f"{study.bowl.material} cylinder, radius {_mm(study.bowl.radius_m)}"
+    yield f"{study.bowl.material} {study.bowl.words(_mm)}"
     if filling is not None and "bed_height_m" in filling.bed:
         fraction = filling.bed.get("solid_fraction")
         solid = f", solid fraction {number(fraction)}" if fraction is not None else ""

@@ -60,7 +60,8 @@ class RunOfScaling:
         if not isinstance(path, CirclePath):
             return None
         bowl, workpiece = needed(self.case.bowl, "bowl"), needed(self.case.workpiece, "workpiece")
-        gap = bowl.radius_m - path.radius_m - workpiece.radius_m
+        side = float(bowl.side_distance(np.array([path.start_point]))[0])
+        gap = side - workpiece.radius_m
         return gap / (2.0 * self.case.media.radius_mean_m)
 
     @property

@@ -7,6 +7,7 @@ from dragchain.arrays import Floats
 from dragchain.errors import TableError
 from dragchain.run.kinematics import needed
 from dragdeck.dumps.frame import Frame
+from dragdeck.physics.walls import Container
 from dragdeck.records.case import CaseOfRun
 from dragdeck.records.packing import Packing
 
@@ -33,9 +34,9 @@ def describe_bed(particles: Frame, case: CaseOfRun, spheres: Frame | None = None
             f"step {particles.step}: the last frame of particles is empty, so there is no packing"
         )
     radius = particles.radii
-    bowl_radius = needed(case.bowl, "bowl").radius_m
+    bowl = needed(case.bowl, "bowl")
     surface = spheres or particles
-    height = probed_height(surface.centres, surface.radii, bowl_radius, float(radius.mean()))
+    height = probed_height(surface.centres, surface.radii, bowl, float(radius.mean()))
     volume = 4.0 / 3.0 * np.pi * radius**3
     density: Floats | float = case.media.density_kg_m3
     if case.classes:
@@ -47,7 +48,7 @@ def describe_bed(particles: Frame, case: CaseOfRun, spheres: Frame | None = None
     return Packing(
         bed_height_m=height,
         top_m=float((surface.columns["z_m"] + surface.columns["radius_m"]).max()),
-        solid_fraction=float(volume.sum() / (np.pi * bowl_radius**2 * height)),
+        solid_fraction=float(volume.sum() / bowl.volume_m3(height)),
         n_particles=particles.rows,
         radius_mean_m=float(radius.mean()),
         radius_std_m=float(radius.std()),
@@ -79,12 +80,12 @@ def segregation(particles: pd.DataFrame) -> dict[str, float]:
 
 
 def probed_height(
-    centre_m: Floats, radius_m: Floats, bowl_radius_m: float, mean_m: float | None = None
+    centre_m: Floats, radius_m: Floats, bowl: Container, mean_m: float | None = None
 ) -> float:
     """Mean height at which a thin vertical probe meets the bed.
 
     The probe comes down at the points of a square grid, one mean particle diameter
-    d apart and centred on the bowl's axis, that lie within R - d/2 of it. It
+    d apart and centred on the bowl's axis, at least d/2 from its upright walls. It
     stops on the highest particle above or below which the point lies: at
     ``z + sqrt(r^2 - s^2)``, s being its horizontal distance from the particle's
     centre, or on the floor if there is none.
@@ -95,8 +96,7 @@ def probed_height(
         Centres, m, from the bowl's axis and floor.
     radius_m : (N,) ndarray
         Radii, m.
-    bowl_radius_m : float
-        Inner radius R of the bowl, m.
+    bowl : Container
     mean_m : float, optional
         Half of d; by default the mean of the radii.
 
@@ -113,28 +113,30 @@ def probed_height(
     if not radius_m.size:
         return 0.0
     pitch = 2.0 * (float(radius_m.mean()) if mean_m is None else mean_m)
-    reach = bowl_radius_m - 0.5 * pitch
-    if reach < 0.0:
-        raise TableError(
-            f"a particle of {pitch:g} m does not fit into a bowl of {bowl_radius_m:g} m"
-        )
-    half = int(reach / pitch)
-    heights = _probe_heights(centre_m, radius_m, pitch, half)
-    index = np.arange(-half, half + 1)
-    inside = pitch * np.hypot(index[:, None], index[None, :]) <= reach
-    return float(heights[inside].mean())
+    x, y = (
+        np.arange(-half, half + 1)
+        for half in (max(0, int((width - 0.5 * pitch) / pitch)) for width in bowl.half_widths_m)
+    )
+    points: Floats = pitch * np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+    inside = bowl.side_distance(points) >= 0.5 * pitch
+    if not inside.any():
+        raise TableError(f"a particle of {pitch:g} m does not fit between the walls of the bowl")
+    heights = _probe_heights(centre_m, radius_m, pitch, (len(x) // 2, len(y) // 2))
+    return float(heights.ravel()[inside].mean())
 
 
-def _probe_heights(centre_m: Floats, radius_m: Floats, pitch: float, half: int) -> Floats:
-    """Heights at the points ``pitch * (i, j)``, i and j from -half to half, shape (M, M)."""
-    heights = np.zeros((2 * half + 1, 2 * half + 1))
+def _probe_heights(
+    centre_m: Floats, radius_m: Floats, pitch: float, half: tuple[int, int]
+) -> Floats:
+    """Heights at the points ``pitch * (i, j)``, i and j from -half to half of each."""
+    heights = np.zeros((2 * half[0] + 1, 2 * half[1] + 1))
     nearest = np.rint(centre_m[:, :2] / pitch).astype(np.int64)
     span = int(np.ceil(radius_m.max() / pitch))
     shifts = range(-span, span + 1)
     for shift in ((i, j) for i in shifts for j in shifts):
         point = nearest + np.array(shift)
         rest = radius_m**2 - ((pitch * point - centre_m[:, :2]) ** 2).sum(axis=1)
-        hit = (rest >= 0.0) & (np.abs(point) <= half).all(axis=1)
+        hit = (rest >= 0.0) & (np.abs(point) <= np.array(half)).all(axis=1)
         top = centre_m[hit, 2] + np.sqrt(rest[hit])
-        np.maximum.at(heights, tuple(point[hit].T + half), top)
+        np.maximum.at(heights, tuple((point[hit] + np.array(half)).T), top)
     return heights

@@ -1,5 +1,6 @@
 """All contacts of a network frame in one form: point, force on body a, normal part."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,10 +8,11 @@ from numpy.typing import NDArray
 
 from dragchain.arrays import Floats, Ints, places
 from dragchain.errors import TableError
-from dragchain.tables.columns import CENTRE, FLOOR_FORCES, FORCES, SIDE_FORCES
+from dragchain.tables.columns import CENTRE, FORCES, vector
 from dragchain.tables.workpiece_contacts import WallContacts, tangential_force
 from dragdeck.dumps.frame import Frame
 from dragdeck.physics.coulomb import within_friction
+from dragdeck.physics.walls import Wall
 from dragdeck.study.contact_law import FrictionLimit
 
 KINDS = ("particle-particle", "particle-workpiece", "particle-floor", "particle-side")
@@ -76,7 +78,7 @@ def contact_rows(
     contacts: Frame,
     workpiece: WallContacts,
     bowl: WallContacts,
-    bowl_radius_m: float,
+    walls: Sequence[Wall],
     friction: FrictionLimit,
 ) -> ContactRows:
     """Bring the contacts of one step into one form.
@@ -90,8 +92,8 @@ def contact_rows(
         ``particles`` and ``contacts`` of one step.
     workpiece, bowl : WallContacts
         Contacts on the workpiece and on a meshed bowl at the same step.
-    bowl_radius_m : float
-        Inner radius of the bowl, about the z axis.
+    walls : sequence of Wall
+        Those of a bowl without a mesh.
     friction : FrictionLimit
         Of contacts between particles, to which their forces are cut.
 
@@ -128,10 +130,10 @@ def contact_rows(
         _mesh(workpiece.select(~workpiece.silent), "particle-workpiece"),
         *_meshed_bowl(bowl.select(~bowl.silent), float(known.radii.min(initial=np.inf))),
     ]
-    if FLOOR_FORCES[0] in particles.columns:
-        groups.append(_floor(known, particles.vectors(*FLOOR_FORCES)))
-    if SIDE_FORCES[0] in particles.columns:
-        groups.append(_side(known, particles.vectors(*SIDE_FORCES), bowl_radius_m))
+    for wall in walls:
+        names = vector(f"{wall.name}_force", "n")
+        if names[0] in particles.columns:
+            groups.append(_wall(known, particles.vectors(*names), wall))
     return _joined(groups)
 
 
@@ -155,36 +157,16 @@ def _particle_particle(
     return _rows("particle-particle", first, second, point, force, -away, overlap)
 
 
-def _floor(particles: _Particles, force_n: Floats) -> ContactRows:
-    touching = (force_n != 0.0).any(axis=1)
-    normal = np.tile([0.0, 0.0, 1.0], (int(touching.sum()), 1))
-    overlap = particles.radii[touching] - particles.centres[touching, 2]
-    return _wall("particle-floor", particles, touching, force_n[touching], normal, overlap)
-
-
-def _side(particles: _Particles, force_n: Floats, bowl_radius_m: float) -> ContactRows:
-    touching = (force_n != 0.0).any(axis=1)
-    across = particles.centres[touching, :2]
-    distance = np.linalg.norm(across, axis=1)
-    normal = np.column_stack([-across / distance[:, None], np.zeros(len(across))])
-    overlap = particles.radii[touching] - (bowl_radius_m - distance)
-    return _wall("particle-side", particles, touching, force_n[touching], normal, overlap)
-
-
-def _wall(
-    kind: str,
-    particles: _Particles,
-    touching: NDArray[np.bool_],
-    force_n: Floats,
-    normal: Floats,
-    overlap_m: Floats,
-) -> ContactRows:
+def _wall(particles: _Particles, force_n: Floats, wall: Wall) -> ContactRows:
     """Contact point where the engine has friction act: R - overlap / 2 from the centre."""
-    ids = particles.ids[touching]
-    reach = particles.radii[touching] - 0.5 * overlap_m
-    point = particles.centres[touching] - reach[:, None] * normal
+    kind = "particle-side" if wall.upright or wall.inwards < 0 else "particle-floor"
+    touching = (force_n != 0.0).any(axis=1)
+    centre, radius = particles.centres[touching], particles.radii[touching]
+    distance, normal = wall.contacts(centre)
+    overlap, ids = radius - distance, particles.ids[touching]
+    point = centre - (radius - 0.5 * overlap)[:, None] * normal
     others = np.full(len(ids), BODY[kind])
-    return _rows(kind, ids, others, point, force_n, normal, overlap_m)
+    return _rows(kind, ids, others, point, force_n[touching], normal, overlap)
 
 
 def _mesh(wall: WallContacts, kind: str) -> ContactRows:

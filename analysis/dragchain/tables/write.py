@@ -189,7 +189,7 @@ class WorkpieceSamples:
 
 
 def _write_workpiece_contacts(run: Run, file: Path) -> None:
-    shared, bodies = run.case.bowl.walls == "mesh", Bodies(run.case)
+    shared, bodies = run.case.bowl.meshed, Bodies(run.case)
     closure = Closure(limit=SHARED_LIMIT if shared else LIMIT)
     samples = WorkpieceSamples(run.prints("workpiece_force"))
     with ExitStack() as stack:
@@ -303,7 +303,6 @@ def _write_particles(run: Run, file: Path) -> None:
 
 
 def _write_contacts(run: Run, file: Path) -> None:
-    bowl_radius = run.case.bowl.radius_m
     particles, pairs = run.frames("particles"), run.workpiece_pairs()
     friction, bodies = friction_with(run.case, "particle"), Bodies(run.case)
     with table_writer(file, _with_classes(CONTACTS, "contacts", run.case)) as table:
@@ -311,7 +310,7 @@ def _write_contacts(run: Run, file: Path) -> None:
             workpiece = _frame_at(pairs, frame.step, "workpiece_contacts").join()
             beside = _frame_at(particles, frame.step, "particles")
             touching = workpiece.workpiece, workpiece.bowl
-            rows = contact_rows(beside, frame, *touching, bowl_radius, friction)
+            rows = contact_rows(beside, frame, *touching, run.case.bowl.walls, friction)
             rows = bodies.network(rows) if bodies else rows
             table.write(_contact_columns(frame.step, rows, run.case))
 

@@ -10,17 +10,18 @@ from made_frames import frame
 
 from dragchain import TableError, load_case
 from dragchain.tables.bed import describe_bed, probed_height, segregation
+from dragdeck.physics.walls import round_container
 
 NAMES = ("x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s", "radius_m")
 
 
 def test_a_bed_of_nothing_has_no_height() -> None:
-    assert probed_height(np.empty((0, 3)), np.empty(0), 0.04) == 0.0
+    assert probed_height(np.empty((0, 3)), np.empty(0), round_container(0.04)) == 0.0
 
 
 def test_where_no_particle_lies_the_probe_meets_the_floor() -> None:
     """Bowl of radius 1.5, pitch 1: probes on the axis and at distance 1, 5 in all."""
-    height = probed_height(np.array([[0, 0, 0.5]]), np.array([0.5]), 1.5)
+    height = probed_height(np.array([[0, 0, 0.5]]), np.array([0.5]), round_container(1.5))
     assert height == pytest.approx(1.0 / 5)
 
 
@@ -38,12 +39,14 @@ def test_it_is_what_a_plain_search_finds(particles) -> None:
         rest = table[:, 3] ** 2 - ((table[:, :2] - spot) ** 2).sum(axis=1)
         hits = [z + np.sqrt(r) for z, r in zip(table[:, 2], rest, strict=True) if r >= 0]
         tops.append(max(hits, default=0.0))
-    assert probed_height(table[:, :3], table[:, 3], 1.2) == pytest.approx(np.mean(tops), rel=1e-6)
+    assert probed_height(table[:, :3], table[:, 3], round_container(1.2)) == pytest.approx(
+        np.mean(tops), rel=1e-6
+    )
 
 
 def test_a_bowl_narrower_than_a_particle_is_an_error() -> None:
     with pytest.raises(TableError, match="does not fit"):
-        probed_height(np.array([[0, 0, 0.5]]), np.array([0.5]), 0.4)
+        probed_height(np.array([[0, 0, 0.5]]), np.array([0.5]), round_container(0.4))
 
 
 def test_describes_a_bed_of_one_particle_by_hand(tiny_run: Path) -> None:

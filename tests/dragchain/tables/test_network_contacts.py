@@ -4,6 +4,7 @@ from made_frames import frame, wall
 
 from dragchain.errors import TableError
 from dragchain.tables.network_contacts import KINDS, contact_rows
+from dragdeck.physics.walls import round_container
 from dragdeck.study.contact_law import FrictionLimit
 
 PARTICLES = (
@@ -20,7 +21,7 @@ def rows_of(particles, contacts=(), workpiece=None, bowl=None, radius=10.0, fric
         frame(CONTACTS, contacts),
         workpiece or wall(),
         bowl or wall(),
-        radius,
+        round_container(radius).walls,
         FrictionLimit(friction, wall=False),
     )
 
@@ -135,7 +136,7 @@ def test_a_contact_of_an_unknown_particle_is_an_error(particles) -> None:
 
 def test_frames_of_different_steps_are_an_error() -> None:
     with pytest.raises(TableError, match="contacts is 9, but that of particles is 100"):
-        contact_rows(frame(PARTICLES, []), frame(CONTACTS, [], step=9), wall(), wall(), 10.0, 0.3)
+        contact_rows(frame(PARTICLES, []), frame(CONTACTS, [], step=9), wall(), wall(), (), 0.3)
 
 
 def test_a_particle_that_is_there_twice_is_refused() -> None:

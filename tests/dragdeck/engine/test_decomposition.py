@@ -16,6 +16,7 @@ from dragdeck.engine.log import decomposition
 from dragdeck.errors import InputError
 from dragdeck.outlook.process import bed_notes
 from dragdeck.physics.domain_split import FilledBowl, rank_warnings, split
+from dragdeck.physics.walls import round_container
 from dragdeck.project import Project
 from dragdeck.records.run import Decomposition, ParticlesPerRank
 from dragdeck.scenes.filling import filling_scene
@@ -25,12 +26,12 @@ from dragdeck.sweep.cases import load_cases
 WriteStudy = Callable[..., Path]
 
 BOWL = FilledBowl(
-    particles=1000, radius_m=0.3, height_m=0.09, half_width_m=0.31, bottom_m=0.0, top_m=0.35,
-    reach_m=0.008,
+    particles=1000, bowl=round_container(0.3), height_m=0.09, half_widths_m=(0.31, 0.31),
+    bottom_m=0.0, top_m=0.35, reach_m=0.008,
 )  # fmt: skip
 COLUMN = FilledBowl(
-    particles=1000, radius_m=0.02, height_m=0.5, half_width_m=0.02, bottom_m=0.0, top_m=0.5,
-    reach_m=0.008,
+    particles=1000, bowl=round_container(0.02), height_m=0.5, half_widths_m=(0.02, 0.02),
+    bottom_m=0.0, top_m=0.5, reach_m=0.008,
 )  # fmt: skip
 
 
@@ -80,13 +81,13 @@ def test_room_above_the_bed_speaks_against_a_split_along_the_height() -> None:
 
 
 def test_a_rank_without_particles_gets_a_warning() -> None:
-    roomy = FilledBowl(**{**vars(BOWL), "half_width_m": 0.9})
+    roomy = FilledBowl(**{**vars(BOWL), "half_widths_m": (0.9, 0.9)})
     (caution,) = rank_warnings(split(36, roomy))
     assert "ranks would have no particle" in caution.text and "fidelity.ranks" in caution.text
 
 
 def test_an_uneven_split_gets_a_warning() -> None:
-    roomy = FilledBowl(**{**vars(BOWL), "half_width_m": 0.38})
+    roomy = FilledBowl(**{**vars(BOWL), "half_widths_m": (0.38, 0.38)})
     found = split(6, roomy)
     assert found.idle == 0
     (caution,) = rank_warnings(found)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from bowls import bowl_of_run
 from made_run import Raw
 from made_scenes import rendered
 from made_study import Made
@@ -21,7 +22,7 @@ from dragdeck.project import Project
 from dragdeck.records.run import AcceptanceCheck, CaseFile, RunPart, RunRecord
 from dragdeck.scenes.process import PROCESS
 
-OUTPUT = particles(10, 10, 40, bowl_facets=True)
+OUTPUT = particles(10, 10, 40, walls=())
 RADIUS = 3e-3
 
 
@@ -52,7 +53,7 @@ def checked(
         "media": {
             "count": 2, "radius_mean_m": RADIUS, "radius_std_m": 0.0, "density_kg_m3": 2500.0
         },
-        "bowl": {"radius_m": 0.05, "walls": "primitive"}, "assumptions": [],
+        "bowl": bowl_of_run(0.05), "assumptions": [],
         "contact_moduli": {"particle": law, "bowl": law}, **changes,
     }  # fmt: skip
     (folder / "case.json").write_text(json.dumps(case))

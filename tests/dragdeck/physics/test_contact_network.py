@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from dragdeck.physics.contact_mechanics import ContactConstants, stability_number
+from dragdeck.physics.walls import round_container
 
-RADIUS, DENSITY, BOWL, OVERLAP = 3e-3, 2500.0, 0.05, 1e-5
+RADIUS, DENSITY, BOWL, OVERLAP = 3e-3, 2500.0, round_container(0.05), 1e-5
 MASS = 4 / 3 * math.pi * RADIUS**3 * DENSITY
 STEP = 1e-5
 ELASTIC = ContactConstants(modulus_pa=4e7, shear_pa=1e7, restitution=1.0, friction=0.3)
@@ -15,7 +16,7 @@ SMOOTH = ContactConstants(modulus_pa=4e7, shear_pa=1e7, restitution=1.0, frictio
 DAMPED = ContactConstants(modulus_pa=4e7, shear_pa=1e7, restitution=0.3, friction=0.0)
 
 ON_FLOOR = [[0.0, 0.0, RADIUS - OVERLAP]]
-AT_SIDE = [[0.0, BOWL - RADIUS + OVERLAP, 0.1]]
+AT_SIDE = [[0.0, 0.05 - RADIUS + OVERLAP, 0.1]]
 PAIR = [[0.0, 0.0, 0.1], [0.0, 1.2 * (RADIUS - OVERLAP / 2), 0.1 + 1.6 * (RADIUS - OVERLAP / 2)]]
 
 

@@ -8,6 +8,7 @@ from scipy.spatial import cKDTree
 
 from dragdeck.errors import InputError
 from dragdeck.physics.packing import pour
+from dragdeck.physics.walls import round_container
 from dragdeck.study.media import quantiles
 
 
@@ -38,9 +39,9 @@ def test_no_particle_touches_another_or_the_bowl(
     sizes = quantiles("normal", mean, spread * mean, count)
     if bowl < (1 + 0.2 * 2**0.5) * sizes.max():
         with pytest.raises(InputError, match="does not fit"):
-            pour([sizes], bowl, seed)
+            pour([sizes], round_container(bowl), seed)
         return
-    particles = pour([sizes], bowl, seed)
+    particles = pour([sizes], round_container(bowl), seed)
     assert sorted(particles.radii_m) == sorted(sizes)
     x, y, z = particles.positions_m.T
     assert (np.hypot(x, y) + particles.radii_m).max() < bowl
@@ -53,6 +54,6 @@ def test_no_particle_touches_another_or_the_bowl(
 
 def test_the_seed_decides() -> None:
     sizes = quantiles("normal", 3e-3, 2e-4, 50)
-    first, again, other = (pour([sizes], 0.03, seed) for seed in (1, 1, 2))
+    first, again, other = (pour([sizes], round_container(0.03), seed) for seed in (1, 1, 2))
     assert np.array_equal(first.positions_m, again.positions_m)
     assert not np.array_equal(first.positions_m, other.positions_m)

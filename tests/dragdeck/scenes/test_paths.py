@@ -34,7 +34,7 @@ def test_the_bowl_rotates_and_the_workpiece_does_not_move(moved: Made, project: 
     assert made["motion"]["bowl_rad_s"] == rate
     assert made["motion"]["start_direction_rad"] == pytest.approx(math.pi / 2)
     assert made["motion"]["axis_speed_m_s"] == pytest.approx(-0.01 * rate)
-    assert made["bowl"]["walls"] == "mesh"
+    assert made["bowl"]["meshed"]
     assert drag.start_step < made["steady"]["from_step"] < drag.end_step
 
 

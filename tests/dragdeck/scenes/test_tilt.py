@@ -8,13 +8,14 @@ import pytest
 from made_scenes import BED
 from made_study import Made
 
+from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
 from dragdeck.scenes.motion import course
 from dragdeck.scenes.process import PROCESS, process_scene
 from dragdeck.scenes.workpiece import (
+    clearances,
     describe,
     dip,
-    farthest_surface,
     reference_height,
     workpiece_length,
     workpiece_mesh,
@@ -59,17 +60,20 @@ def test_the_gap_is_that_of_what_is_in_the_bed(moved: Made) -> None:
     assert thickness[0] == pytest.approx(thickness[1])
 
 
+def outermost(case: Case) -> float:
+    """Largest distance of the workpiece from the bowl's axis, m."""
+    return case.study.bowl.container.reach_m - clearances(case, 1.0).wall_m
+
+
 def test_a_workpiece_that_follows_a_circle_leans_along_it(moved: Made) -> None:
     """Its farthest point lies ahead of the axis, not outwards; with a fixed orientation it may."""
     case = moved(tilt_deg=20)
     depth, path = case.study.motion.immersion_depth_m, case.study.motion.path.radius_m
     radius, lean = case.study.workpiece.shape.radius_m, depth * math.tan(math.radians(20))
-    farthest = farthest_surface(case)
+    farthest = outermost(case)
     assert math.hypot(path, lean) < farthest < math.hypot(path + radius, lean + 1.1 * radius)
-    assert farthest_surface(moved(orientation="fixed")) == pytest.approx(
-        path + workpiece_reach(case)
-    )
-    upright = farthest_surface(moved(tilt_deg=None, orientation="follow_path"))
+    assert outermost(moved(orientation="fixed")) == pytest.approx(path + workpiece_reach(case))
+    upright = outermost(moved(tilt_deg=None, orientation="follow_path"))
     assert upright == pytest.approx(path + radius, rel=0.01)
     assert upright < farthest
 

@@ -10,7 +10,7 @@ import pytest
 from blades import twisted_blade
 from trimesh import Trimesh
 
-from dragdeck.cases.bed import box_half_width
+from dragdeck.cases.bed import box_half_widths
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
 from dragdeck.mesh.contacts import gap_fraction
@@ -206,7 +206,7 @@ def test_facets_that_would_leave_the_box_are_not_written(
     written = surface(corners, np.arange(len(corners)).reshape(-1, 3))
     assert 0 < len(written.faces) < len(whole.faces)
     reach = np.hypot(*written.triangles_center[:, :2].T) + 0.01
-    assert reach.max() <= box_half_width(case.study)
+    assert reach.max() <= box_half_widths(case.study)[0]
     in_bed = [(mesh.triangles[:, :, 2].min(axis=1) < 0.015).sum() for mesh in (whole, written)]
     assert in_bed[0] == in_bed[1] > 0
 

@@ -9,7 +9,6 @@ from dragdeck.errors import InputError
 from dragdeck.mesh.clump import SPHERE, Clump, fit_clump
 from dragdeck.physics.contact_mechanics import (
     ENGINE_SOFTEST_PA,
-    bed_height,
     bed_pressure,
     effective_modulus,
     hertz_contact_time,
@@ -184,7 +183,7 @@ def expected_surface(study: Study) -> float:
     levels = [part.radii(LEVELS) for part in parts]
     numbers = np.repeat([len(class_.radii_m) for class_ in classes], LEVELS)
     solid = study.media.solid_fraction(np.concatenate(levels), numbers)
-    return bed_height(bed_volume(study), study.bowl.radius_m, solid)
+    return study.bowl.container.height_m(bed_volume(study) / solid)
 
 
 def submerged_fraction(study: Study, depth_m: float | None = None) -> float:
@@ -254,9 +253,10 @@ def full_stiffness_number(study: Study) -> float:
     return stiffness_number(particle_material(study), tip_pressure(study))
 
 
-def box_half_width(study: Study) -> float:
-    """Half of the simulation box's width, from the axis of the bowl, m."""
-    return study.bowl.radius_m + 2 * study.media.typical_radius_m
+def box_half_widths(study: Study) -> tuple[float, float]:
+    """Half of the simulation box's widths along x and y, from the axis of the bowl, m."""
+    x, y = study.bowl.container.half_widths_m
+    return x + 2 * study.media.typical_radius_m, y + 2 * study.media.typical_radius_m
 
 
 def skin(study: Study) -> float:

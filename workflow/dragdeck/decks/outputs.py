@@ -4,7 +4,7 @@ A deck's dump lines and the ``columns.json`` beside it are both made from these
 definitions, so that no reader has to guess a column.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import ClassVar, Literal, Self
@@ -188,6 +188,12 @@ def _vector(name: str, unit: str, source: str, first: int = 1) -> tuple[Column, 
     )
 
 
+def _of_walls(walls: Sequence[str]) -> Iterator[Column]:
+    """The force of each wall on a particle."""
+    for wall in walls:
+        yield from _vector(f"{wall}_force", "n", f"f_force_{wall}")
+
+
 _POSITION = tuple(Column(f"{axis}_m", axis) for axis in "xyz")
 _VELOCITY = tuple(Column(f"v{axis}_m_s", f"v{axis}") for axis in "xyz")
 _SPIN = tuple(Column(f"w{axis}_rad_s", f"omega{axis}") for axis in "xyz")
@@ -313,14 +319,10 @@ def contacts(period: int, first: int, last: int) -> Output:
 
 
 def particles(
-    period: int, first: int, last: int, bowl_facets: bool, clumped: bool = False
+    period: int, first: int, last: int, walls: Sequence[str], clumped: bool = False
 ) -> Output:
-    """Every particle or sphere of a clump, with the forces of an exact bowl on it as applied."""
-    bowl = (
-        *_vector("floor_force", "n", "f_force_floor"),
-        *_vector("side_force", "n", "f_force_side"),
-    )
-    columns = (_ID, *_POSITION, *_VELOCITY, *_SPIN, _RADIUS, *(() if bowl_facets else bowl))
+    """Every particle or sphere of a clump, with the force of each wall on it as applied."""
+    columns = (_ID, *_POSITION, *_VELOCITY, *_SPIN, _RADIUS, *_of_walls(walls))
     columns += (_BODY,) if clumped else ()
     purpose = "all particles, for particles.parquet and force chains"
     return Output("particles", "custom", columns, period, first, last, True, 1.0, purpose)
@@ -332,7 +334,7 @@ def bodies(period: int, last: int, walls: Sequence[str]) -> Output:
         *(_ID, *_POSITION, *_VELOCITY, *_SPIN, _RADIUS),
         *(Column(f"force_{axis}_n", f"f{axis}") for axis in "xyz"),
         *(Column(f"torque_{axis}_n_m", f"tq{axis}") for axis in "xyz"),
-        *(column for wall in walls for column in _vector(f"{wall}_force", "n", f"f_force_{wall}")),
+        *_of_walls(walls),
     )
     purpose = "all particles with their forces, for the comparison with reference solutions"
     return Output("bodies", "custom", columns, period, 0, last, True, 1.0, purpose)

@@ -256,7 +256,7 @@ def _stability_number(case: CaseOfBed, rows: Floats) -> float:
     constants = [
         [class_.contact_moduli[body] for body in bodies] for class_ in case.classes or (case,)
     ]
-    of_case = case.density_of(ids), case.bowl.radius_m, constants, case.timestep_s
+    of_case = case.density_of(ids), case.bowl, constants, case.timestep_s
     rigid = _rigid(case, rows[:, :3], ids) if case.bodies else None
     return stability_number(rows[:, :3], rows[:, 3], *of_case, case.class_of(ids), rigid)
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dragdeck.errors import InputError
-from dragdeck.mesh.surface import Floats, surface, weld
+from dragdeck.mesh.surface import Floats, Integers, surface, weld
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
@@ -154,6 +156,67 @@ def bowl(radius_m: float, height_m: float, facet_size_m: float) -> Trimesh:
     return weld(floor + _turned(side))
 
 
+def clear_radius(radius_m: float, facet_size_m: float) -> float:
+    """Distance of the corners from the axis of a polygon whose sides touch the circle, m."""
+    return radius_m / math.cos(math.pi / polygon_sides(radius_m, facet_size_m))
+
+
+def revolved(profile_m: Sequence[tuple[float, float]], facet_size_m: float) -> Trimesh:
+    """Turn a line about the z axis, the normals pointing to its left as seen along it.
+
+    Parameters
+    ----------
+    profile_m : sequence of (float, float)
+        Radius and height of its points, m; from the axis or a column outwards for a bowl.
+    facet_size_m : float
+        The longest leg of a triangle, m.
+
+    Raises
+    ------
+    InputError
+        As `cylinder`.
+    """
+    points = [profile_m[0]]
+    for begin, end in pairwise(profile_m):
+        parts = _levels(math.dist(begin, end), facet_size_m)
+        points += np.linspace(begin, end, parts + 1)[1:].tolist()
+    widest = max(radius for radius, _ in points)
+    _require_facet_size(facet_size_m, widest, len(points) * facet_size_m)
+    sides = polygon_sides(widest, facet_size_m)
+    rings = [_ring(sides, radius, z_m=height) for radius, height in points]
+    strips = weld(surface(np.concatenate(rings), _strips(sides, len(points) - 1)))
+    degenerate = (strips.faces == np.roll(strips.faces, 1, axis=1)).any(axis=1)
+    return _turned(surface(strips.vertices, strips.faces[~degenerate]))
+
+
+def trough(size_m: tuple[float, float, float], facet_size_m: float) -> Trimesh:
+    """Make an open rectangular trough: floor in z = 0 and four sides, the normals pointing in.
+
+    Parameters
+    ----------
+    size_m : (float, float, float)
+        Length along x, width along y, and height, m.
+    facet_size_m : float
+        The longest leg of a triangle, m.
+    """
+    x, y, z = np.diag(size_m)
+    corner = -(x + y) / 2
+    faces = (corner, x, y), (corner, z, x), (corner, y, z), (corner + y, x, z), (corner + x, z, y)
+    floor, *sides = (_patch(*face, facet_size_m) for face in faces)
+    return weld(sum(sides, floor))
+
+
+def _patch(corner_m: Floats, a_m: Floats, b_m: Floats, facet_size_m: float) -> Trimesh:
+    """A rectangle from a corner along two edges, its normal along a x b."""
+    along, across = (_levels(float(np.linalg.norm(edge)), facet_size_m) for edge in (a_m, b_m))
+    u, v = np.meshgrid(np.linspace(0, 1, along + 1), np.linspace(0, 1, across + 1))
+    points = corner_m + u.reshape(-1, 1) * a_m + v.reshape(-1, 1) * b_m
+    lower = (np.arange(across)[:, None] * (along + 1) + np.arange(along)).ravel()
+    upper = lower + along + 1
+    halves = [[lower, lower + 1, upper + 1], [lower, upper + 1, upper]]
+    return surface(points, np.hstack(halves).T)
+
+
 def tube(radius_m: float, length_m: float, facet_size_m: float) -> Trimesh:
     """Make the side of an upright cylinder, from z = 0 on, its polygon outside of the circle.
 
@@ -228,11 +291,16 @@ def _side(sides: int, corner_radius_m: float, length_m: float, facet_size_m: flo
     levels = _levels(length_m, facet_size_m)
     heights = [length_m * k / levels for k in range(levels + 1)]
     points = np.concatenate([_ring(sides, corner_radius_m, z_m=z_m) for z_m in heights])
+    return surface(points, _strips(sides, levels))
+
+
+def _strips(sides: int, levels: int) -> Integers:
+    """Triangles between rings of nodes, one ring after another, (N, 3)."""
     lower = np.arange(levels * sides).reshape(levels, sides)
     beside = np.roll(lower, -1, axis=1)
     lower_half = np.stack([lower, beside, beside + sides], axis=-1)
     other = np.stack([lower, beside + sides, lower + sides], axis=-1)
-    return surface(points, np.stack([lower_half, other], axis=2))
+    return np.stack([lower_half, other], axis=2).reshape(-1, 3)
 
 
 def _turned(mesh: Trimesh) -> Trimesh:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from dragdeck.arrays import Floats, Ints
 from dragdeck.physics.estimates import COORDINATION_ESTIMATE, SOLID_FRACTION_ESTIMATE
 from dragdeck.physics.rigid import Levers, RigidBodies
+from dragdeck.physics.walls import Container
 
 Size = TypeVar("Size", float, NDArray[np.float64])
 
@@ -143,11 +144,6 @@ def wedge_ratio(friction: float, wall: bool) -> float:
     return 1 / friction**2 if wall else 1 / (math.sqrt(1 + friction**2) - 1)
 
 
-def bed_height(volume_m3: float, bowl_radius_m: float, solid_fraction: float) -> float:
-    """Height of a bed of particles of that total volume, m."""
-    return volume_m3 / (solid_fraction * math.pi * bowl_radius_m**2)
-
-
 def bed_pressure(density_kg_m3: float, gravity_m_s2: float, depth_m: float) -> float:
     """Weight of the bed above a depth, Pa, at a solid fraction of `SOLID_FRACTION_ESTIMATE`.
 
@@ -247,7 +243,7 @@ def stability_number(
     centre_m: Floats,
     radius_m: Floats,
     density_kg_m3: Floats | float,
-    bowl_radius_m: float,
+    bowl: Container,
     constants: Sequence[Sequence[ContactConstants]],
     timestep_s: float,
     classes: Ints | None = None,
@@ -270,9 +266,9 @@ def stability_number(
     Parameters
     ----------
     centre_m, radius_m : (N, 3) and (N,) ndarray
-        Of the particles, in a bowl about the z axis with its floor at z = 0.
+        Of the particles.
     density_kg_m3 : float or (N,) ndarray
-    bowl_radius_m : float
+    bowl : Container
     constants : sequence of sequence of ContactConstants
         For each class of particles, those with particles of each class and with the bowl.
     timestep_s : float
@@ -290,7 +286,7 @@ def stability_number(
     ----------
     Otsubo, O'Sullivan and Shire (2017), Computers and Geotechnics 86, 67-79.
     """
-    bodies, normal, overlap = touching(centre_m, radius_m, bowl_radius_m)
+    bodies, normal, overlap = touching(centre_m, radius_m, bowl)
     if rigid is not None:
         owner = np.append(rigid.of_sphere, len(rigid.mass_kg))
         apart = owner[bodies[0]] != owner[bodies[1]]
@@ -393,8 +389,8 @@ def largest_eigenvalue(
     return float(eigsh(operator, k=1, v0=start, tol=tolerance, return_eigenvectors=False)[0])
 
 
-def touching(centre: Floats, radius: Floats, bowl_radius: float) -> tuple[Ints, Floats, Floats]:
-    """Contacts of particles with each other, the floor and the side.
+def touching(centre: Floats, radius: Floats, bowl: Container) -> tuple[Ints, Floats, Floats]:
+    """Contacts of particles with each other and with the walls of the bowl.
 
     Returns
     -------
@@ -404,11 +400,16 @@ def touching(centre: Floats, radius: Floats, bowl_radius: float) -> tuple[Ints, 
     from scipy.spatial import KDTree
 
     first, second = KDTree(centre).query_pairs(2 * radius.max(), output_type="ndarray").T
-    everyone, bowl = np.arange(count := len(radius)), np.full(count, count)
-    bodies = np.stack([np.r_[first, everyone, everyone], np.r_[second, bowl, bowl]])
-    away = np.concatenate([centre[second] - centre[first], centre * [0, 0, -1], centre * [1, 1, 0]])
-    distance = np.linalg.norm(away, axis=1)
-    reach = np.r_[radius[first] + radius[second], radius, radius - bowl_radius]
-    overlap = reach - np.r_[distance[:-count], -distance[-count:]]
-    hit = (overlap > 0) & (distance > 0)
-    return bodies[:, hit], away[hit] / distance[hit, None], overlap[hit]
+    between = centre[second] - centre[first]
+    distance = np.linalg.norm(between, axis=1)
+    bodies, normals = [(first, second)], [between / np.maximum(distance, 1e-300)[:, None]]
+    overlaps = [np.where(distance > 0, radius[first] + radius[second] - distance, 0.0)]
+    everyone = np.arange(count := len(radius))
+    for wall in bowl.walls:
+        gap, normal = wall.contacts(centre)
+        bodies.append((everyone, np.full(count, count)))
+        normals.append(-normal)
+        overlaps.append(radius - gap)
+    overlap = np.concatenate(overlaps)
+    hit = overlap > 0
+    return np.hstack(bodies)[:, hit], np.concatenate(normals)[hit], overlap[hit]

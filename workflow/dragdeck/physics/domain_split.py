@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dragdeck.errors import Caution
+from dragdeck.physics.walls import Container
 
 _MOST_OVER_MEAN = 1.5
 """A warning is given where the fullest rank has more than this times the mean."""
@@ -25,23 +26,24 @@ _Fractions = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class FilledBowl:
-    """Particles in a round bowl within the engine's box, as far as the split goes.
+    """Particles in a bowl within the engine's box, as far as the split goes.
 
     Attributes
     ----------
     particles : int
-    radius_m, height_m : float
+    bowl : Container
+    height_m : float
         Of the space they fill, from the floor at z = 0.
-    half_width_m, bottom_m, top_m : float
-        The box: from minus to plus `half_width_m` along x and y.
+    half_widths_m, bottom_m, top_m
+        The box: along x and y from minus to plus `half_widths_m`.
     reach_m : float
         How far beyond its cell a rank looks for neighbours.
     """
 
     particles: int
-    radius_m: float
+    bowl: Container
     height_m: float
-    half_width_m: float
+    half_widths_m: tuple[float, float]
     bottom_m: float
     top_m: float
     reach_m: float
@@ -128,18 +130,17 @@ def _split(grid: Counts, filled: FilledBowl) -> Split:
 
 def _floor_fractions(grid: Counts, filled: FilledBowl, reach_m: float) -> _Fractions:
     """Share of the bowl's floor in each cell of x and y, widened by a reach."""
-    radius, half_width = filled.radius_m, filled.half_width_m
-    x_edges, y_edges = (_edges(n, -half_width, half_width) for n in grid[:2])
+    halves = zip(grid[:2], filled.half_widths_m, strict=True)
+    x_edges, y_edges = (_edges(n, -half, half) for n, half in halves)
+    radius, area = filled.bowl.half_widths_m[0], filled.bowl.levels[-1][1]
     fractions = np.empty(grid[:2])
     for i, j in product(range(grid[0]), range(grid[1])):
         x_ends = np.array([x_edges[i] - reach_m, x_edges[i + 1] + reach_m])
         first, last = np.arcsin(np.clip(x_ends / radius, -1, 1))
         angles = np.linspace(first, last, _POINTS)
-        chord = radius * np.cos(angles)  # half of it, at x = radius sin(angle)
-        low, high = (
-            np.clip(y, -chord, chord) for y in (y_edges[j] - reach_m, y_edges[j + 1] + reach_m)
-        )
-        fractions[i, j] = np.trapezoid((high - low) * chord, angles) / (np.pi * radius**2)
+        within = y_edges[j] - reach_m, y_edges[j + 1] + reach_m
+        chord = filled.bowl.chord(radius * np.sin(angles), *within)
+        fractions[i, j] = np.trapezoid(chord * radius * np.cos(angles), angles) / area
     return fractions
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from dragdeck.arrays import Floats, Ints
 from dragdeck.errors import InputError
+from dragdeck.physics.walls import Container
 
 _SPACING = 1.2
 """Lattice spacing over the largest diameter: room to jitter, and to fall."""
@@ -81,14 +82,14 @@ class Particles:
         return float(np.linalg.norm(self.velocities_m_s, axis=1).max())
 
 
-def pour(classes_m: Sequence[Floats], bowl_radius_m: float, seed: int) -> Particles:
-    """Place particles on a jittered lattice inside a cylinder, in random order.
+def pour(classes_m: Sequence[Floats], bowl: Container, seed: int) -> Particles:
+    """Place particles on a jittered lattice inside a bowl, in random order.
 
     Parameters
     ----------
     classes_m : sequence of (N,) array
         Radii of the particles of each class.
-    bowl_radius_m : float
+    bowl : Container
     seed : int
         Of the order of the radii, the jitter and the first velocities.
 
@@ -100,7 +101,7 @@ def pour(classes_m: Sequence[Floats], bowl_radius_m: float, seed: int) -> Partic
     random = np.random.default_rng(seed)
     radii = np.concatenate(classes_m)
     largest = float(radii.max())
-    sites = _sites(len(radii), bowl_radius_m, largest)
+    sites = _sites(len(radii), bowl, largest)
     jitter = (_SPACING - 1) * largest * 0.999
     velocities = random.normal(0.0, FIRST_SPEED_M_S, sites.shape)
     velocities[:, 2] = -np.abs(velocities[:, 2])  # none leaves through the top
@@ -123,14 +124,14 @@ _INSERTED_FRACTION = 0.2
 half of where random sequential addition of spheres ends, 0.38."""
 
 
-def room_to_insert(reaches_m: Floats, bowl_radius_m: float) -> float:
+def room_to_insert(reaches_m: Floats, bowl: Container) -> float:
     """Height of the space in a bowl in which clumps can be inserted at random, m.
 
     Parameters
     ----------
     reaches_m : (N,) array
         Distance of the farthest point of each from its centre.
-    bowl_radius_m : float
+    bowl : Container
 
     Raises
     ------
@@ -138,16 +139,17 @@ def room_to_insert(reaches_m: Floats, bowl_radius_m: float) -> float:
         The largest clump does not fit into the bowl.
     """
     largest = float(reaches_m.max())
-    if largest >= bowl_radius_m:
+    if largest >= bowl.clear_m:
         raise InputError(
             "the largest particle does not fit into the bowl",
             field="media.radius_mean_m",
             value=f"farthest point {largest:.6g} m from the centre of mass",
-            limit=f"less than {bowl_radius_m:g} m, the radius of the bowl",
+            limit=f"less than {bowl.clear_m:g} m, {_CLEAR}",
             remedy="use smaller or more compact particles, or a wider bowl",
         )
     volume = float((4 / 3 * reaches_m**3).sum())
-    return 2 * largest + volume / (_INSERTED_FRACTION * (bowl_radius_m - largest) ** 2)
+    radius = math.sqrt(bowl.levels[-1][1] / math.pi)  # of a circle as wide
+    return 2 * largest + volume / (_INSERTED_FRACTION * (radius - largest) ** 2)
 
 
 def primes(seed: int, count: int) -> list[int]:
@@ -161,28 +163,36 @@ def primes(seed: int, count: int) -> list[int]:
     return numbers
 
 
-def _sites(count: int, bowl_radius_m: float, largest_m: float) -> Floats:
+_CLEAR = "half the width between the walls of the bowl"
+
+
+def _sites(count: int, bowl: Container, largest_m: float) -> Floats:
     """The lowest `count` points of a square lattice in the bowl, (count, 3)."""
     step = 2 * _SPACING * largest_m
     room = largest_m * (1 + math.sqrt(2) * (_SPACING - 1))  # the jitter is along x and along y
-    reach = bowl_radius_m - room
-    if reach < 0:
-        widest = largest_m * bowl_radius_m / room
+    columns, lines = (_centred(half - room, step) for half in bowl.half_widths_m)
+    rows: list[Floats] = []
+    for y in lines:  # no more rows of the lowest layer than there are particles for
+        places = np.column_stack([columns, np.full(len(columns), y)])
+        rows.append(places[bowl.side_distance(places) >= room])
+        if sum(map(len, rows)) >= count:
+            break
+    if not sum(map(len, rows)):
+        widest = largest_m * bowl.clear_m / room
         raise InputError(
             "the largest particle does not fit into the bowl with room to fall",
             field="media.radius_mean_m",
             value=f"largest radius {largest_m:.6g} m",
-            limit=f"at most {widest:.6g} m in a bowl of radius {bowl_radius_m:g} m",
+            limit=f"at most {widest:.6g} m with {bowl.clear_m:g} m, {_CLEAR}",
             remedy="use smaller particles or a wider bowl",
         )
-    line = np.arange(-np.floor(reach / step), np.floor(reach / step) + 1) * step
-    rows: list[Floats] = []
-    for y in line:  # no more rows of the lowest layer than there are particles for
-        x = line[line**2 + y**2 <= reach**2]
-        rows.append(np.column_stack([x, np.full(len(x), y)]))
-        if sum(map(len, rows)) >= count:
-            break
     layer = np.concatenate(rows)
     layers = -(-count // len(layer))
     heights = np.repeat(_SPACING * largest_m + step * np.arange(layers), len(layer))
     return np.column_stack([np.tile(layer, (layers, 1)), heights])[:count]
+
+
+def _centred(reach_m: float, step_m: float) -> Floats:
+    """Places a step apart about 0, no farther than a reach."""
+    most = np.floor(reach_m / step_m)
+    return np.arange(-most, most + 1) * step_m

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dragdeck.cases.case import Case, of_each_workpiece
-from dragdeck.mesh.shapes import bowl
 from dragdeck.mesh.surface import surface
 from dragdeck.scenes.filling import expected_bed
 from dragdeck.scenes.motion import Course, course, driven_surface_speed
@@ -96,7 +95,9 @@ class CaseLayout:
     ----------
     bowl, bed : Trimesh
         The inside of the bowl, and the expected surface of the bed.
-    bowl_radius_m, bowl_height_m, surface_m : float
+    outlines : sequence of (N, 2) array
+        Closed lines around the section of the bowl.
+    bowl_reach_m, bowl_height_m, surface_m : float
     bowl_turn : int
         Sense of the bowl's rotation: 1 counter-clockwise from above, -1, 0 for none.
     workpieces : sequence of MovingWorkpiece
@@ -104,7 +105,8 @@ class CaseLayout:
 
     bowl: "Trimesh"
     bed: "Trimesh"
-    bowl_radius_m: float
+    outlines: Sequence[Floats]
+    bowl_reach_m: float
     bowl_height_m: float
     surface_m: float
     bowl_turn: int
@@ -120,11 +122,13 @@ def layout(case: Case) -> CaseLayout:
         The mesh of the workpiece is missing or cannot be used.
     """
     study = case.study
-    radius, level = study.bowl.radius_m, expected_bed(study).surface_m
+    inside, level = study.bowl.container, expected_bed(study).surface_m
+    outlines = list(inside.outlines())
     return CaseLayout(
-        bowl=bowl(radius, study.bowl.height_m, radius / 10),
-        bed=_disc(radius, level),
-        bowl_radius_m=radius,
+        bowl=study.bowl.mesh(study.bowl.height_m, inside.clear_m / 10),
+        bed=_section(outlines, level),
+        outlines=outlines,
+        bowl_reach_m=inside.reach_m,
         bowl_height_m=study.bowl.height_m,
         surface_m=level,
         bowl_turn=int(np.sign(study.motion.bowl_rad_s)),
@@ -145,13 +149,17 @@ def _moving(case: Case) -> MovingWorkpiece:
     )
 
 
-def _disc(radius_m: float, height_m: float) -> "Trimesh":
-    angle = np.linspace(0, math.tau, 90, endpoint=False)
-    x, y = radius_m * np.cos(angle), radius_m * np.sin(angle)
-    rim = np.arange(1, 91)
-    points = np.column_stack([x, y, np.full(90, height_m)])
-    triangles = np.column_stack([np.zeros(90), rim, np.roll(rim, -1)])
-    return surface(np.vstack([[0, 0, height_m], points]), triangles)
+def _section(outlines: Sequence[Floats], height_m: float) -> "Trimesh":
+    """The surface within an outline, and around a second one."""
+    outer, inner = outlines[0][:-1], np.zeros((len(outlines[0]) - 1, 2))
+    if len(outlines) > 1:
+        inner = outlines[1][:-1]
+    count = len(outer)
+    points = np.column_stack([np.vstack([outer, inner]), np.full(2 * count, height_m)])
+    here = np.arange(count)
+    ahead = np.roll(here, -1)
+    halves = [[here, ahead, ahead + count], [here, ahead + count, here + count]]
+    return surface(points, np.hstack(halves).T)
 
 
 def _stages(case: Case, way: Course) -> Iterator[Stage]:

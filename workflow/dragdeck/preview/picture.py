@@ -88,17 +88,19 @@ def _draw(axes: "Axes", view: Projection, layout: CaseLayout, layers: Sequence[_
     for name in _WORDS:
         axes.fill([], [], color=COLOURS[name], label=_WORDS[name])
     for height, name in ((layout.surface_m, "bed"), (layout.bowl_height_m, "bowl"), (0.0, "bowl")):
-        _line(axes, view, _circle(layout.bowl_radius_m, height), _darker(name), lw=1.2)
+        for outline in layout.outlines:
+            points = np.column_stack([outline, np.full(len(outline), height)])
+            _line(axes, view, points, _darker(name), lw=1.2)
     for body in layout.workpieces:
         for stage in body.stages:
             style = {"ls": _DASHES.get(stage.name, "solid"), "label": stage.name}
             _line(axes, view, stage.poses[:, :3, 3], COLOURS[stage.name], lw=1.8, **style)
         start, ahead = body.drag.poses[0, :3, 3], body.direction_rad
         along = np.array([math.cos(ahead), math.sin(ahead), 0.0])
-        _arrow(axes, view, start, 0.3 * layout.bowl_radius_m * along)
+        _arrow(axes, view, start, 0.3 * layout.bowl_reach_m * along)
         _turn(axes, view, start, 1.3 * body.radius_m, body.spin)
     rim = np.array([0.0, 0.0, layout.bowl_height_m])
-    _turn(axes, view, rim, 1.08 * layout.bowl_radius_m, layout.bowl_turn)
+    _turn(axes, view, rim, 1.08 * layout.bowl_reach_m, layout.bowl_turn)
     axes.set(title=view.title, xlabel=view.across, ylabel=view.along, aspect="equal")
     axes.autoscale_view()
     if not view.across:
@@ -150,13 +152,6 @@ def _turn(axes: "Axes", view: Projection, centre_m: Floats, radius_m: float, sen
 def _line(axes: "Axes", view: Projection, points: Floats, colour: Any, **style: Any) -> None:
     across, along, _ = 1e3 * view.basis @ points.T
     axes.plot(across, along, color=colour, **style)
-
-
-def _circle(radius_m: float, height_m: float) -> Floats:
-    angle = np.linspace(0.0, math.tau, 181)
-    return np.column_stack(
-        [radius_m * np.cos(angle), radius_m * np.sin(angle), 0 * angle + height_m]
-    )
 
 
 def _darker(name: str) -> Floats:

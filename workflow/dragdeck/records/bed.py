@@ -1,7 +1,6 @@
 """What ``case.json`` says of the particles and the bowl; the engine reads it, too."""
 
 from collections.abc import Mapping
-from typing import Literal
 
 import numpy as np
 from pydantic import PositiveFloat
@@ -9,6 +8,7 @@ from pydantic import PositiveFloat
 from dragdeck.arrays import Floats, Ints, class_numbers
 from dragdeck.documents import Part, omitted
 from dragdeck.physics.contact_mechanics import ContactConstants
+from dragdeck.physics.walls import Container
 from dragdeck.records.run import CaseFile, CountOfRun
 
 
@@ -112,19 +112,16 @@ class BodiesOfRun(Part):
         return values[self.rows].reshape(self.count, len(self.radii_m), -1)
 
 
-class BowlOfRun(Part):
-    """The bowl: a cylinder about the z axis with its floor at z = 0.
+class BowlOfRun(Container):
+    """The bowl.
 
     Attributes
     ----------
-    radius_m : float
-        Inner radius, m.
-    walls : str
-        ``primitive`` (analytical plane and cylinder) or ``mesh``.
+    meshed : bool
+        Whether the particles touch a mesh in place of its walls.
     """
 
-    radius_m: PositiveFloat
-    walls: Literal["primitive", "mesh"]
+    meshed: bool = omitted(False)
 
 
 class CaseOfBed(CaseFile):

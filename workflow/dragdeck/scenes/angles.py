@@ -30,6 +30,7 @@ from dragdeck.physics.contact_mechanics import ENGINE_SOFTEST_PA, fall_time
 from dragdeck.physics.estimates import SOLID_FRACTION_ESTIMATE
 from dragdeck.physics.packing import pour
 from dragdeck.physics.rounding import rounded
+from dragdeck.physics.walls import round_container
 from dragdeck.records.case import CaseOfRun
 from dragdeck.scenes.scene import case_of_study, material_table
 from dragdeck.study.calibration import Drum, Repose, Rig
@@ -156,7 +157,7 @@ def angle_scene(case: Case, run: AngleRun, stiffness: float = STIFFNESS) -> Scen
         skin_m=widest_skin(study),
         timestep_s=dt,
         rayleigh_time_s=rayleigh,
-        outputs=(outputs.thermo(period, steps), outputs.particles(period, 0, steps, True)),
+        outputs=(outputs.thermo(period, steps), outputs.particles(period, 0, steps, ())),
         thermo_steps=period,
         glued=glued,
         edge_m=placed.edge_m,
@@ -209,7 +210,7 @@ def _total(study: Study, rig: Repose | Drum) -> tuple[int, float]:
 def _heap(study: Study, rig: Repose, speed_m_s: float) -> _Placed:
     """The cylinder on its glued layer, whose tops are at z = 0."""
     size, inner, radii = study.media.typical_radius_m, rig.cylinder_radius_m, bed_radii(study)
-    poured = pour([radii], inner, study.seed)
+    poured = pour([radii], round_container(inner), study.seed)
     volume = bed_volume(study) / SOLID_FRACTION_ESTIMATE
     edge = max((3 * volume / math.pi / _FLATTEST) ** (1 / 3), inner) + 4 * size
     line = np.arange(-edge + size, edge - size, 2 * size)

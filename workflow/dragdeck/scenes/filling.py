@@ -19,7 +19,7 @@ from dragdeck.cases.bed import (
     bed_timestep,
     bed_volume,
     body_sizes,
-    box_half_width,
+    box_half_widths,
     buoyancy_density,
     expected_surface,
     farthest_point,
@@ -49,6 +49,7 @@ from dragdeck.physics.domain_split import FilledBowl, Split, rank_warnings, spli
 from dragdeck.physics.packing import Bed, Particles, pour, primes, room_to_insert
 from dragdeck.physics.rounding import rounded
 from dragdeck.physics.run_limits import RunLimits, run_limits
+from dragdeck.physics.walls import Container
 from dragdeck.records.case import FillingCase
 from dragdeck.records.run import SettlingCriterion
 from dragdeck.scenes.scene import (
@@ -85,7 +86,7 @@ class FillingDeck(Deck):
     """What the fill template sees; for clumps with primes as seeds, and the top of the space, m."""
 
     bowl_type: int
-    bowl_radius_m: float
+    bowl: Container
     energy_ratio: float
     energy_unit_j: float
     check_steps: int
@@ -133,7 +134,7 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
         checkpoint_steps=5 * check_steps,
         processors=rank_split(case).line,
         bowl_type=types.index(study.bowl.material) + 1,
-        bowl_radius_m=study.bowl.radius_m,
+        bowl=study.bowl.container,
         energy_ratio=study.filling.energy_ratio,
         energy_unit_j=_energy_unit(study),
         check_steps=check_steps,
@@ -213,20 +214,20 @@ def _start(study: Study) -> _Start:
         particles = first_particles(study)
         return _Start(particles.top_m, particles.fastest_m_s)
     reaches = [class_.radii_m * class_.clump.reach for class_ in bed_classes(study)]
-    return _Start(room_to_insert(np.concatenate(reaches), study.bowl.radius_m), 0.0)
+    return _Start(room_to_insert(np.concatenate(reaches), study.bowl.container), 0.0)
 
 
 def first_particles(study: Study) -> Particles:
     """The particles of a study before they fall."""
     counts = tuple(study.class_counts.values())
-    return _first_particles(study.media, counts, study.bowl.radius_m, study.seed)
+    return _first_particles(study.media, counts, study.bowl.container, study.seed)
 
 
 @lru_cache(maxsize=1)
 def _first_particles(
-    media: Media, counts: tuple[int, ...], bowl_radius_m: float, seed: int
+    media: Media, counts: tuple[int, ...], bowl: Container, seed: int
 ) -> Particles:
-    return pour([class_.radii_m for class_ in media_classes(media, counts)], bowl_radius_m, seed)
+    return pour([class_.radii_m for class_ in media_classes(media, counts)], bowl, seed)
 
 
 def _check_capacity(case: Case) -> None:
@@ -265,17 +266,17 @@ def _check_cells(case: Case) -> None:
     largest = max(
         float(class_.radii_m[-1] * class_.clump.radii.max()) for class_ in bed_classes(study)
     )
-    box = 4 * box_half_width(study) ** 2 * (box_top(study) + study.media.typical_radius_m)
+    floor = 4 * math.prod(box_half_widths(study))
+    box = floor * (box_top(study) + study.media.typical_radius_m)
     cells = box / (largest + skin(study) / 2) ** 3
     if cells * _CELL_BYTES > _MOST_CELL_BYTES:
         raise InputError(
             "the bowl is too large for its particles: LIGGGHTS would divide it into "
             f"{cells:.3g} cells, with {cells * _CELL_BYTES / 1e9:.3g} GB of memory",
             file=case.file,
-            field="bowl.radius_m",
-            value=study.bowl.radius_m,
+            field="bowl",
             limit=f"{_MOST_CELL_BYTES / 1e9:g} GB",
-            remedy="use a smaller bowl (radius_m, height_m), or larger particles",
+            remedy="use a smaller bowl, or larger particles",
         )
 
 
@@ -305,9 +306,9 @@ def rank_split(case: Case) -> Split:
     study = case.study
     filled = FilledBowl(
         particles=study.sphere_count,
-        radius_m=study.bowl.radius_m,
+        bowl=study.bowl.container,
         height_m=expected_surface(study),
-        half_width_m=box_half_width(study),
+        half_widths_m=box_half_widths(study),
         bottom_m=-study.media.typical_radius_m,
         top_m=box_top(study),
         reach_m=(4 if study.media.clumped else 2) * farthest_point(study) + skin(study),
@@ -481,8 +482,8 @@ def _arrival_speed(study: Study, top_m: float) -> float:
 
 
 def _particles_data(study: Study, top_m: float, types: int) -> str:
-    side = box_half_width(study)
-    box = ((-side, side), (-side, side), (-study.media.typical_radius_m, top_m))
+    x, y = box_half_widths(study)
+    box = ((-x, x), (-y, y), (-study.media.typical_radius_m, top_m))
     if study.media.clumped:
         return data_file("the empty box", types, box, [])
     particles, names = first_particles(study), [class_.material for class_ in bed_classes(study)]
@@ -527,7 +528,7 @@ def partners_in_bed(case: Case) -> list[tuple[str, str, float]]:
     study = case.study
     return [
         ("particle", study.media.main_material, smallest_radius(study)),
-        ("bowl", study.bowl.material, study.bowl.radius_m),
+        ("bowl", study.bowl.material, study.bowl.container.clear_m),
     ]
 
 

@@ -18,6 +18,7 @@ from dragdeck.cases.case import Case
 from dragdeck.decks.deck import Deck, Properties
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import round_to
+from dragdeck.physics.walls import Container
 from dragdeck.study.drive import Drive, EngineMotion, Floats, Orientations, rotation_vector
 from dragdeck.study.driven import DrivenMotion
 from dragdeck.study.model import Motion, Study
@@ -346,7 +347,7 @@ class ProcessDeck(Deck):
     """What the process template sees."""
 
     bowl_type: int
-    bowl_radius_m: float
+    bowl: Container
     bowl_facets: bool
     bowl_rad_s: float
     workpiece_type: int

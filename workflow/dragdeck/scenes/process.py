@@ -19,12 +19,12 @@ from dragdeck.decks.outputs import Output
 from dragdeck.errors import Caution
 from dragdeck.files import file_checksum
 from dragdeck.mesh.files import stl_text
-from dragdeck.mesh.shapes import bowl
 from dragdeck.physics.contact_mechanics import ENGINE_NEIGHBOURS
 from dragdeck.physics.domain_split import rank_warnings
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import round_to
 from dragdeck.physics.run_limits import RunLimits, thrown_speed
+from dragdeck.records.bed import BowlOfRun
 from dragdeck.records.case import AssumptionOfRun, ProcessCase, StatisticsOfRun, WorkpieceOfRun
 from dragdeck.records.run import Phase, SteadyCriterion
 from dragdeck.scenes.drop_test import DROP_TEST
@@ -48,7 +48,6 @@ from dragdeck.scenes.motion import (
 from dragdeck.scenes.scene import (
     SceneType,
     assumed,
-    bowl_of_run,
     case_of_study,
     liquid,
     liquid_leaves_out,
@@ -62,6 +61,7 @@ from dragdeck.scenes.workpiece import (
     check_apart,
     check_fit,
     check_headroom,
+    check_lid,
     describe,
     fastest_motion,
     may_jam,
@@ -109,6 +109,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
     dt, top = bed_timestep(study, "timestep_fraction"), box_top(study)
     periods, meshes = output_periods(study, dt), _mesh_files(each)
     check_apart(each, bed)
+    check_lid(whole, bed)
     courses, moved = (
         [course(workpiece.study, bed, reference_height(workpiece)) for workpiece in each],
         [],
@@ -123,6 +124,8 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         check_headroom(workpiece, way.start_m[2] + bed.margin_m - reference_height(workpiece), top)
     types, parts = study.type_names(), rank_split(whole)
     materials = material_table(study, types, fidelity.youngs_modulus_scale, whole)
+    bowl = study.bowl.closed
+    primitive = tuple(wall for wall in bowl.walls if not facets or wall.name == "lid")
     touches = study.outputs.first_touch_fraction if steps.end == drag.end else 0.0
     deck = ProcessDeck(
         title=study.title,
@@ -145,6 +148,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
             steps,
             [body.name for body in moved],
             facets,
+            [wall.name for wall in primitive],
             touches,
             study.media.clumped,
         ),
@@ -152,7 +156,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         checkpoint_steps=_checkpoint_steps(study, steps.end - steps.entry),
         processors=parts.line,
         bowl_type=types.index(study.bowl.material) + 1,
-        bowl_radius_m=study.bowl.radius_m,
+        bowl=bowl.model_copy(update={"walls": primitive}),
         bowl_facets=facets,
         bowl_rad_s=courses[0].driven.bowl_rad_s,
         clumped=study.media.clumped,
@@ -227,6 +231,7 @@ def _outputs(
     steps: Covered,
     workpieces: Sequence[str],
     facets: bool,
+    walls: Sequence[str],
     touches: float,
     clumped: bool,
 ) -> tuple[Output, ...]:
@@ -245,7 +250,7 @@ def _outputs(
         *(outputs.workpiece_force(periods.force, force, name, steps.entry) for name in workpieces),
         outputs.workpiece_particles(periods.contacts, first_touching, touching),
         outputs.workpiece_contacts(periods.contacts, first_touching, touching, several),
-        outputs.particles(periods.network, first, network, facets, clumped),
+        outputs.particles(periods.network, first, network, walls, clumped),
         outputs.contacts(periods.network, first, network),
         *(outputs.first_touch(last_part, steps.end, several) if touches else ()),
     )
@@ -278,7 +283,7 @@ def _process_case(
         bed_rayleigh_time(study),
         settings=study.chosen_fidelity().model_dump(include={"timestep_fraction", "speed_factor"}),
         media=media_of_run(study, buoyancy_density(study)),
-        bowl=bowl_of_run(study, facets=study.bowl_facet_size_m is not None),
+        bowl=BowlOfRun(**dict(study.bowl.closed), meshed=study.bowl_facet_size_m is not None),
         assumptions=[*assumed(study), *_of_liquid(case, surface_m)],
         asked=case.advised,
         study=said_study(study),
@@ -365,7 +370,7 @@ def _bowl_files(study: Study, top_m: float) -> dict[str, Callable[[], str]]:
     size = study.bowl_facet_size_m
     if size is None:
         return {}
-    mesh = bowl(study.bowl.radius_m, min(study.bowl.height_m, 0.99 * top_m), size)
+    mesh = study.bowl.mesh(min(study.bowl.height_m, 0.99 * top_m), size)
     return {"bowl.stl": lambda: stl_text(mesh)}
 
 

@@ -220,9 +220,9 @@ def media_of_run(study: Study, buoyancy_kg_m3: float = 0.0) -> MediaOfRun:
     )
 
 
-def bowl_of_run(study: Study, *, facets: bool = False) -> BowlOfRun:
-    """The bowl, whose walls are exact or have facets."""
-    return BowlOfRun(radius_m=study.bowl.radius_m, walls="mesh" if facets else "primitive")
+def bowl_of_run(study: Study) -> BowlOfRun:
+    """The bowl before the process: open, with exact walls."""
+    return BowlOfRun(**dict(study.bowl.container))
 
 
 def liquid(study: Study) -> Liquid | None:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from dragdeck.cases.bed import (
     JUST_BEYOND,
     bed_timestep,
-    box_half_width,
+    box_half_widths,
     farthest_point,
     full_stiffness_number,
     impact_time,
@@ -61,6 +61,7 @@ from dragdeck.scenes.motion import (
 from dragdeck.study.contact_law import compared_numbers
 from dragdeck.study.drive import by_vector
 from dragdeck.study.driven import DrivenMotion
+from dragdeck.study.paths.path import as_rows
 from dragdeck.study.workpiece import CylinderShape, MeshShape
 
 if TYPE_CHECKING:
@@ -197,7 +198,7 @@ def _too_fine(case: Case) -> Iterator[Caution]:
 
 def _of_case(case: Case, shape: MeshShape) -> "tuple[Trimesh, list[Finding]]":
     study = case.study
-    sizes = study.bowl.radius_m, study.media.typical_radius_m, deepest(study.motion)
+    sizes = study.bowl.container.clear_m, study.media.typical_radius_m, deepest(study.motion)
     surroundings = Surroundings(*sizes)
     return _from_file(mesh_file(case, shape), shape, surroundings)
 
@@ -216,14 +217,14 @@ def simulated_mesh(case: Case) -> "Trimesh":
     mesh, motion = workpiece_mesh(case), case.study.motion
     if motion.path.inclined or motion.turns_about_inclined_axis:
         return mesh
-    half_width_m = box_half_width(case.study)
-    outside = np.hypot(*mesh.triangles_center[:, :2].T) + farthest_reach(motion) > half_width_m
+    box = case.study.bowl.container.reach_m + 2 * case.study.media.typical_radius_m
+    outside = np.hypot(*mesh.triangles_center[:, :2].T) + farthest_reach(motion) > box
     if (outside & (mesh.triangles[:, :, 2].min(axis=1) < deepest(motion))).any():
         raise InputError(
             "a facet of the workpiece reaches from the bed out of the simulation box",
             file=case.file,
             field="workpiece.shape",
-            limit=f"a centre within {half_width_m:.4g} m from the axis of the bowl",
+            limit=f"a centre within {box:.4g} m from the axis of the bowl",
             remedy="mesh the part with smaller facets, or cut it off above the bed",
         )
     return surface(mesh.vertices, mesh.faces[~outside]) if outside.any() else mesh
@@ -264,23 +265,6 @@ def workpiece_reach(case: Case) -> float:
     if not case.study.motion.inclined:
         return workpiece_radius(case)
     return float(np.hypot(*_in_bed(case)).max())
-
-
-def farthest_surface(case: Case) -> float:
-    """Largest distance from the bowl's axis of what of the workpiece is in the bed, m.
-
-    A tilted workpiece that shows the bowl's axis one side all the time is measured where it starts,
-    all others as the cylinder of `workpiece_reach`.
-    """
-    motion = case.study.motion
-    if not motion.tilt_deg or not motion.path.one_side_inwards(motion.orientation):
-        return farthest_reach(motion) + workpiece_reach(case)
-    angle, (x, y) = motion.path.direction_rad, _in_bed(case)
-    across = np.array(
-        [x * np.cos(angle) - y * np.sin(angle), x * np.sin(angle) + y * np.cos(angle)]
-    )
-    places = np.array([motion.path.start_point, plunge_point(motion)])
-    return float(np.hypot(*(across[:, :, None] + places.T[:, None, :])).max())
 
 
 def _in_bed(case: Case) -> NDArray[np.float64]:
@@ -378,8 +362,22 @@ def in_diameters(case: Case, gap_m: float) -> float:
 
 
 def _wall_gap(case: Case) -> float:
-    """Narrowest gap between the workpiece and the wall, m; no bed is needed for it."""
-    return case.study.bowl.radius_m - farthest_surface(case)
+    """Narrowest gap between the workpiece and a wall, m; no bed is needed for it.
+
+    A tilted workpiece that shows the axis of a round bowl one side all the time is measured where
+    it starts, all others as the cylinder of `workpiece_reach`.
+    """
+    motion, bowl = case.study.motion, case.study.bowl.container
+    begin, plunge = motion.path.start_point, plunge_point(motion)
+    if bowl.round and motion.tilt_deg and motion.path.one_side_inwards(motion.orientation):
+        angle, outline = motion.path.direction_rad, _in_bed(case).T
+        turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+        around = np.concatenate([outline @ turn + place for place in (begin, plunge)])
+        return float(bowl.side_distance(around).min())
+    entry = np.linspace(plunge, begin, _PLACES_PER_LEG)
+    drag = np.atleast_2d(as_rows(motion.path.place(np.linspace(0.0, 1.0, _PLACES_PER_LEG))))
+    places = np.concatenate([entry, motion.path.corners[:, :2], drag[:, :2]])
+    return float(bowl.side_distance(places).min()) - workpiece_reach(case)
 
 
 def may_jam(case: Case, surface_m: float) -> bool:
@@ -468,7 +466,7 @@ def process_cautions(case: Case) -> Iterator[Caution]:
         yield Caution(
             "mesh",
             f"{left_out:,} facets above the bed would leave the simulation box, "
-            f"{box_half_width(study):.3g} m from the axis of the bowl: the run leaves them out",
+            f"{box_half_widths(study)[0]:.3g} m from the axis of the bowl: the run leaves them out",
         )
     gap = in_diameters(case, _wall_gap(case))
     if gap < JAMMING_GAP:
@@ -494,11 +492,10 @@ def process_cautions(case: Case) -> Iterator[Caution]:
 
 def _beside(case: Case, gap: float) -> Iterator[InputError]:
     study = case.study
-    reach = farthest_reach(study.motion)
-    radius = study.bowl.radius_m - gap - reach
     diameter = 2 * typical_reach(study)
     if gap < diameter:
-        remedy, shape = "use a smaller path or workpiece, or a wider bowl", study.workpiece.shape
+        shape = study.workpiece.shape
+        remedy = "use another path or motion.plunge_at_m, a smaller workpiece, or a wider bowl"
         if isinstance(shape, MeshShape) and shape.offset_m:
             remedy = f"leave workpiece.shape.offset_m out: the part is centred then; or {remedy}"
         yield InputError(
@@ -507,9 +504,9 @@ def _beside(case: Case, gap: float) -> Iterator[InputError]:
             else "no particle fits between the workpiece and the bowl",
             file=case.file,
             field="motion.path",
-            value=f"axis up to {reach:.4g} m from the bowl's axis, workpiece radius {radius:.4g} m",
-            limit=f"sum at most {study.bowl.radius_m - diameter:.4g} m: the bowl's radius "
-            "minus a particle diameter",
+            value=f"{gap:.4g} m between workpiece and wall, at its axis "
+            f"{farthest_reach(study.motion):.4g} m from that of the bowl or nearer",
+            limit=f"at least {diameter:.4g} m, a particle diameter",
             remedy=remedy,
         )
 
@@ -606,7 +603,7 @@ def _per_step(case: Case, timestep_s: float) -> Iterator[InputError]:
 def fastest_motion(case: Case) -> float:
     """Speed of the fastest motion of workpiece and bowl, superposed motions included, m/s."""
     motion, factor = case.study.motion, case.study.chosen_fidelity().speed_factor
-    rim = abs(motion.bowl_rad_s) * case.study.bowl.radius_m
+    rim = abs(motion.bowl_rad_s) * case.study.bowl.container.reach_m
     entry = max(motion.plunge_speed_m_s, motion.approach_speed_m_s)
     return max(_driven_surface(case), factor * max(rim, entry))
 
@@ -634,6 +631,26 @@ def check_headroom(case: Case, tip_m: float, top_m: float) -> None:
             value=f"length {workpiece_length(case):.4g} m",
             limit=f"at most {longest:.4g} m",
             remedy="shorten the mesh at its upper end, or use a higher bowl (bowl.height_m)",
+        )
+
+
+def check_lid(case: Case, bed: Bed) -> None:
+    """Refuse a lid that the packing would touch.
+
+    Raises
+    ------
+    InputError
+        The lid is too low.
+    """
+    lid, least = case.study.bowl.lid_m, bed.top_m + bed.margin_m
+    if lid is not None and lid < least:
+        raise InputError(
+            "the lid is not above the packing",
+            file=case.file,
+            field="bowl.lid_m",
+            value=lid,
+            limit=f"at least {least:.4g} m, the highest point of a particle",
+            remedy="use a higher lid, or fewer particles",
         )
 
 
@@ -679,7 +696,7 @@ def describe(case: Case) -> dict[str, float]:
     superposed = {"superposed_speed": added} if motion.superposed() or added > 1e-9 else {}
     acceleration = weight_acceleration(study)
     optional = {
-        "bowl_froude_number": motion.bowl_rad_s**2 * study.bowl.radius_m / acceleration,
+        "bowl_froude_number": motion.bowl_rad_s**2 * study.bowl.container.reach_m / acceleration,
         "tilt_deg": abs(motion.tilt_deg or 0.0),
         "submerged_weight_ratio": acceleration / study.gravity_m_s2 if study.compound else 0.0,
         "further_workpieces": float(len(of_each_workpiece(case.all_workpieces)) - 1),
@@ -692,7 +709,7 @@ def describe(case: Case) -> dict[str, float]:
         ),
         "workpiece_to_particle": 2 * workpiece_radius(case) / diameter,
         "depth_to_particle": motion.immersion_depth_m / diameter,
-        "bowl_to_particle": 2 * study.bowl.radius_m / diameter,
+        "bowl_to_particle": 2 * study.bowl.container.clear_m / diameter,
         **compared_numbers(
             study.pair(names[0], names[0]), study.pair(*names), study.pairs.values()
         ),

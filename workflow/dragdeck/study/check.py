@@ -114,6 +114,8 @@ def _media(study: Study) -> _Found:
                 field = f"media.classes.{name}" if name else "media"
                 yield field, "not one particle of it", "a larger total or fraction"
         yield from _crowd(study)
+    if (study.bowl.lid_m or 0.0) > study.bowl.height_m:
+        yield "bowl.lid_m", "the lid is above the rim", f"at most {study.bowl.height_m:g} m"
     if (media.fill_height_m or 0.0) > study.bowl.height_m:
         problem = "the bed would stand above the rim of the bowl"
         yield "media.fill_height_m", problem, f"at most {study.bowl.height_m:g} m"
@@ -191,6 +193,8 @@ def _shape(study: Study) -> _Found:
 def _motion(study: Study) -> _Found:
     """Statistics need a frame of the contact network after all that they leave out."""
     motion, problem = study.motion, "no path is left for the statistics"
+    if motion.bowl_rad_s and not study.bowl.container.round:
+        yield "motion.path", f"a bowl of kind {study.bowl.kind} cannot rotate", "a round bowl"
     length, speed = motion.path_length_m, motion.nominal_speed_m_s
     frame = speed / study.outputs.network_hz
     if length < frame * (1 - 1e-9):
@@ -505,7 +509,7 @@ def _problem(issue: ErrorDetails) -> InputError:
     """One problem that a model found."""
     kind = issue["type"]
     places = pairwise(("", *issue["loc"]))
-    named = (part for above, part in places if above not in ("path", "shape"))
+    named = (part for above, part in places if above not in ("path", "shape", "bowl"))
     field = ".".join(str(part) for part in named if part not in _FORMS)
     words = _WORDS.get(kind, (issue["msg"].removeprefix("Value error, "), None))
     problem, limit, remedy = *words, None

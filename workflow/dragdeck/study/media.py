@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from dragdeck.physics.walls import Container
 from dragdeck.study.base import MaterialName, Model, Name, NonNegative, Number, Positive, Whole
 from dragdeck.study.shapes import FEWEST_SPHERES, AnyShape, solid_fraction
 
@@ -336,7 +337,7 @@ class Media(Grains):
 
 @lru_cache(maxsize=16)
 def class_counts(
-    media: Media, densities_kg_m3: tuple[float, ...], bowl_area_m2: float
+    media: Media, densities_kg_m3: tuple[float, ...], bowl: Container
 ) -> Mapping[str, int]:
     """Number of particles of each class.
 
@@ -345,8 +346,8 @@ def class_counts(
     media : Media
     densities_kg_m3 : tuple of float
         Of each class.
-    bowl_area_m2 : float
-        Area of the bowl's floor, on which a fill height stands.
+    bowl : Container
+        In which a fill height stands.
     """
     volume = {name: part.mean_volume_m3 for name, part in media.parts.items()}
     densities = dict(zip(volume, densities_kg_m3, strict=True))
@@ -365,7 +366,7 @@ def class_counts(
         if media.fill_height_m is not None:
             radii = np.concatenate([part.radii(LEVELS) for part in media.parts.values()])
             numbers = np.repeat(list(by_number.values()), LEVELS)
-            total = media.fill_height_m * bowl_area_m2 * media.solid_fraction(radii, numbers)
+            total = bowl.volume_m3(media.fill_height_m) * media.solid_fraction(radii, numbers)
         assert total is not None
         scale = total / of_all
     return _whole_numbers({name: scale * number for name, number in by_number.items()})

@@ -23,6 +23,9 @@ from dragdeck.study.base import (
     flat,
     without_fields,
 )
+from dragdeck.study.bowls.annulus import AnnulusBowl
+from dragdeck.study.bowls.cylinder import CylinderBowl
+from dragdeck.study.bowls.trough import TroughBowl
 from dragdeck.study.calibration import Calibration
 from dragdeck.study.contact_law import Contact, Pair
 from dragdeck.study.media import MOST_CLASSES, Media, class_counts
@@ -48,17 +51,20 @@ Ranks = Annotated[
 ]
 
 
-class Bowl(Model):
-    """A flat-bottomed cylindrical bowl about the z axis, floor at z = 0."""
+AnyBowl = (
+    Annotated[CylinderBowl, Tag("cylinder")]
+    | Annotated[AnnulusBowl, Tag("annulus")]
+    | Annotated[TroughBowl, Tag("trough")]
+)
+"""The registry of bowls."""
 
-    material: str = Field(description="material of the bowl: a name under `materials`")
-    radius_m: Positive = Field(description="inner radius of the bowl, m")
-    height_m: Positive = Field(description="inner height of the bowl from floor to rim, m")
-    facet_size_m: Positive | None = Field(
-        default=None,
-        description="edge length of the bowl's mesh elements, m; none: analytical walls, or a "
-        "particle diameter if the bowl rotates",
-    )
+
+def _kind_of_bowl(value: object) -> object:
+    """A bowl without a kind is a cylinder."""
+    default = CylinderBowl.model_fields["kind"].default
+    if isinstance(value, Mapping):
+        return value.get("kind", default)
+    return getattr(value, "kind", default)
 
 
 class Compound(Model):
@@ -553,7 +559,7 @@ class Study(Model):
         description="'a-b': contact coefficients of the materials a and b"
     )
     media: Media
-    bowl: Bowl
+    bowl: Annotated[AnyBowl, Discriminator(_kind_of_bowl)]
     compound: Compound | None = Field(default=None, exclude_if=lambda value: value is None)
     workpiece: Workpiece
     workpieces: Carousel | None = None
@@ -652,7 +658,7 @@ class Study(Model):
         densities = tuple(
             self.materials[str(part.material)].density_kg_m3 for part in self.media.parts.values()
         )
-        return class_counts(self.media, densities, math.pi * self.bowl.radius_m**2)
+        return class_counts(self.media, densities, self.bowl.container)
 
     @property
     def particle_count(self) -> int:

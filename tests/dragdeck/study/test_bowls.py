@@ -1,0 +1,110 @@
+"""Kinds of bowl: walls, sections, meshes, places of the particles, and what is refused."""
+
+from copy import deepcopy
+from typing import Any
+
+import numpy as np
+import pytest
+from bowls import SMALL_BOWLS
+from made_study import Made, plain_study
+from scipy.spatial import KDTree
+
+from dragdeck.errors import InputError
+from dragdeck.physics.contact_mechanics import touching
+from dragdeck.physics.domain_split import FilledBowl, split
+from dragdeck.scenes.filling import first_particles
+from dragdeck.scenes.process import process_scene
+from dragdeck.study.bowls.bowl import Bowl
+from dragdeck.study.check import validate
+from dragdeck.study.model import Study
+
+
+def bowl(name: str) -> Bowl:
+    changes = {"bowl": {"material": "steel"} | SMALL_BOWLS[name]["bowl"]}
+    data = plain_study({})
+    return Study.model_validate({**data, **changes}).bowl
+
+
+def test_a_cylinder_is_what_a_bowl_was() -> None:
+    assert set(plain_study({})["bowl"]) == {"material", "radius_m", "height_m"}
+
+
+@pytest.mark.parametrize("name", SMALL_BOWLS)
+def test_the_mesh_leaves_the_space_between_the_walls_clear(name: str) -> None:
+    shape = bowl(name)
+    mesh, inside = shape.mesh(0.06, 0.004), shape.container
+    top = mesh.vertices[mesh.vertices[:, 2] > 0.059, :2]
+    assert -0.0002 < inside.side_distance(top).min() <= inside.side_distance(top).max() < 1e-9
+    assert mesh.bounds[0, 2] == 0 and mesh.bounds[1, 2] == pytest.approx(0.06)
+    area = (mesh.area_faces * mesh.face_normals[:, 2]).sum()
+    assert area == pytest.approx(inside.levels[0][1], rel=0.03)  # the floor faces up
+    inwards = -(mesh.face_normals * mesh.triangles_center)[:, :2].sum(axis=1)
+    outer = np.hypot(*mesh.triangles_center[:, :2].T) > 0.02
+    assert (inwards[outer] > -1e-12).all()
+    rim = mesh.edges_unique[np.bincount(mesh.edges_unique_inverse) == 1]
+    assert mesh.vertices[rim][:, :, 2].min() == pytest.approx(0.06)  # closed at the bottom
+
+
+@pytest.mark.parametrize("name", SMALL_BOWLS)
+def test_particles_start_within_the_walls(name: str, made: Made) -> None:
+    study = made(SMALL_BOWLS[name]).study
+    particles, inside = first_particles(study), study.bowl.container
+    gaps = [wall.contacts(particles.positions_m)[0] for wall in inside.walls]
+    assert (np.min(gaps, axis=0) > particles.radii_m).all()
+    near = KDTree(particles.positions_m).query(particles.positions_m, 2)[0][:, 1]
+    assert near.min() > 2 * particles.radii_m.min()
+    bodies, *_ = touching(particles.positions_m, particles.radii_m, inside)
+    assert not bodies.size
+
+
+@pytest.mark.parametrize("name", SMALL_BOWLS)
+def test_ranks_share_the_whole_section(name: str) -> None:
+    inside = bowl(name).container
+    x, y = (half + 0.004 for half in inside.half_widths_m)
+    for ranks in (2, 4, 6):
+        filled = FilledBowl(1000, inside, 0.03, (x, y), -0.003, 0.2, 0.0)
+        assert sum(split(ranks, filled).particles) == pytest.approx(1000, rel=0.01)
+    assert inside.height_m(inside.volume_m3(0.02)) == pytest.approx(0.02)
+
+
+def test_contacts_with_a_column_and_with_planes() -> None:
+    ring, box = bowl("annulus").container, bowl("trough").container
+    at = np.array([[0.0, 0.0129, 0.02], [0.0395, 0.0, 0.0029]])
+    bodies, normal, overlap = touching(at, np.full(2, 0.003), ring)
+    assert bodies.tolist() == [[1, 0], [2, 2]]
+    assert overlap == pytest.approx([1e-4, 1e-4])
+    assert normal == pytest.approx(np.array([[0, 0, -1], [0, -1, 0]]))
+    bodies, normal, overlap = touching(np.array([[-0.0371, 0.0196, 0.1]]), np.full(1, 0.003), box)
+    assert sorted(map(tuple, normal.tolist())) == [(-1.0, 0.0, 0.0), (0.0, 1.0, 0.0)]
+    assert overlap == pytest.approx([1e-4, 1e-4])
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "problem"),
+    [
+        ("annulus", {"bowl.core_radius_m": 0.05}, "not below radius_m"),
+        ("annulus", {"bowl.core_radius_m": 0.0205}, "no particle fits"),
+        ("annulus", {"bowl.core_radius_m": 0.026}, "does not fit"),
+        ("annulus", {"motion.plunge_at_m": None}, "does not fit"),
+        ("annulus", {"motion.plunge_at_m": [-0.028, 0.0]}, "does not fit"),
+        ("trough", {"motion.path.length_m": 0.05}, "no particle fits|does not fit"),
+        ("trough", {"bowl.width_m": 0.019}, "no particle fits"),
+        ("trough", {"bowl.width_m": 0.006}, "room to fall"),
+        ("lid", {"bowl.lid_m": 0.02}, "lid is not above"),
+        ("lid", {"bowl.lid_m": 0.2}, "above the rim"),
+        ("lid", {"bowl.kind": "bucket"}, "unknown kind"),
+    ],
+)
+def test_what_does_not_fit_is_refused(
+    name: str, changes: dict[str, Any], problem: str, made: Made
+) -> None:
+    with pytest.raises(InputError, match=problem):
+        process_scene(made({**deepcopy(SMALL_BOWLS[name]), **changes}))
+
+
+def test_only_a_round_bowl_rotates() -> None:
+    rest = {"kind": "rest", "radius_m": 0.01, "bowl_rpm": 20}
+    data = plain_study({"bowl": {"material": "steel"} | SMALL_BOWLS["trough"]["bowl"]})
+    data["motion"] = {**data["motion"], "path": rest, "speed_m_s": None}
+    with pytest.raises(InputError, match="trough cannot rotate"):
+        validate(data, "study.yaml")

@@ -1,0 +1,32 @@
+"""Bowls of several kinds, and a bowl as ``case.json`` has it."""
+
+from typing import Any
+
+from dragdeck.physics.walls import round_container
+
+SMALL_BOWLS: dict[str, dict[str, Any]] = {
+    "annulus": {
+        "bowl": {"kind": "annulus", "material": "steel", "radius_m": 0.046, "core_radius_m": 0.010,
+                 "height_m": 0.08},
+        "motion.path": {"kind": "circle", "radius_m": 0.028, "revolutions": 0.05},
+        "motion.plunge_at_m": [0.028, 0.0],
+        "media.count": 600,
+    },
+    "trough": {
+        "bowl": {"kind": "trough", "material": "steel", "length_m": 0.08, "width_m": 0.045,
+                 "height_m": 0.08},
+        "motion.path": {"kind": "line", "start_m": [-0.01, 0], "direction_deg": 0,
+                        "length_m": 0.01},
+        "media.count": 350,
+    },
+    "lid": {
+        "bowl": {"radius_m": 0.025, "height_m": 0.1, "lid_m": 0.05},
+        "media.count": 200,
+    },
+}  # fmt: skip
+"""Changes of the small study: bowls, with a path and a number of particles that fit."""
+
+
+def bowl_of_run(radius_m: float) -> dict[str, Any]:
+    """A cylinder."""
+    return round_container(radius_m).model_dump(mode="json")

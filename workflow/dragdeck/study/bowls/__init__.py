@@ -1,0 +1,1 @@
+"""Kinds of bowl: one module for each."""
