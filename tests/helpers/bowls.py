@@ -19,6 +19,19 @@ SMALL_BOWLS: dict[str, dict[str, Any]] = {
                         "length_m": 0.01},
         "media.count": 350,
     },
+    "revolved": {
+        "bowl": {"kind": "revolved", "material": "steel", "height_m": 0.05,
+                 "profile_m": [[0, 0], [0.012, 0], [0.024, 0.008], [0.03, 0.02], [0.032, 0.05]]},
+        "media.count": 380,
+    },
+    "ring": {
+        "bowl": {"kind": "revolved", "material": "steel", "height_m": 0.05,
+                 "profile_m": [[0.012, 0.05], [0.012, 0.018], [0.020, 0.004], [0.029, 0],
+                               [0.038, 0.004], [0.046, 0.018], [0.046, 0.05]]},
+        "motion.path": {"kind": "circle", "radius_m": 0.029, "revolutions": 0.05},
+        "motion.plunge_at_m": [0.029, 0.0],
+        "media.count": 640,
+    },
     "lid": {
         "bowl": {"radius_m": 0.025, "height_m": 0.1, "lid_m": 0.05},
         "media.count": 200,

@@ -1,4 +1,4 @@
-"""Bowls on LIGGGHTS: particles rest between the walls; a run on two ranks, and resumed."""
+"""Bowls on LIGGGHTS: particles rest between the walls; a run is resumed, on two ranks."""
 
 import json
 from copy import deepcopy
@@ -33,13 +33,12 @@ FAST = {"motion.plunge_speed_m_s": 0.5, "motion.approach_speed_m_s": 0.5, "motio
 
 @pytest.fixture(scope="module", params=SMALL_BOWLS)
 def finished(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The process of a bowl, run on two ranks, beside its filling."""
+    """The process of a bowl, beside its filling."""
     folder = tmp_path_factory.mktemp("project")
     for name in ("templates", "meshes"):
         (folder / name).symlink_to(ROOT / name)
     study: dict[str, Any] = yaml.safe_load(SMALL_STUDY.read_text())
     put(study, {**deepcopy(SMALL_BOWLS[request.param]), **FAST})
-    study["fidelities"]["quick"]["ranks"] = 2
     study["motion"]["immersion_depth_m"] = 0.010
     file = folder / "studies/small/study.yaml"
     file.parent.mkdir(parents=True)
@@ -88,13 +87,13 @@ def test_every_wall_carries_its_part(finished: Path) -> None:
 
 
 def test_a_resumed_run_goes_on(finished: Path) -> None:
-    """On one rank; particles and workpiece are where those of the whole run are, or near."""
+    """On two ranks; particles are where those of the whole run are, or near."""
     names = ["step", "particle_id", "x_m", "y_m", "z_m"]
     whole = read_table(finished / "tables/particles.parquet", names)
     last = whole[whole["step"] == whole["step"].max()].set_index("particle_id")
     steps = sorted(int(file.name.split(".")[1]) for file in finished.glob("checkpoint.*.restart"))
     columns = Run.open(finished).outputs["particles"].columns
-    engine(finished, part=2, source=finished / f"checkpoint.{steps[-3]}.restart")
+    engine(finished, ranks=2, part=2, source=finished / f"checkpoint.{steps[-2]}.restart")
     *_, frame = read_dump(finished / "particles.2.bin", columns)
     assert frame.step == last["step"].iloc[0] and frame.rows == len(last)
     centre = frame.by_particle().centres

@@ -7,7 +7,6 @@ import {
   LatheGeometry,
   Line,
   LineBasicMaterial,
-  LineSegments,
   Mesh,
   Triangle,
   Vector2,
@@ -111,21 +110,11 @@ function arrow(radius) {
 
 /** The lines of bowl, surface and path. */
 export function outline({ bowl, surface, workpieces }) {
-  const at = (outline, height) => outline.map(([x, y]) => new Vector3(x, y, height)),
-    line = (points, color, Kind = Line) =>
-      new Kind(new BufferGeometry().setFromPoints(points), new LineBasicMaterial({ color }));
-  const upright = (outline) =>
-    [0, 0.25, 0.5, 0.75].map((turn) => outline[Math.round(turn * (outline.length - 1))]).flatMap((point) => [
-      ...at([point], 0),
-      ...at([point], bowl.height),
-    ]);
+  const line = (points, color) =>
+    new Line(new BufferGeometry().setFromPoints(points), new LineBasicMaterial({ color }));
   const lines = [
-    ...bowl.outlines.flatMap((outline) => [
-      line(at(outline, 0), COLOURS.bowl),
-      line(at(outline, surface), STEEL),
-      line(at(outline, bowl.height), COLOURS.bowl),
-      line(upright(outline), COLOURS.bowl, LineSegments),
-    ]),
+    ...bowl.lines.map((points) => line(points.map((point) => new Vector3(...point)), COLOURS.bowl)),
+    ...bowl.surface.map((points) => line(points.map(([x, y]) => new Vector3(x, y, surface)), STEEL)),
     ...workpieces.map(({ poses }) =>
       line(
         poses.map(([x, y]) => new Vector3(x, y, surface)),

@@ -201,13 +201,11 @@ def _add_bowl(plotter: Any, case: CaseOfRun, view: View) -> None:
     import pyvista as pv
 
     height = 1.2 * needed(case.surface_m, "surface_m")
-    lines = [np.insert(outline, 2, 0.0, axis=1) for outline in case.bowl.outlines()]
-    walls = [pv.MultipleLines(line).extrude((0, 0, height), capping=False) for line in lines]
-    floor = pv.PolyData(lines[0][:-1]).delaunay_2d()
-    for wall in walls:
-        plotter.add_mesh(wall, color="#7a8694", opacity=0.04)
-    plotter.add_mesh(floor, color="#7a8694", opacity=0.06 if view == "xy" else 0.5)
-    for line in lines:
+    if not case.bowl.rim:
+        floor = np.insert(case.bowl.sections(0.0)[0][:-1], 2, 0.0, axis=1)
+        opacity = 0.06 if view == "xy" else 0.5
+        plotter.add_mesh(pv.PolyData(floor).delaunay_2d(), color="#7a8694", opacity=opacity)
+    for line in case.bowl.lines(height):
         plotter.add_mesh(pv.MultipleLines(line).tube(radius=0.0003), color="#4a5561")
 
 

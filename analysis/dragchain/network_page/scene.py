@@ -253,7 +253,8 @@ def page_scene(run: Run) -> PageScene:
         "bowl": {
             "radius": 1e3 * bowl.reach_m,
             "height": 1.2 * surface,
-            "outlines": [(1e3 * outline).round(3).tolist() for outline in bowl.outlines()],
+            "lines": [(1e3 * line).round(3).tolist() for line in bowl.lines(1.2e-3 * surface)],
+            "surface": [(1e3 * line).round(3).tolist() for line in bowl.sections(1e-3 * surface)],
         },
         "surface": surface,
         "media": {

@@ -122,6 +122,10 @@ def probed_height(
     if not inside.any():
         raise TableError(f"a particle of {pitch:g} m does not fit between the walls of the bowl")
     heights = _probe_heights(centre_m, radius_m, pitch, (len(x) // 2, len(y) // 2))
+    if bowl.rim:  # narrower at the surface of the bed
+        on_bed = inside & (heights.ravel() > 0.0)
+        surface = np.full((len(points), 1), np.median(heights.ravel()[on_bed]))
+        inside = on_bed & (bowl.distance(np.hstack([points, surface])) >= 0.5 * pitch)
     return float(heights.ravel()[inside].mean())
 
 

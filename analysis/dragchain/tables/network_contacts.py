@@ -128,7 +128,7 @@ def contact_rows(
     groups = [
         _particle_particle(known, contacts, friction),
         _mesh(workpiece.select(~workpiece.silent), "particle-workpiece"),
-        *_meshed_bowl(bowl.select(~bowl.silent), float(known.radii.min(initial=np.inf))),
+        *_meshed_bowl(bowl.select(~bowl.silent)),
     ]
     for wall in walls:
         names = vector(f"{wall.name}_force", "n")
@@ -176,12 +176,9 @@ def _mesh(wall: WallContacts, kind: str) -> ContactRows:
     )
 
 
-def _meshed_bowl(bowl: WallContacts, smallest_radius_m: float) -> list[ContactRows]:
-    """Contacts with a meshed bowl.
-
-    A side contact lies as high as a particle's centre, or higher.
-    """
-    low = bowl.point_m[:, 2] < 0.5 * smallest_radius_m
+def _meshed_bowl(bowl: WallContacts) -> list[ContactRows]:
+    """Contacts with a meshed bowl, whose floor is what is less steep than 60 degrees."""
+    low = bowl.normal[:, 2] > 0.5
     return [_mesh(bowl.select(low), "particle-floor"), _mesh(bowl.select(~low), "particle-side")]
 
 

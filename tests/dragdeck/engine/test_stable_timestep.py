@@ -37,9 +37,14 @@ def frame(step: int, overlap_m: float, ranks: int) -> bytes:
 
 
 def checked(
-    folder: Path, overlaps: Sequence[float], ranks: int = 1, **changes: Any
+    folder: Path,
+    overlaps: Sequence[float],
+    ranks: int = 1,
+    code: str = "stable_timestep",
+    screen: str = "",
+    **changes: Any,
 ) -> AcceptanceCheck:
-    """The check of a run in two parts with a frame for each overlap."""
+    """A check of a run in two parts with a frame for each overlap."""
     folder.mkdir(exist_ok=True)
     law = {"modulus_pa": 4e7, "shear_pa": 1e7, "restitution": 0.9, "friction": 0.3}
     case = {
@@ -57,6 +62,7 @@ def checked(
         "contact_moduli": {"particle": law, "bowl": law}, **changes,
     }  # fmt: skip
     (folder / "case.json").write_text(json.dumps(case))
+    (folder / "screen.2.txt").write_text(screen)
     frames = [frame(10 * n + 10, overlap, ranks) for n, overlap in enumerate(overlaps)]
     for part, some in ((1, frames[:2]), (2, frames[2:])):
         (folder / f"particles.{part}.bin").write_bytes(b"".join(some))
@@ -69,7 +75,7 @@ def checked(
         parts,
         ranks,
     )
-    return next(check for check in checks if check.code == "stable_timestep")
+    return next(check for check in checks if check.code == code)
 
 
 def number(check: AcceptanceCheck) -> float:
@@ -94,6 +100,15 @@ def test_what_it_says_is_stable_is(tmp_path: Path) -> None:
     factor = float(check.limit.removeprefix("1; ").split()[0])
     assert factor < 0.5
     assert number(checked(tmp_path, [HEAVY] * 4, timestep_s=0.95 * factor * 2e-4)) < 1
+
+
+def test_particles_that_leave_through_the_top_are_said_to_do_so(tmp_path: Path) -> None:
+    screen = "  orthogonal box = (-0.1 -0.1 0) to (0.1 0.1 0.35)\nERROR: Lost atoms 2 -> 1\n"
+    for gap, words in ((0.3, False), (0.36, True)):
+        check = checked(tmp_path, [LIGHT] * 3 + [-gap], code="no_engine_error", screen=screen)
+        assert (check.passed, check.reason) == (False, "lost_particles")
+        assert ("2 particles fly through the open top" in check.seen) == words
+        assert ("bowl.lid_m" in check.seen) == words
 
 
 def test_an_accepted_step_passes_and_says_so(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ from dragdeck.physics.contact_mechanics import (
     fall_speed,
     hertz_contact_time,
     hertz_overlap,
+    impact_overlap,
     particle_mass,
     rayleigh_time,
     shear_modulus,
@@ -68,3 +69,10 @@ def test_overlap_gives_back_the_force() -> None:
     modulus = effective_modulus(CERAMIC, STEEL)
     overlap = hertz_overlap(2.5, RADIUS, modulus)
     assert 4 / 3 * modulus * math.sqrt(RADIUS) * overlap**1.5 == pytest.approx(2.5)
+
+
+@pytest.mark.parametrize(("speed", "overlap"), [(1.0, 0.032), (2.0, 0.056), (3.0, 0.077)])
+def test_the_overlap_of_an_impact(speed: float, overlap: float) -> None:
+    """Half of the overlap over the radius, in sphere on sphere impacts of soft ceramic."""
+    modulus = 77e6 / (2 * (1 - 0.19**2))
+    assert impact_overlap(2656.0, modulus, speed) == pytest.approx(overlap / 2, rel=0.02)

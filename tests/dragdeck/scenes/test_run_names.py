@@ -48,7 +48,10 @@ PAIRS = {
 DAMPED = {name: {**pair, "rolling_damping": 0.2} for name, pair in PAIRS.items()}
 SIEVE = [[0.005, 0.0], [0.006, 0.4], [0.007, 1.0]]
 OF_REMOVAL = {"law": "archard", "coefficient_m2_n": 1e-15, "target_depth_m": 1e-6}
-REST = {"kind": "rest", "radius_m": 0.01, "bowl_rpm": 20, "start_deg": 5, "revolutions": 0.2}
+BOWL = {"material": "liner", "height_m": 0.1, "facet_size_m": 0.008, "lid_m": 0.07}
+RING = {"kind": "annulus", "radius_m": 0.04, "core_radius_m": 0.006, **BOWL}
+PROFILE = [[0.0, 0.0], [0.024, 0.0], [0.028, 0.01], [0.03, 0.1]]
+REST = {"kind": "rest", "radius_m": 0.023, "bowl_rpm": 20, "start_deg": 5, "revolutions": 0.2}
 EIGHT = {
     "kind": "figure_eight", "radius_m": 0.004, "middle_m": [0.001, 0.0], "direction_deg": 10,
     "loops": 0.5,
@@ -105,6 +108,7 @@ RICH: dict[str, dict[str, Any]] = {
     },
     "one class": {
         "media": {"material": "ceramic", "fill_height_m": 0.02, "sieve": SIEVE},
+        "bowl": RING,
         "motion.path": REST, "motion.speed_m_s": None,
         "motion.spin": {"schedule": [{"until_s": 0.1, "rpm": 30}, {"until_s": 9, "rpm": 50}]},
         "fidelities": {"quick": {**SOFT, "speed_factor": 2.0}}, "fidelity": "quick",
@@ -120,6 +124,7 @@ RICH: dict[str, dict[str, Any]] = {
                 "kind": "ellipsoid", "axes": [1.0, 1.2, 1.4], "spheres": 2}),
             "pyramids": grains("plastic", 0.5, shape={"kind": "tetrahedron", "spheres": 4})}},
         "motion.path": EIGHT, "motion.orientation": "fixed",
+        "bowl": {"kind": "trough", "length_m": 0.06, "width_m": 0.055, **BOWL},
     },
     "waypoints": {
         "media": {"count": 60, "classes": {
@@ -128,6 +133,7 @@ RICH: dict[str, dict[str, Any]] = {
             "stones": grains("plastic", 0.5, shape={"kind": "mesh", "spheres": 2, "points": [
                 [0, 0, 0], [1, 0, 0], [0, 1.2, 0], [0, 0, 1.1], [0.8, 0.8, 0.8]]})}},
         "motion.path": WAYPOINTS, "motion.speed_m_s": None,
+        "bowl": {"kind": "revolved", "profile_m": PROFILE, **BOWL},
     },
     "line": {
         "media": {"material": "ceramic", "count": 60, "radius_mean_m": 3e-3},
@@ -135,6 +141,7 @@ RICH: dict[str, dict[str, Any]] = {
             "kind": "mesh", "file": "shaft.step", "unit": "mm", "axis": "+x", "facet_size_m": 0.003,
             "edge_facet_size_m": 0.002},
         "motion.path": LINE,
+        "bowl.lid_m": 0.07,
         "fidelity": {**SOFT, "soft_start": {"youngs_modulus_scale": 1e-3}},
     },
 }  # fmt: skip
@@ -142,7 +149,13 @@ RICH: dict[str, dict[str, Any]] = {
 TOLD_APART_BY = ("kind", "file", "law")
 """Fields that are not changed alone: a kind of block has other fields."""
 
-BOUND = (f"sieve.{len(SIEVE) - 1}.1", "contact.rolling_model", "fidelity.speed_factor")
+BOUND = (
+    *(f"profile_m.{point}" for point in ("0.0", "0.1", "1.1", "3.0", "3.1")),
+    "bowl.height_m",
+    f"sieve.{len(SIEVE) - 1}.1",
+    "contact.rolling_model",
+    "fidelity.speed_factor",
+)
 """Fields that others bind: the last sieve passes all, rolling_damping requires epsd, windows
 forbid a faster workpiece. Another study has the last two."""
 
@@ -154,6 +167,7 @@ UNCHANGED = {
     "drop_test": {"filling", "process", "lead", "window"},
     "media.count": {"drop_test"},
     "bowl": {"drop_test"},
+    "bowl.lid_m": {"drop_test", "filling"},
     "pairs.ceramic-ceramic": {"drop_test"},
     "seed": {"drop_test"},
     "compound": {"drop_test"},
@@ -393,7 +407,7 @@ def test_the_rich_studies_have_every_field(written: tuple[Path, dict[str, Any]])
         data = {key: value for key, value in small.items() if key not in ("media", "contact")}
         put(data := copy.deepcopy(data), copy.deepcopy(changes))
         plain = validate(data, file).model_dump(mode="json")
-        values = dict(leaves(plain))
+        values = {"bowl.kind": "cylinder", **dict(leaves(plain))}
         for field in values:
             block = field.rpartition(".")[0]
             kinds = [values.get(f"{'.'.join(block.split('.')[:depth])}.kind", "")

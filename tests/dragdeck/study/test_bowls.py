@@ -34,12 +34,13 @@ def test_the_mesh_leaves_the_space_between_the_walls_clear(name: str) -> None:
     shape = bowl(name)
     mesh, inside = shape.mesh(0.06, 0.004), shape.container
     top = mesh.vertices[mesh.vertices[:, 2] > 0.059, :2]
-    assert -0.0002 < inside.side_distance(top).min() <= inside.side_distance(top).max() < 1e-9
+    assert -0.0002 < inside.side_distance(top).min() <= inside.side_distance(top).max() < 2e-5
     assert mesh.bounds[0, 2] == 0 and mesh.bounds[1, 2] == pytest.approx(0.06)
     area = (mesh.area_faces * mesh.face_normals[:, 2]).sum()
-    assert area == pytest.approx(inside.levels[0][1], rel=0.03)  # the floor faces up
+    assert area == pytest.approx(inside.levels[-1][1], rel=0.03)  # the floor faces up
     inwards = -(mesh.face_normals * mesh.triangles_center)[:, :2].sum(axis=1)
-    outer = np.hypot(*mesh.triangles_center[:, :2].T) > 0.02
+    away = np.hypot(*mesh.triangles_center[:, :2].T)
+    outer = away > 0.8 * away.max()
     assert (inwards[outer] > -1e-12).all()
     rim = mesh.edges_unique[np.bincount(mesh.edges_unique_inverse) == 1]
     assert mesh.vertices[rim][:, :, 2].min() == pytest.approx(0.06)  # closed at the bottom

@@ -57,7 +57,8 @@ def check_run(
         That were asked for.
     """
     screens = [_text(folder / f"screen.{part.part}.txt") for part in parts]
-    checks = [_ended(screens[-1], exit_status), _no_errors(screens[-1])]
+    fled = _through_the_top(folder, outputs, parts, screens[-1])
+    checks = [_ended(screens[-1], exit_status), _no_errors(screens[-1], fled)]
     checks += [_packing(folder / mark, inputs.media.n_spheres, ranks) for mark in inputs.marks]
     if inputs.settled is not None:
         checks.append(_at_rest(screens[-1]))
@@ -112,11 +113,33 @@ def _ended(screen: str, exit_status: int) -> AcceptanceCheck:
     return _check("ended", "LIGGGHTS ended normally", passed, seen, "exit status 0, end reached")
 
 
-def _no_errors(screen: str) -> AcceptanceCheck:
+def _no_errors(screen: str, fled: str) -> AcceptanceCheck:
     errors = log.engine_errors(screen)
     seen = "; ".join(errors) or "none"
+    seen += fled if "Lost atoms" in seen else ""
     reason: CheckReason = "lost_particles" if "Lost atoms" in seen else "other"
     return _check("no_engine_error", "no LIGGGHTS error", not errors, seen, "none", reason)
+
+
+def _through_the_top(
+    folder: Path, outputs: Mapping[str, OutputOfRun], parts: Sequence[RunPart], screen: str
+) -> str:
+    """Whether particles of the last frame fly out of the box, in words; empty if none does."""
+    top = log.top_of_box(screen)
+    if top is None or "particles" not in outputs or not (folder / CASE_FILE).is_file():
+        return ""
+    particles = outputs["particles"]
+    *_, rows = [np.empty((0, len(particles.columns))), *some_frames(folder, particles, parts, 2)]
+    names = "z_m", "vz_m_s", "radius_m"
+    z, speed, radius = rows[:, [particles.columns.index(name) for name in names]].T
+    gravity = CaseOfBed.read(folder / CASE_FILE).gravity_m_s2
+    count = int((z + radius + np.maximum(speed, 0.0) ** 2 / (2 * gravity) >= top).sum())
+    if not count:
+        return ""
+    return (
+        f"; in the last frame, {count} particles fly through the open top of the simulation box at "
+        f"{top:.3g} m: use a lid (bowl.lid_m) or a higher bowl (bowl.height_m)"
+    )
 
 
 def _at_rest(screen: str) -> AcceptanceCheck:
@@ -146,15 +169,19 @@ def _packing(file: Path, particles: int, ranks: int) -> AcceptanceCheck:
 def _in_bowl(
     folder: Path, particles: OutputOfRun, parts: Sequence[RunPart], highest_m: float
 ) -> list[AcceptanceCheck]:
-    """Whether every particle of the settled packing lies below the rim; none without a frame."""
+    """Whether the settled packing lies between the walls, below the rim; none without a frame."""
     *_, rows = [np.empty((0, 0)), *some_frames(folder, particles, parts, 2)]
     if not rows.size:
         return []
     z, radius = (particles.columns.index(name) for name in ("z_m", "radius_m"))
     top = float((rows[:, z] + rows[:, radius]).max())
+    centres = rows[:, [particles.columns.index(name) for name in ("x_m", "y_m", "z_m")]]
+    beyond = int((CaseOfBed.read(folder / CASE_FILE).bowl.distance(centres) <= 0).sum())
     seen, limit = f"highest point {top:.4g} m", f"rim of the bowl, {highest_m:.4g} m"
+    seen += f", {beyond} particles beyond a wall" if beyond else ""
     name = "packing within the bowl"
-    return [_check("packing_in_bowl", name, top <= highest_m, seen, limit, number=top)]
+    passed = top <= highest_m and not beyond
+    return [_check("packing_in_bowl", name, passed, seen, limit, number=top)]
 
 
 def _samples(folder: Path, output: OutputOfRun, parts: Sequence[RunPart]) -> list[log.Sample]:

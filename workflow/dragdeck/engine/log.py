@@ -16,6 +16,12 @@ def engine_errors(screen: str) -> list[str]:
     return list(dict.fromkeys(re.findall(line, screen, flags=re.MULTILINE)))
 
 
+def top_of_box(screen: str) -> float | None:
+    """Height of the top of the simulation box, m; None if LIGGGHTS did not state it."""
+    box = re.search(r"orthogonal box = \(.*\) to \(\S+ \S+ (\S+)\)", screen)
+    return float(box[1]) if box else None
+
+
 def reached_end(screen: str) -> bool:
     """Whether LIGGGHTS came to the last line of the input script."""
     return re.search(f"^{END}$", screen, flags=re.MULTILINE) is not None

@@ -2,8 +2,10 @@
 
 import math
 
+from dragdeck.cases.bed import particle_material
 from dragdeck.cases.case import Case, of_each_workpiece
 from dragdeck.cases.ranks import cores_here
+from dragdeck.physics.contact_mechanics import effective_modulus, impact_overlap
 from dragdeck.scenes.filling import MOST_OVERLAP, expected_bed, floor_overlap, rank_split
 from dragdeck.scenes.workpiece import clearances, closest, describe, fastest_surface, in_diameters
 from dragdeck.study.contact_law import compared_labels
@@ -28,6 +30,7 @@ def workpiece_notes(case: Case) -> list[tuple[str, str]]:
         ("gap between workpiece and floor", _gap(case, gaps.floor_m)),
         *_between(case),
         ("highest surface speed of the workpiece", _speed(case)),
+        ("overlap of impacts", _impact(case)),
         ("bed height", f"{1e3 * bed.surface_m:.3g} mm, +- {1e3 * bed.margin_m:.2g} mm (estimate)"),
         *_rotation(case),
     ]
@@ -65,6 +68,26 @@ def _speed(case: Case) -> str:
     speed, factor = fastest_surface(case), case.study.chosen_fidelity().speed_factor
     faster = "" if factor == 1 else f", {factor * speed:.3g} m/s in the run (speed_factor)"
     return f"{speed:.3g} m/s{faster}"
+
+
+_SOFT_IMPACT = 0.025
+"""Overlap of an impact over the diameter from which numbers and forces of single contacts are said
+to depend on the reduced modulus; an assumption."""
+
+
+def _impact(case: Case) -> str:
+    """Overlap of two particles that meet at the speed of the workpiece."""
+    scale = case.study.chosen_fidelity().youngs_modulus_scale
+    particle = particle_material(case.study)
+    modulus = effective_modulus(particle, particle, scale)
+    overlap = impact_overlap(particle.density_kg_m3, modulus, case.axis_speed_m_s)
+    text = f"{100 * overlap:.2g} % of a diameter, if two particles meet at the speed of the path"
+    if overlap < _SOFT_IMPACT or scale == 1:
+        return text
+    return (
+        f"{text}: numbers and forces of single contacts differ from those at the physical modulus "
+        "more than the drag does"
+    )
 
 
 def bed_notes(case: Case) -> list[tuple[str, str]]:

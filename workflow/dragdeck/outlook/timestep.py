@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dragdeck.cases.bed import full_stiffness_number, particle_material, smallest_radius
+from dragdeck.cases.bed import bed_density, particle_material, smallest_radius, tip_pressure
 from dragdeck.cases.case import Case
 from dragdeck.errors import Caution, InputError
 from dragdeck.physics.contact_mechanics import (
@@ -20,7 +20,9 @@ from dragdeck.physics.contact_mechanics import (
     hertz_contact_time,
     particle_mass,
     rayleigh_time,
+    stiffness_number,
 )
+from dragdeck.physics.estimates import SOLID_FRACTION_ESTIMATE
 from dragdeck.physics.rounding import rounded
 from dragdeck.records.stability import RestitutionErrors, stability_map, stable_step_law
 from dragdeck.scenes.scene import Regime, SceneType, StudyScene
@@ -179,6 +181,10 @@ def timestep_notes(case: Case, kind: SceneType, scene: StudyScene) -> list[tuple
 # --- stability of contacts -----------------------------------------------------------------------
 
 
+_MOMENTUM = 0.08
+"""Part of the dynamic pressure of the bed, its density times the square of the speed, that adds to
+the weight of the bed above the tip: from runs at 0.3 to 3 m/s (docs/evidence/stability.md)."""
+
 _DOUBT = 2.0
 """Standard deviations about the law within which a run may pass or not."""
 
@@ -194,7 +200,9 @@ def stable_fraction(case: Case, margin: float = 0.0) -> float:
     """
     study, law = case.study, stable_step_law()
     softer = study.chosen_fidelity().youngs_modulus_scale ** (2 / 3)
-    kappa = softer * full_stiffness_number(study)
+    density = SOLID_FRACTION_ESTIMATE * bed_density(study)
+    pressure = tip_pressure(study) + _MOMENTUM * density * case.axis_speed_m_s**2
+    kappa = softer * stiffness_number(particle_material(study), pressure)
     restitution = study.pair(study.media.main_material, study.media.main_material).restitution
     spread = study.media.typical_std_m / study.media.typical_radius_m
     return law.largest_fraction(kappa, restitution, spread, math.exp(margin))

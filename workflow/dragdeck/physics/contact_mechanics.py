@@ -170,6 +170,16 @@ def bed_overlap(modulus_pa: float, pressure_pa: float) -> float:
     return hertz_overlap(force, 0.25, modulus_pa)  # of particles with a diameter of 1
 
 
+def impact_overlap(density_kg_m3: float, modulus_pa: float, speed_m_s: float) -> float:
+    """Largest overlap of two equal spheres in an elastic impact, over their diameter.
+
+    ``(15 m v^2 / (16 E* sqrt(R)))^(2/5)`` with effective mass, radius and modulus (Johnson 1985,
+    eq. 11.23); the size of the spheres cancels.
+    """
+    mass = sphere_mass(0.5, density_kg_m3) / 2
+    return float((15 * mass * speed_m_s**2 / (16 * modulus_pa * math.sqrt(0.25))) ** 0.4)
+
+
 def stiffness_number(material: Solid, pressure_pa: float) -> float:
     """How stiff particles are against the pressure on them: (E / ((1 - nu^2) p))^(2/3).
 

@@ -149,7 +149,7 @@ def room_to_insert(reaches_m: Floats, bowl: Container) -> float:
         )
     volume = float((4 / 3 * reaches_m**3).sum())
     radius = math.sqrt(bowl.levels[-1][1] / math.pi)  # of a circle as wide
-    return 2 * largest + volume / (_INSERTED_FRACTION * (radius - largest) ** 2)
+    return bowl.rim_m + 2 * largest + volume / (_INSERTED_FRACTION * (radius - largest) ** 2)
 
 
 def primes(seed: int, count: int) -> list[int]:
@@ -188,7 +188,7 @@ def _sites(count: int, bowl: Container, largest_m: float) -> Floats:
         )
     layer = np.concatenate(rows)
     layers = -(-count // len(layer))
-    heights = np.repeat(_SPACING * largest_m + step * np.arange(layers), len(layer))
+    heights = np.repeat(bowl.rim_m + _SPACING * largest_m + step * np.arange(layers), len(layer))
     return np.column_stack([np.tile(layer, (layers, 1)), heights])[:count]
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import PositiveFloat
 
 from dragdeck.arrays import Floats
-from dragdeck.documents import Part
+from dragdeck.documents import Part, omitted
 
 _AXES = {"xplane": 0, "yplane": 1, "zplane": 2}
 
@@ -21,35 +21,40 @@ _SIDES = 120
 
 
 class Wall(Part):
-    """A plane, or an upright cylinder about the z axis, without end.
+    """A plane, or an upright cylinder about the z axis, without end; or a part of a cone.
 
     Attributes
     ----------
     name : str
         In the input script.
     shape : str
-        Its name in LIGGGHTS.
+        Its name in LIGGGHTS, which has no ``cone``: there, the wall is a part of the mesh.
     at_m : float
         Coordinate of the plane, or radius of the cylinder.
     inwards : int
         1 if the particles are at larger coordinates, or outside of the cylinder; otherwise -1.
+    ends_m : tuple of 4 floats
+        Of a cone: radius and height of one end, then of the other.
     """
 
     name: str
-    shape: Literal["xplane", "yplane", "zplane", "zcylinder"]
-    at_m: float
-    inwards: Literal[1, -1]
+    shape: Literal["xplane", "yplane", "zplane", "zcylinder", "cone"]
+    at_m: float = omitted(0.0)
+    inwards: Literal[1, -1] = 1
+    ends_m: tuple[float, float, float, float] | None = omitted(None)
 
     @property
     def upright(self) -> bool:
         """Whether it is neither floor nor lid."""
-        return self.shape != "zplane"
+        return self.shape not in ("zplane", "cone")
 
     def contacts(self, centre_m: Floats) -> tuple[Floats, Floats]:
         """Distances, (N,), and normals into the bowl, (N, 3), of (N, 3) points.
 
-        Distances are negative beyond the wall.
+        Distances are negative beyond the wall, but for a cone.
         """
+        if self.ends_m is not None:
+            return _from_cone(centre_m, np.array(self.ends_m))
         normal = np.zeros_like(centre_m)
         if self.shape in _AXES:
             axis = _AXES[self.shape]
@@ -61,31 +66,51 @@ class Wall(Part):
         return self.inwards * (place - self.at_m), normal
 
 
+def _from_cone(centre_m: Floats, ends_m: Floats) -> tuple[Floats, Floats]:
+    """Distances of points from a cone, and normals away from it."""
+    begin, along = ends_m[:2], ends_m[2:] - ends_m[:2]
+    radius = np.linalg.norm(centre_m[:, :2], axis=1)
+    place = np.column_stack([radius, centre_m[:, 2]])
+    share = np.clip((place - begin) @ along / (along @ along), 0.0, 1.0)
+    away = place - begin - share[:, None] * along
+    distance = np.linalg.norm(away, axis=1)
+    across, up = (away / np.maximum(distance, 1e-300)[:, None]).T
+    normal = centre_m.copy()
+    normal[:, :2] *= (across / np.maximum(radius, 1e-300))[:, None]
+    normal[:, 2] = up
+    return distance, normal
+
+
 class Container(Part):
     """The space that particles can be in.
 
     Attributes
     ----------
     walls : tuple of Wall
-        Those that hold the particles before they fall, and, unless there is a mesh with another
-        shape, afterwards.
     half_widths_m : (float, float)
         Largest x and y within the walls.
     clear_m : float
         Radius of the widest sphere that fits between the upright walls.
     levels : tuple of (float, float)
         Heights, m, and areas of the horizontal section, m2, linear between them.
+    rim : tuple of Wall
+        Of a bowl whose width varies with height: the upright walls above its rim, between which
+        the particles start.
+    rim_m : float
+        Height from which these hold.
     """
 
     walls: tuple[Wall, ...]
     half_widths_m: tuple[PositiveFloat, PositiveFloat]
     clear_m: PositiveFloat
     levels: tuple[tuple[float, float], ...]
+    rim: tuple[Wall, ...] = omitted(())
+    rim_m: float = omitted(0.0)
 
     @property
     def upright(self) -> list[Wall]:
-        """All walls but floor and lid."""
-        return [wall for wall in self.walls if wall.upright]
+        """All walls but floor and lid; those of the rim, if the width varies with height."""
+        return [wall for wall in self.rim or self.walls if wall.upright]
 
     @property
     def round(self) -> bool:
@@ -106,12 +131,28 @@ class Container(Part):
     @property
     def reach_m(self) -> float:
         """Distance of the farthest point from the z axis."""
-        radii = [wall.at_m for wall in self.walls if wall.shape == "zcylinder"]
-        return max(radii) if radii else math.hypot(*self.half_widths_m)
+        return self.half_widths_m[0] if self.round else math.hypot(*self.half_widths_m)
 
     def side_distance(self, place_m: Floats) -> Floats:
-        """Distance of (N, 2) or (N, 3) points from the nearest upright wall, (N,), m."""
+        """Distance of (N, 2) points from the nearest upright wall, (N,), m."""
         return np.asarray(np.min([wall.contacts(place_m)[0] for wall in self.upright], axis=0))
+
+    def distance(self, place_m: Floats) -> Floats:
+        """Distance of (N, 3) points from the nearest wall but a flat floor and a lid, (N,), m.
+
+        Negative outside.
+        """
+        radius, height = np.hypot(*place_m[:, :2].T), place_m[:, 2]
+        each, farther = [self.side_distance(place_m)], np.zeros(len(place_m), dtype=np.int64)
+        for wall in self.walls:
+            if wall.ends_m is not None:
+                r, z, end_r, end_z = wall.ends_m
+                at = r + (height - z) / (end_z - z or 1.0) * (end_r - r)
+                farther += (height >= min(z, end_z)) & (height < max(z, end_z)) & (at > radius)
+                each.append(wall.contacts(place_m)[0])
+        nearest = np.min(each, axis=0)
+        outside = (height < self.rim_m) & (farther % 2 == 0)
+        return np.asarray(np.where(outside, -np.abs(nearest), nearest))
 
     def volume_m3(self, height_m: float) -> float:
         """Volume up to a height."""
@@ -150,16 +191,37 @@ class Container(Part):
         missing = np.clip(high, -hole, hole) - np.clip(low, -hole, hole)
         return np.asarray(np.maximum(high - low, 0.0) - missing)
 
-    def outlines(self) -> Iterator[Floats]:
-        """Closed lines around and within the horizontal section, (N, 2), m: the outer one first."""
+    def sections(self, height_m: float) -> list[Floats]:
+        """Closed lines around the section at a height, (N, 2), m: the outermost first."""
+        if not self.round:
+            corners = [[1, 1], [-1, 1], [-1, -1], [1, -1], [1, 1]]
+            return [np.array(corners) * self.half_widths_m]
         angle = np.linspace(0.0, math.tau, _SIDES + 1)
         circle = np.column_stack([np.cos(angle), np.sin(angle)])
-        if any(wall.shape == "xplane" for wall in self.walls):
-            corners = [[1, 1], [-1, 1], [-1, -1], [1, -1], [1, 1]]
-            yield np.array(corners) * self.half_widths_m
-        for wall in sorted(self.upright, key=lambda wall: wall.inwards):
-            if wall.shape == "zcylinder":
-                yield wall.at_m * circle
+        radii = [wall.at_m for wall in self.upright]
+        if self.rim and height_m < self.rim_m:
+            ends = [wall.ends_m for wall in self.walls if wall.ends_m is not None]
+            radii = [
+                r + (height_m - z) / (end_z - z) * (end_r - r)
+                for r, z, end_r, end_z in ends
+                if min(z, end_z) <= height_m < max(z, end_z)
+            ]
+        return [radius * circle for radius in sorted(radii, reverse=True)]
+
+    def lines(self, height_m: float) -> Iterator[Floats]:
+        """Its edges up to a height, and lines up its walls, (N, 3), m."""
+        ends = [wall.ends_m for wall in self.walls if wall.ends_m is not None]
+        heights = {0.0, height_m, *(end[3] for end in ends if end[3] < height_m)}
+        for z in sorted(heights):
+            for outline in self.sections(z):
+                yield np.insert(outline, 2, z, axis=1)
+        for start in np.linspace(0, 1, 4, endpoint=False):
+            for r, z, end_r, end_z in ends:
+                ray = np.array([math.cos(math.tau * start), math.sin(math.tau * start)])
+                yield np.array([[*(r * ray), z], [*(end_r * ray), end_z]])
+            for outline in self.sections(0.0) if not ends else ():
+                point = outline[round(start * (len(outline) - 1))]
+                yield np.array([[*point, 0.0], [*point, height_m]])
 
 
 def round_container(radius_m: float) -> Container:

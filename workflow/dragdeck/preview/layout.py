@@ -95,8 +95,8 @@ class CaseLayout:
     ----------
     bowl, bed : Trimesh
         The inside of the bowl, and the expected surface of the bed.
-    outlines : sequence of (N, 2) array
-        Closed lines around the section of the bowl.
+    lines : sequence of (N, 3) array
+        Edges of the bowl, and lines up its walls.
     bowl_reach_m, bowl_height_m, surface_m : float
     bowl_turn : int
         Sense of the bowl's rotation: 1 counter-clockwise from above, -1, 0 for none.
@@ -105,7 +105,7 @@ class CaseLayout:
 
     bowl: "Trimesh"
     bed: "Trimesh"
-    outlines: Sequence[Floats]
+    lines: Sequence[Floats]
     bowl_reach_m: float
     bowl_height_m: float
     surface_m: float
@@ -123,11 +123,10 @@ def layout(case: Case) -> CaseLayout:
     """
     study = case.study
     inside, level = study.bowl.container, expected_bed(study).surface_m
-    outlines = list(inside.outlines())
     return CaseLayout(
         bowl=study.bowl.mesh(study.bowl.height_m, inside.clear_m / 10),
-        bed=_section(outlines, level),
-        outlines=outlines,
+        bed=_section(inside.sections(level), level),
+        lines=list(inside.lines(study.bowl.height_m)),
         bowl_reach_m=inside.reach_m,
         bowl_height_m=study.bowl.height_m,
         surface_m=level,

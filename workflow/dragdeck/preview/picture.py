@@ -87,10 +87,8 @@ def _draw(axes: "Axes", view: Projection, layout: CaseLayout, layers: Sequence[_
         _paint(axes, view, layer)
     for name in _WORDS:
         axes.fill([], [], color=COLOURS[name], label=_WORDS[name])
-    for height, name in ((layout.surface_m, "bed"), (layout.bowl_height_m, "bowl"), (0.0, "bowl")):
-        for outline in layout.outlines:
-            points = np.column_stack([outline, np.full(len(outline), height)])
-            _line(axes, view, points, _darker(name), lw=1.2)
+    for line in layout.lines:
+        _line(axes, view, line, _darker("bowl"), lw=1.2)
     for body in layout.workpieces:
         for stage in body.stages:
             style = {"ls": _DASHES.get(stage.name, "solid"), "label": stage.name}

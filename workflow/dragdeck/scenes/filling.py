@@ -1,7 +1,7 @@
 """The fill: the particles fall into the bowl and come to rest."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import combinations_with_replacement, product
@@ -33,7 +33,9 @@ from dragdeck.cases.case import Case
 from dragdeck.decks import outputs
 from dragdeck.decks.deck import Body, Deck, LeftOut, Scene, data_file
 from dragdeck.errors import Caution, InputError
+from dragdeck.mesh.files import stl_text
 from dragdeck.physics.contact_mechanics import (
+    ENGINE_NEIGHBOURS,
     bed_overlap,
     bed_pressure,
     effective_modulus,
@@ -115,7 +117,7 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
     check_steps = max(1, math.ceil(_CHECK_INTERVAL_S / dt))
     top, start = box_top(study), _start(study)
     longest = study.filling.max_time_s
-    types = _filling_types(study)
+    types, meshed = _filling_types(study), bool(study.bowl.container.rim)
     deck = FillingDeck(
         title=f"Filling: {study.title}",
         study=case.study_name,
@@ -140,6 +142,7 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
         check_steps=check_steps,
         most_checks=math.ceil(longest / (check_steps * dt)),
         max_time_s=longest,
+        neighbours=max(ENGINE_NEIGHBOURS, bowl_neighbours(study) if meshed else 0),
         clumped=study.media.clumped,
         insertions=body_sizes(study),
         seeds=primes(study.seed, 3 * MOST_SIZES * len(study.media.parts)),
@@ -161,7 +164,10 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
             limits=bed_limits(study, top, start.fastest_m_s),
         ),
         steps=round(expected_time(study) / dt),
-        files={"particles.data": lambda: _particles_data(study, top, len(types))},
+        files={
+            "particles.data": lambda: _particles_data(study, top, len(types)),
+            **(bowl_files(study, top) if meshed else {}),
+        },
         models={
             **_models(study),
             "settling by a criterion": f"kinetic energy below {study.filling.energy_ratio:g} m "
@@ -175,12 +181,13 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
             "contact output": LeftOut(
                 "contacts before the drag are not analysed", "filling_contacts"
             ),
-            "facets of the bowl": LeftOut(
-                "particles settle in the same way on an exact plane and cylinder"
-            ),
+            **({} if meshed else {"facets of the bowl": LeftOut(_SETTLE_ALIKE)}),
         },
         warnings=list(filling_cautions(case)),
     )
+
+
+_SETTLE_ALIKE = "particles settle in the same way on exact planes and cylinders"
 
 
 def _filling_types(study: Study) -> list[str]:
@@ -457,6 +464,25 @@ def _size_cautions(study: Study) -> Iterator[Caution]:
         )
 
 
+def bowl_neighbours(study: Study) -> int:
+    """More facets of the bowl, at least 0.4 size^2 each, than a particle in a corner reaches."""
+    size = study.bowl_facet_size_m
+    if size is None:
+        return 0
+    reach_m = farthest_point(study) + skin(study) + 2 * size
+    return math.ceil(3 * math.pi * reach_m**2 / (0.4 * size**2))
+
+
+def bowl_files(study: Study, top_m: float) -> dict[str, Callable[[], str]]:
+    """The bowl as a mesh, if the study asks for facets or its width varies with height."""
+    size = study.bowl_facet_size_m
+    if size is None:
+        return {}
+    height = 0.99 * top_m if study.bowl.container.rim else min(study.bowl.height_m, 0.99 * top_m)
+    mesh = study.bowl.mesh(height, size)
+    return {"bowl.stl": lambda: stl_text(mesh)}
+
+
 def bed_limits(study: Study, top_m: float, speed_m_s: float) -> RunLimits:
     """Limits of a run with the whole bed in a box of that height."""
     mass = particle_mass(particle_material(study), study.media.typical_radius_m)
@@ -502,7 +528,7 @@ def _particles_data(study: Study, top_m: float, types: int) -> str:
 
 
 _NOT_READ = (
-    *("bowl.facet_size_m", "drop_test", "motion", "outputs", "workpiece", "workpieces"),
+    *("bowl.lid_m", "drop_test", "motion", "outputs", "workpiece", "workpieces"),
     *("fidelity.filling_youngs_modulus_scale", "fidelity.soft_start", "fidelity.speed_factor"),
     *("fidelity.timestep_fraction", "fidelity.windows"),
 )
@@ -512,7 +538,8 @@ _NOT_READ = (
 def _content(case: Case) -> Json:
     """What a filling depends on."""
     study = case.of_filling.study
-    content = without_fields(study.of_runs(study.bowl.material), *_NOT_READ)
+    exact = () if study.bowl.container.rim else ("bowl.facet_size_m",)
+    content = without_fields(study.of_runs(study.bowl.material), *_NOT_READ, *exact)
     return {**content, "types": len(study.type_names())}
 
 

@@ -1,17 +1,11 @@
 """The process: the workpiece plunges into the settled bed and is dragged along its path."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from functools import partial
 
-from dragdeck.cases.bed import (
-    bed_rayleigh_time,
-    bed_timestep,
-    buoyancy_density,
-    farthest_point,
-    skin,
-)
+from dragdeck.cases.bed import bed_rayleigh_time, bed_timestep, buoyancy_density, skin
 from dragdeck.cases.case import Case, Stretch, mesh_file, of_each_workpiece
 from dragdeck.decks import PACKING_FILE, WORKPIECE_MESH, outputs
 from dragdeck.decks.deck import NOT_OF_LIQUID, LeftOut, Scene
@@ -31,6 +25,8 @@ from dragdeck.scenes.drop_test import DROP_TEST
 from dragdeck.scenes.filling import (
     FILLING,
     bed_limits,
+    bowl_files,
+    bowl_neighbours,
     box_top,
     expected_bed,
     partners_in_bed,
@@ -76,6 +72,7 @@ from dragdeck.scenes.workpiece import (
     workpiece_reach,
 )
 from dragdeck.study.base import Json, without_fields
+from dragdeck.study.bowls.bowl import LID
 from dragdeck.study.contact_law import coefficient_words
 from dragdeck.study.drive import Drive
 from dragdeck.study.model import Study
@@ -125,7 +122,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
     types, parts = study.type_names(), rank_split(whole)
     materials = material_table(study, types, fidelity.youngs_modulus_scale, whole)
     bowl = study.bowl.closed
-    primitive = tuple(wall for wall in bowl.walls if not facets or wall.name == "lid")
+    primitive = tuple(wall for wall in bowl.walls if not facets or wall.name == LID)
     touches = study.outputs.first_touch_fraction if steps.end == drag.end else 0.0
     deck = ProcessDeck(
         title=study.title,
@@ -141,7 +138,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         skin_m=skin(study),
         timestep_s=dt,
         rayleigh_time_s=bed_rayleigh_time(study),
-        neighbours=max(ENGINE_NEIGHBOURS, _bowl_neighbours(study), *counts),
+        neighbours=max(ENGINE_NEIGHBOURS, bowl_neighbours(study), *counts),
         outputs=_outputs(
             periods,
             drag,
@@ -186,7 +183,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         ),
         steps=steps.end - steps.entry,
         facets=sum(counts),
-        files=files if number else {**models, **_bowl_files(study, top)},
+        files=files if number else {**models, **bowl_files(study, top)},
         models=_models(study),
         leaves_out=_leaves_out(study),
         warnings=[*_cautions(each), *rank_warnings(parts)],
@@ -356,30 +353,14 @@ def _fastest(case: Case, way: Course) -> float:
     return max(speeds)
 
 
-def _bowl_neighbours(study: Study) -> int:
-    """More facets of the bowl, at least 0.4 size^2 each, than a particle in a corner reaches."""
-    size = study.bowl_facet_size_m
-    if size is None:
-        return 0
-    reach_m = farthest_point(study) + skin(study) + 2 * size
-    return math.ceil(3 * math.pi * reach_m**2 / (0.4 * size**2))
-
-
-def _bowl_files(study: Study, top_m: float) -> dict[str, Callable[[], str]]:
-    """The bowl as a mesh, if the study asks for facets."""
-    size = study.bowl_facet_size_m
-    if size is None:
-        return {}
-    mesh = study.bowl.mesh(min(study.bowl.height_m, 0.99 * top_m), size)
-    return {"bowl.stl": lambda: stl_text(mesh)}
-
-
 def _models(study: Study) -> dict[str, str]:
     optional, superposed = coefficient_words(study.pairs.values())[0], study.motion.superposed()
     exact, why = study.bowl_facet_size_m is None, "facets, as requested"
     if study.motion.bowl_rad_s:
         why = "facets, whose surface moves with the rotation"
-    bowl = "exact plane and cylinder" if exact else why
+    if study.bowl.container.rim:
+        why = "facets, because its width varies with height"
+    bowl = "exact planes and cylinders" if exact else why
     return {
         "particle-particle, particle-workpiece, particle-bowl": "force chains run through all",
         f"bowl: {bowl}": "force chains end there; the force on each particle gives its contacts",

@@ -19,6 +19,7 @@ from dragdeck.cases.bed import (
     JUST_BEYOND,
     bed_timestep,
     box_half_widths,
+    expected_surface,
     farthest_point,
     full_stiffness_number,
     impact_time,
@@ -325,6 +326,9 @@ _FEWEST_STEPS_PER_CONTACT = 5
 _PLACES_PER_LEG = 500
 """At which the distance of two workpieces is compared."""
 
+_SIDES, _HEIGHTS = 12, 9
+"""Points around a workpiece, and heights, at which its gap to a sloping wall is measured."""
+
 JAMMING_GAP = 2.0
 """Particle diameters between workpiece and bowl below which a warning is given: in a narrower gap,
 an arch of two particles can block the workpiece (docs/development/liggghts.md)."""
@@ -369,7 +373,8 @@ def _wall_gap(case: Case) -> float:
     """
     motion, bowl = case.study.motion, case.study.bowl.container
     begin, plunge = motion.path.start_point, plunge_point(motion)
-    if bowl.round and motion.tilt_deg and motion.path.one_side_inwards(motion.orientation):
+    one_side = motion.tilt_deg and motion.path.one_side_inwards(motion.orientation)
+    if one_side and bowl.round and not bowl.rim:
         angle, outline = motion.path.direction_rad, _in_bed(case).T
         turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
         around = np.concatenate([outline @ turn + place for place in (begin, plunge)])
@@ -377,7 +382,16 @@ def _wall_gap(case: Case) -> float:
     entry = np.linspace(plunge, begin, _PLACES_PER_LEG)
     drag = np.atleast_2d(as_rows(motion.path.place(np.linspace(0.0, 1.0, _PLACES_PER_LEG))))
     places = np.concatenate([entry, motion.path.corners[:, :2], drag[:, :2]])
-    return float(bowl.side_distance(places).min()) - workpiece_reach(case)
+    reach, surface = workpiece_reach(case), expected_surface(case.study)
+    if not bowl.rim:
+        return float(bowl.side_distance(places).min()) - reach
+    angle = np.linspace(0.0, math.tau, _SIDES, endpoint=False)
+    around = reach * np.column_stack([np.cos(angle), np.sin(angle)])
+    points = (places[:, None] + around).reshape(-1, 2)
+    return min(
+        float(bowl.distance(np.insert(points, 2, height, axis=1)).min())
+        for height in np.linspace(surface - deepest(motion), surface, _HEIGHTS).tolist()
+    )
 
 
 def may_jam(case: Case, surface_m: float) -> bool:

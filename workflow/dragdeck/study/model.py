@@ -25,6 +25,7 @@ from dragdeck.study.base import (
 )
 from dragdeck.study.bowls.annulus import AnnulusBowl
 from dragdeck.study.bowls.cylinder import CylinderBowl
+from dragdeck.study.bowls.revolved import RevolvedBowl
 from dragdeck.study.bowls.trough import TroughBowl
 from dragdeck.study.calibration import Calibration
 from dragdeck.study.contact_law import Contact, Pair
@@ -55,6 +56,7 @@ AnyBowl = (
     Annotated[CylinderBowl, Tag("cylinder")]
     | Annotated[AnnulusBowl, Tag("annulus")]
     | Annotated[TroughBowl, Tag("trough")]
+    | Annotated[RevolvedBowl, Tag("revolved")]
 )
 """The registry of bowls."""
 
@@ -695,7 +697,7 @@ class Study(Model):
     @property
     def bowl_facet_size_m(self) -> float | None:
         """Edge length of the bowl's facets, m; None for exact walls, which cannot rotate."""
-        if self.bowl.facet_size_m is None and self.motion.bowl_rad_s:
+        if self.bowl.facet_size_m is None and (self.motion.bowl_rad_s or self.bowl.container.rim):
             return 2 * self.media.typical_radius_m
         return self.bowl.facet_size_m
 

@@ -13,6 +13,10 @@ if TYPE_CHECKING:
     from trimesh import Trimesh
 
 
+LID = "lid"
+"""Name of the wall that a lid is."""
+
+
 class Bowl(Model):
     """Block of a study: the bowl, with its lowest point at z = 0."""
 
@@ -42,7 +46,7 @@ class Bowl(Model):
         """With the lid, if there is one."""
         if self.lid_m is None:
             return self.container
-        lid = Wall(name="lid", shape="zplane", at_m=self.lid_m, inwards=-1)
+        lid = Wall(name=LID, shape="zplane", at_m=self.lid_m, inwards=-1)
         return self.container.model_copy(update={"walls": (*self.container.walls, lid)})
 
     @abstractmethod
