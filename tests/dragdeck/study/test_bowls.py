@@ -80,6 +80,21 @@ def test_contacts_with_a_column_and_with_planes() -> None:
     assert overlap == pytest.approx([1e-4, 1e-4])
 
 
+@pytest.mark.parametrize("name", ["revolved", "ring"])
+def test_distances_from_a_revolved_bowl_are_those_from_its_facets(name: str) -> None:
+    import pyvista
+
+    shape = bowl(name)
+    mesh, inside = shape.mesh(0.05, shape.own_facet_size_m or 0.0), shape.container
+    surface = pyvista.PolyData.from_regular_faces(mesh.vertices, mesh.faces)
+    points = np.random.default_rng(1).uniform([-0.05, -0.05, 0.001], [0.05, 0.05, 0.045], (4000, 3))
+    points = points[np.abs(inside.distance(points) - 0.0025) < 0.0015]
+    _, nearest = surface.find_closest_cell(points, return_closest_point=True)
+    away = np.linalg.norm(points - nearest, axis=1)
+    assert len(points) > 200
+    assert inside.distance(points) == pytest.approx(away, abs=1e-5)
+
+
 @pytest.mark.parametrize(
     ("name", "changes", "problem"),
     [
@@ -92,6 +107,10 @@ def test_contacts_with_a_column_and_with_planes() -> None:
         ("trough", {"bowl.width_m": 0.019}, "no particle fits"),
         ("trough", {"bowl.width_m": 0.006}, "room to fall"),
         ("lid", {"bowl.lid_m": 0.02}, "lid is not above"),
+        ("revolved", {"bowl.profile_m": [[0.01, 0], [0.032, 0.05]]}, "not closed at the bottom"),
+        ("revolved", {"bowl.profile_m": [[0, 0], [0.032, 0.04]]}, "must end at the rim"),
+        ("revolved", {"motion.path.radius_m": 0.022}, "no particle fits|does not fit"),
+        ("ring", {"motion.path.radius_m": 0.022}, "no particle fits|does not fit"),
         ("lid", {"bowl.lid_m": 0.2}, "above the rim"),
         ("lid", {"bowl.kind": "bucket"}, "unknown kind"),
     ],

@@ -156,13 +156,10 @@ def bowl(radius_m: float, height_m: float, facet_size_m: float) -> Trimesh:
     return weld(floor + _turned(side))
 
 
-def clear_radius(radius_m: float, facet_size_m: float) -> float:
-    """Distance of the corners from the axis of a polygon whose sides touch the circle, m."""
-    return radius_m / math.cos(math.pi / polygon_sides(radius_m, facet_size_m))
-
-
 def revolved(profile_m: Sequence[tuple[float, float]], facet_size_m: float) -> Trimesh:
     """Turn a line about the z axis, the normals pointing to its left as seen along it.
+
+    The sides of the polygons touch the circles from outside.
 
     Parameters
     ----------
@@ -183,7 +180,8 @@ def revolved(profile_m: Sequence[tuple[float, float]], facet_size_m: float) -> T
     widest = max(radius for radius, _ in points)
     _require_facet_size(facet_size_m, widest, len(points) * facet_size_m)
     sides = polygon_sides(widest, facet_size_m)
-    rings = [_ring(sides, radius, z_m=height) for radius, height in points]
+    wider = 1 / math.cos(math.pi / sides)
+    rings = [_ring(sides, wider * radius, z_m=height) for radius, height in points]
     strips = weld(surface(np.concatenate(rings), _strips(sides, len(points) - 1)))
     degenerate = (strips.faces == np.roll(strips.faces, 1, axis=1)).any(axis=1)
     return _turned(surface(strips.vertices, strips.faces[~degenerate]))

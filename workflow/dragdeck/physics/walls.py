@@ -35,6 +35,8 @@ class Wall(Part):
         1 if the particles are at larger coordinates, or outside of the cylinder; otherwise -1.
     ends_m : tuple of 4 floats
         Of a cone: radius and height of one end, then of the other.
+    sides : int
+        Of a cone, which is a polygon around the circle: the number of its sides.
     """
 
     name: str
@@ -42,6 +44,7 @@ class Wall(Part):
     at_m: float = omitted(0.0)
     inwards: Literal[1, -1] = 1
     ends_m: tuple[float, float, float, float] | None = omitted(None)
+    sides: int = omitted(0)
 
     @property
     def upright(self) -> bool:
@@ -54,7 +57,7 @@ class Wall(Part):
         Distances are negative beyond the wall, but for a cone.
         """
         if self.ends_m is not None:
-            return _from_cone(centre_m, np.array(self.ends_m))
+            return _from_cone(centre_m, np.array(self.ends_m), self.sides)
         normal = np.zeros_like(centre_m)
         if self.shape in _AXES:
             axis = _AXES[self.shape]
@@ -66,19 +69,18 @@ class Wall(Part):
         return self.inwards * (place - self.at_m), normal
 
 
-def _from_cone(centre_m: Floats, ends_m: Floats) -> tuple[Floats, Floats]:
-    """Distances of points from a cone, and normals away from it."""
+def _from_cone(centre_m: Floats, ends_m: Floats, sides: int) -> tuple[Floats, Floats]:
+    """Distances of points from the nearest side of a cone, and normals away from it."""
     begin, along = ends_m[:2], ends_m[2:] - ends_m[:2]
-    radius = np.linalg.norm(centre_m[:, :2], axis=1)
-    place = np.column_stack([radius, centre_m[:, 2]])
+    side = np.floor(np.arctan2(centre_m[:, 1], centre_m[:, 0]) / math.tau * sides)
+    middle = math.tau * (side + 0.5) / sides
+    outwards = np.column_stack([np.cos(middle), np.sin(middle)])
+    place = np.column_stack([(centre_m[:, :2] * outwards).sum(axis=1), centre_m[:, 2]])
     share = np.clip((place - begin) @ along / (along @ along), 0.0, 1.0)
     away = place - begin - share[:, None] * along
     distance = np.linalg.norm(away, axis=1)
     across, up = (away / np.maximum(distance, 1e-300)[:, None]).T
-    normal = centre_m.copy()
-    normal[:, :2] *= (across / np.maximum(radius, 1e-300))[:, None]
-    normal[:, 2] = up
-    return distance, normal
+    return distance, np.column_stack([across[:, None] * outwards, up])
 
 
 class Container(Part):
@@ -143,14 +145,14 @@ class Container(Part):
         Negative outside.
         """
         radius, height = np.hypot(*place_m[:, :2].T), place_m[:, 2]
-        each, farther = [self.side_distance(place_m)], np.zeros(len(place_m), dtype=np.int64)
+        nearest = np.where(height < self.rim_m, np.inf, self.side_distance(place_m))
+        farther = np.zeros(len(place_m), dtype=np.int64)
         for wall in self.walls:
             if wall.ends_m is not None:
                 r, z, end_r, end_z = wall.ends_m
                 at = r + (height - z) / (end_z - z or 1.0) * (end_r - r)
                 farther += (height >= min(z, end_z)) & (height < max(z, end_z)) & (at > radius)
-                each.append(wall.contacts(place_m)[0])
-        nearest = np.min(each, axis=0)
+                nearest = np.minimum(nearest, wall.contacts(place_m)[0])
         outside = (height < self.rim_m) & (farther % 2 == 0)
         return np.asarray(np.where(outside, -np.abs(nearest), nearest))
 

@@ -697,9 +697,10 @@ class Study(Model):
     @property
     def bowl_facet_size_m(self) -> float | None:
         """Edge length of the bowl's facets, m; None for exact walls, which cannot rotate."""
-        if self.bowl.facet_size_m is None and (self.motion.bowl_rad_s or self.bowl.container.rim):
+        size = self.bowl.own_facet_size_m
+        if size is None and self.motion.bowl_rad_s:
             return 2 * self.media.typical_radius_m
-        return self.bowl.facet_size_m
+        return size
 
     def chosen_fidelity(self) -> Fidelity:
         """The settings in ``fidelity``, or those it names; the study's own go before the built-in.

@@ -43,8 +43,8 @@ class AnnulusBowl(Bowl):
         return whole.model_copy(update=ring)
 
     def mesh(self, height_m: float, facet_size_m: float) -> "Trimesh":
-        """The column, the floor and the side, whose polygons leave the exact ring clear."""
-        outer, core = shapes.clear_radius(self.radius_m, facet_size_m), self.core_radius_m
+        """The column, the floor and the side."""
+        outer, core = self.radius_m, self.core_radius_m
         profile = [(core, height_m), (core, 0.0), (outer, 0.0), (outer, height_m)]
         return shapes.revolved(profile, facet_size_m)
 

@@ -42,6 +42,11 @@ class Bowl(Model):
         """Its walls and the space between them."""
 
     @property
+    def own_facet_size_m(self) -> float | None:
+        """Edge length of its mesh elements, m; None if its walls are analytical."""
+        return self.facet_size_m
+
+    @property
     def closed(self) -> Container:
         """With the lid, if there is one."""
         if self.lid_m is None:

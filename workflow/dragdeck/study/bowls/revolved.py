@@ -16,6 +16,9 @@ from dragdeck.study.bowls.bowl import Bowl
 if TYPE_CHECKING:
     from trimesh import Trimesh
 
+_SIDES = 48
+"""Of the polygons that stand for circles, unless the study gives the size of the facets."""
+
 _LEVELS = 60
 """Heights at which the area of the section is computed."""
 
@@ -48,14 +51,20 @@ class RevolvedBowl(Bowl):
         return self
 
     @property
+    def own_facet_size_m(self) -> float:
+        """That of the study, or of a polygon with `_SIDES` sides."""
+        return self.facet_size_m or math.tau * self.profile_m[-1][0] / _SIDES
+
+    @property
     def container(self) -> Container:
         """Cones, and above the rim one or two cylinders."""
         core, rim = self.profile_m[0][0], self.profile_m[-1][0]
+        sides = shapes.polygon_sides(rim, self.own_facet_size_m)
         cylinders = [Wall(name="side", shape="zcylinder", at_m=rim, inwards=-1)]
         if core:
             cylinders.append(Wall(name="core", shape="zcylinder", at_m=core, inwards=1))
         cones = [
-            Wall(name=f"part_{number}", shape="cone", ends_m=(*begin, *end))
+            Wall(name=f"part_{number}", shape="cone", ends_m=(*begin, *end), sides=sides)
             for number, (begin, end) in enumerate(pairwise(self.profile_m), 1)
         ]
         return Container(
@@ -80,9 +89,7 @@ class RevolvedBowl(Bowl):
 
     def mesh(self, height_m: float, facet_size_m: float) -> "Trimesh":
         """The profile, and upright walls above its rim, as polygons around the circles."""
-        rim = self.profile_m[-1][0]
-        wider = shapes.clear_radius(rim, facet_size_m) / rim
-        points = [(wider * radius, height) for radius, height in self.profile_m]
+        points = list(self.profile_m)
         if height_m > self.height_m:
             column = [(points[0][0], height_m)] if points[0][0] else []
             points = [*column, *points, (points[-1][0], height_m)]
