@@ -16,11 +16,14 @@ from plate import engine
 from dragchain import read_dump, write_tables
 from dragchain.tables.by_step import read_table
 from dragchain.tables.run_folder import Run
+from dragdeck.decks.outputs import load_outputs
 from dragdeck.decks.render import write_run
 from dragdeck.decks.templates import environment
+from dragdeck.engine.acceptance import check_run
 from dragdeck.engine.reports import silent
 from dragdeck.engine.run_folder import run
 from dragdeck.project import Project
+from dragdeck.records.run import CaseFile, RunPart
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import PROCESS
 from dragdeck.scenes.scene import read_bed
@@ -50,9 +53,19 @@ def finished(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
     run(filling, silent)
     write_tables(filling)
     write_run(PROCESS.build(case, read_bed(filling / "tables/packing.json")), process, templates)
-    run(process, silent)
+    engine(process)  # which keeps the checkpoints
     write_tables(process)
     return process
+
+
+def test_the_run_is_accepted(finished: Path) -> None:
+    """Of what its files say; there is no screen output."""
+    whole = RunPart(part=1, checkpoint=None, from_step=0)
+    inputs, outputs = CaseFile.read(finished / "case.json"), load_outputs(finished)
+    checks = {check.code: check for check in check_run(finished, inputs, outputs, 0, [whole], 1)}
+    failed = {code: check.seen for code, check in checks.items() if not check.passed}
+    assert not {*failed} - {"ended", "ranks"}, failed
+    assert {"particles_kept", "stable_timestep", "within_limits"} <= {*checks}
 
 
 def test_particles_rest_between_the_walls(finished: Path) -> None:

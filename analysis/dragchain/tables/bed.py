@@ -117,7 +117,8 @@ def probed_height(
         np.arange(-half, half + 1)
         for half in (max(0, int((width - 0.5 * pitch) / pitch)) for width in bowl.half_widths_m)
     )
-    points: Floats = pitch * np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+    grid = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+    points = pitch * grid.astype(np.float64)
     inside = bowl.side_distance(points) >= 0.5 * pitch
     if not inside.any():
         raise TableError(f"a particle of {pitch:g} m does not fit between the walls of the bowl")

@@ -385,9 +385,9 @@ def _wall_gap(case: Case) -> float:
     reach, surface = workpiece_reach(case), expected_surface(case.study)
     if not bowl.rim:
         return float(bowl.side_distance(places).min()) - reach
-    angle = np.linspace(0.0, math.tau, _SIDES, endpoint=False)
-    around = reach * np.column_stack([np.cos(angle), np.sin(angle)])
-    points = (places[:, None] + around).reshape(-1, 2)
+    ring = np.linspace(0.0, math.tau, _SIDES, endpoint=False)
+    outline = reach * np.column_stack([np.cos(ring), np.sin(ring)])
+    points = (places[:, None] + outline).reshape(-1, 2)
     return min(
         float(bowl.distance(np.insert(points, 2, height, axis=1)).min())
         for height in np.linspace(surface - deepest(motion), surface, _HEIGHTS).tolist()
