@@ -357,7 +357,7 @@ def clearances(case: Case, surface_m: float) -> Clearances:
     """Clearances of a case's workpiece in a bed with its surface at this height, m."""
     motion = case.study.motion
     tip = surface_m - motion.immersion_depth_m
-    return Clearances(_wall_gap(case), tip, tip + vertical_range(motion)[0] - dip(case))
+    return Clearances(_wall_gap(case, surface_m), tip, tip + vertical_range(motion)[0] - dip(case))
 
 
 def in_diameters(case: Case, gap_m: float) -> float:
@@ -365,8 +365,11 @@ def in_diameters(case: Case, gap_m: float) -> float:
     return gap_m / (2 * typical_reach(case.study))
 
 
-def _wall_gap(case: Case) -> float:
-    """Narrowest gap between the workpiece and a wall, m; no bed is needed for it.
+def _wall_gap(case: Case, surface_m: float | None = None) -> float:
+    """Narrowest gap between the workpiece and a wall, m.
+
+    Only a bowl whose width varies with height needs the surface of the bed; by default, the
+    expected one.
 
     A tilted workpiece that shows the axis of a round bowl one side all the time is measured where
     it starts, all others as the cylinder of `workpiece_reach`.
@@ -382,7 +385,7 @@ def _wall_gap(case: Case) -> float:
     entry = np.linspace(plunge, begin, _PLACES_PER_LEG)
     drag = np.atleast_2d(as_rows(motion.path.place(np.linspace(0.0, 1.0, _PLACES_PER_LEG))))
     places = np.concatenate([entry, motion.path.corners[:, :2], drag[:, :2]])
-    reach, surface = workpiece_reach(case), expected_surface(case.study)
+    reach, surface = workpiece_reach(case), surface_m or expected_surface(case.study)
     if not bowl.rim:
         return float(bowl.side_distance(places).min()) - reach
     ring = np.linspace(0.0, math.tau, _SIDES, endpoint=False)
