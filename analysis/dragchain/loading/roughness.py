@@ -70,7 +70,7 @@ class Profile:
     def depth_to(self, ra_m: ArrayLike) -> Floats:
         """Depth of removal at which Ra has fallen to a value, any shape, m; 0 where it is lower."""
         depths = np.maximum(self._mean - self._sorted, 0.0)
-        return np.asarray(np.interp(ra_m, 2.0 * self._below, depths))
+        return np.asarray(np.interp(np.asarray(ra_m), 2.0 * self._below, depths))
 
     def level(self, depth_m: ArrayLike) -> Floats:
         """Height at which the peaks are cut, m; below the valleys, all has gone."""
@@ -211,7 +211,8 @@ def fit_measured(roughness: Roughness, profile: Profile) -> RaFit | None:
     fit = least_squares(misfit, start[: 1 if given else 2], method="lm")
     degrees = len(times) - len(fit.x)
     variance = float(fit.fun @ fit.fun) / degrees
-    errors = np.sqrt(np.diag(np.linalg.pinv(fit.jac.T @ fit.jac)) * variance)
+    jacobian = np.asarray(fit.jac, dtype=np.float64)
+    errors = np.sqrt(np.diag(np.linalg.pinv(jacobian.T @ jacobian)) * variance)
     ends = student_quantile(degrees) * errors
     rate, *steady = (
         Estimate(log, log - half, log + half).exp() for log, half in zip(fit.x, ends, strict=True)

@@ -215,7 +215,7 @@ def write_study_report(
         table = summary(studies)
         cases = cases_of(studies)
         removed = [(one, *found) for one in cases if (found := _removed(one))]
-        rough = {one.key: found for one, of, _ in removed if (found := roughness_of(one, of))}
+        rough = {one.key: course for one, of, _ in removed if (course := roughness_of(one, of))}
         signals = _signals(cases, signal)
         picture = file_uri(preview) if preview else None
         page = _render(sections, cases, missing, picture, removed, rough, signals)
@@ -227,8 +227,8 @@ def write_study_report(
                 write_bytes(out_dir / name, section.network.read_bytes())
         assumed = {one.study.process.case.run: one.assumptions for one in sections}
         maps = {f"{one.key}-removal": found.facets for one, found, _ in removed}
-        for key, found in rough.items():
-            maps[f"{key}-removal"] = maps[f"{key}-removal"].join(found.ra)
+        for key, course in rough.items():
+            maps[f"{key}-removal"] = maps[f"{key}-removal"].join(course.ra)
         write_bundle(
             out_dir,
             tables={"summary": table, **maps} | _tables(signals),
