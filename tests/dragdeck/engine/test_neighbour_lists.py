@@ -62,7 +62,7 @@ def contacts(
     flight = 3 * speed * chance.choice([-1.0, 1.0], places.shape) / np.sqrt(3)
     rows = [f"{n} 1 {2 * RADIUS} 2500 {x} {y} {z}" for n, (x, y, z) in enumerate(places, 1)]
     speeds = [f"{n} {u} {v} {w} 0 0 0" for n, (u, v, w) in enumerate(flight, 1)]
-    box = "".join(f"-0.2 0.2 {axis}lo {axis}hi\n" for axis in "xyz")
+    box = "".join(f"-0.04 0.04 {axis}lo {axis}hi\n" for axis in "xyz")
     (folder / "spheres.data").write_text(
         "spheres\n\n216 atoms\n1 atom types\n\n" + box
         + "\n".join(["\nAtoms\n", *rows, "\nVelocities\n", *speeds, ""])
@@ -109,7 +109,7 @@ def test_lists_that_wait_miss_contacts(tmp_path: Path) -> None:
     assert len(seen["late pair"]) > 20
 
 
-@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.long)])
+@pytest.mark.parametrize("ranks", [1, 2])
 @pytest.mark.parametrize("skins", [1.05, 0.5])
 def test_a_mesh_that_moves_by_more_than_the_skin_touches_a_step_late(
     tmp_path: Path, skins: float, ranks: int
