@@ -15,9 +15,8 @@ def soft_study() -> dict[str, Any]:
     data: dict[str, Any] = yaml.safe_load(SMALL_STUDY.read_text())
     for material in data["materials"].values():
         material["youngs_modulus_pa"] = float(material["youngs_modulus_pa"]) / 100
-    data["motion"] |= {"speed_m_s": 0.1, "transient_m": 0.012}
+    data["motion"] |= {"speed_m_s": 0.05, "transient_m": 0.012}
     data["motion"]["path"]["revolutions"] = 1
-    data["workpiece"]["shape"]["facet_size_m"] = 0.003
     data["motion"]["spin"] = {"rpm": 30}
     data["removal"] = {"coefficient_m2_n": COEFFICIENT_M2_N}
     data["outputs"] = {"first_touch_fraction": 0.05}
