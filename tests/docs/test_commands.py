@@ -21,7 +21,7 @@ STUDY = "quickstart"
 WAYPOINTS = "time_s,x_m,y_m\n0,0.02,0\n2,0,0.02\n5,-0.02,0\n"
 """A recorded path that examples name."""
 
-SPEEDS = {"speed_m_s": 0.04, "plunge_speed_m_s": 0.2, "approach_speed_m_s": 0.2}
+SPEEDS = {"speed_m_s": 0.02, "plunge_speed_m_s": 0.2, "approach_speed_m_s": 0.2}
 SHORT = {"motion.path.revolutions": 0.2, **{f"motion.{name}": v for name, v in SPEEDS.items()}}
 """Fields of the study without `--long`."""
 
