@@ -109,7 +109,7 @@ def test_lists_that_wait_miss_contacts(tmp_path: Path) -> None:
     assert len(seen["late pair"]) > 20
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.long)])
 @pytest.mark.parametrize("skins", [1.05, 0.5])
 def test_a_mesh_that_moves_by_more_than_the_skin_touches_a_step_late(
     tmp_path: Path, skins: float, ranks: int
