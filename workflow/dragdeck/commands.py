@@ -23,7 +23,7 @@ from dragdeck.advice.forecast import (
 from dragdeck.cases.bed import clump_of
 from dragdeck.cases.case import Case
 from dragdeck.cases.ranks import check_ranks, cores_here
-from dragdeck.decks.engine_commands import contact_laws
+from dragdeck.script.commands import contact_laws
 from dragdeck.decks.render import (
     changed_scripts,
     deck_text,

@@ -9,7 +9,7 @@ import jinja2
 
 from dragdeck.decks import CASE_FILE, COLUMNS_FILE, DECK_FILE, END, OUTCOME_FILE, RUN_FILE
 from dragdeck.decks.deck import AnyScene
-from dragdeck.decks.engine_commands import (
+from dragdeck.script.commands import (
     commands,
     contact_laws,
     endless,

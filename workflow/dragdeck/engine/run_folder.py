@@ -11,7 +11,7 @@ import shutil
 from pathlib import Path
 
 from dragdeck.decks import CASE_FILE, COLUMNS_FILE, DECK_FILE, RUN_FILE
-from dragdeck.decks.engine_commands import files_read
+from dragdeck.script.commands import files_read
 from dragdeck.decks.outputs import ColumnsFile
 from dragdeck.engine.checkpoints import is_whole, take_forced_restarts
 from dragdeck.engine.part import STATE_FILE, PartOfRun, why_rejected

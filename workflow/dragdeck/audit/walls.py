@@ -1,0 +1,225 @@
+"""The walls of a script where they are at a step: planes, cylinders, and meshes that move."""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from dragdeck.arrays import Floats, Ints
+from dragdeck.physics.contact_mechanics import touching_pairs
+from dragdeck.script.facts import Facts, Fix, number, numbers
+
+Place = Callable[[Floats, float], Floats]
+"""Points of a wall, (..., 3), at a time step."""
+
+
+@dataclass(frozen=True)
+class Wall:
+    """A wall: its type from 0, and what it is.
+
+    Attributes
+    ----------
+    type : int
+    towards : callable
+        Vectors from (N, 3) centres to the nearest points of the wall at a step, for spheres of (N,)
+        radii; NaN where it is out of reach.
+    """
+
+    type: int
+    towards: Callable[[Floats, Floats, float], Floats]
+
+
+def walls_of(facts: Facts) -> tuple[list[Wall], list[str]]:
+    """The walls whose places are known, and names of the others."""
+    walls: list[Wall] = []
+    unknown: list[str] = []
+    meshes = {fix.id: fix for fix in facts.styled("mesh/surface")}
+    for fix in facts.styled("wall/gran"):
+        (type_, *_) = facts.wall_types(fix) or [1]
+        if "primitive" in fix.words:
+            shape = fix.after("type", 2)[1:]
+            sizes = numbers(fix.after(shape[0], 1 if "plane" in shape[0] else 3)) if shape else None
+            if sizes:
+                walls.append(Wall(type_ - 1, _primitive(shape[0], sizes)))
+            else:
+                unknown.append(fix.id)
+        for name in facts.meshes_of(fix):
+            mesh = meshes.get(name)
+            triangles = _triangles(mesh, facts.script.file.parent) if mesh else None
+            motions = _motions(facts, name)
+            if mesh is None or triangles is None or motions is None:
+                unknown.append(name)
+                continue
+            (word,) = mesh.after("type") or ("1",)
+            walls.append(Wall(int(number(word) or 1) - 1, _mesh(triangles, motions)))
+    return walls, unknown
+
+
+def contacts_with(
+    centre: Floats, radius: Floats, walls: Sequence[Wall], step: float
+) -> tuple[Ints, Floats, Floats]:
+    """Contacts of particles with each other and with walls, whose bodies are N, N + 1, ...
+
+    Returns
+    -------
+    (2, M), (M, 3) and (M,) ndarray
+        As `dragdeck.physics.contact_mechanics.touching`.
+    """
+    parts = [touching_pairs(centre, radius)]
+    for body, wall in enumerate(walls, start=len(radius)):
+        away = wall.towards(centre, radius, step)
+        distance = np.linalg.norm(away, axis=1)
+        hit = np.flatnonzero((distance < radius) & (distance > 0))
+        bodies = np.stack([hit, np.full(len(hit), body)])
+        parts.append((bodies, away[hit] / distance[hit, None], radius[hit] - distance[hit]))
+    bodies, normals, overlaps = zip(*parts, strict=True)
+    return np.concatenate(bodies, axis=1), np.concatenate(normals), np.concatenate(overlaps)
+
+
+def _primitive(shape: str, sizes: Sequence[float]) -> Callable[[Floats, Floats, float], Floats]:
+    axis = "xyz".index(shape[0])
+
+    def plane(centre: Floats, radius: Floats, step: float) -> Floats:
+        away = np.zeros_like(centre)
+        away[:, axis] = sizes[0] - centre[:, axis]
+        return away
+
+    def cylinder(centre: Floats, radius: Floats, step: float) -> Floats:
+        away = np.zeros_like(centre)
+        across = [number for number in range(3) if number != axis]
+        out = centre[:, across] - sizes[1:3]
+        distance = np.linalg.norm(out, axis=1, keepdims=True)
+        with np.errstate(invalid="ignore"):
+            away[:, across] = out / distance * (sizes[0] - distance)
+        return away
+
+    return plane if "plane" in shape else cylinder
+
+
+def _mesh(triangles: Floats, place: Place) -> Callable[[Floats, Floats, float], Floats]:
+    middle = triangles.mean(axis=1)
+    size = np.linalg.norm(triangles - middle[:, None], axis=2).max(axis=1)
+
+    def towards(centre: Floats, radius: Floats, step: float) -> Floats:
+        from scipy.spatial import KDTree
+        from trimesh.triangles import closest_point
+
+        away = np.full_like(centre, np.nan)
+        moved, tree = place(triangles, step), KDTree(centre)
+        nearest = np.full(len(centre), np.inf)
+        for facet, near in enumerate(tree.query_ball_point(moved.mean(axis=1), size + radius.max())):
+            if near:
+                rows = np.array(near)
+                facets = np.broadcast_to(moved[facet], (len(rows), 3, 3))
+                way = closest_point(facets, centre[rows]) - centre[rows]
+                distance = np.linalg.norm(way, axis=1)
+                closer = distance < nearest[rows]
+                nearest[rows[closer]], away[rows[closer]] = distance[closer], way[closer]
+        return away
+
+    return towards
+
+
+def _triangles(mesh: Fix, folder: Path) -> Floats | None:
+    """Corners of the facets of a mesh as it is loaded, (F, 3, 3); None if they are not known."""
+    import trimesh
+
+    file = folder / "".join(mesh.after("file"))
+    if not file.is_file() or any("$" in word for word in mesh.words):
+        return None
+    loaded = trimesh.load_mesh(file, process=False)
+    corners = np.asarray(loaded.triangles, dtype=np.float64)
+    for at, word in enumerate(mesh.words):
+        values = mesh.words[at + 1 : at + 7]
+        if word == "scale":
+            corners = corners * float(values[0])
+        elif word == "move":
+            corners = corners + np.array(values[:3], dtype=float)
+        elif word == "rotate" and values[0] == "axis":
+            turn = _turn(np.array(values[1:4], dtype=float), math.radians(float(values[5])))
+            corners = corners @ turn.T
+    return corners
+
+
+def _turn(axis: Floats, angle: float) -> Floats:
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_rotvec(angle * axis / np.linalg.norm(axis)).as_matrix())
+
+
+def _motions(facts: Facts, mesh: str) -> Place | None:
+    """How a mesh moves; None where that cannot be followed."""
+    motions = [fix for fix in facts.styled("move/mesh") if mesh in fix.words]
+    spans = sorted((*_span(facts, fix), fix.words[3:]) for fix in motions)
+    if any(first[1] > second[0] for first, second in pairwise(spans)) or facts.timestep_s is None:
+        return None if motions else lambda points, step: points
+    acts = []
+    for begin, end, words in spans:
+        act = _act(words, facts.timestep_s)
+        if act is None or math.isnan(begin):
+            return None
+        acts.append((begin, end, act))
+
+    def place(points: Floats, step: float) -> Floats:
+        for begin, end, act in acts:
+            points = act(points, max(min(step, end) - begin, 0.0))
+        return points
+
+    return place
+
+
+def _act(words: Sequence[str], timestep_s: float) -> Place | None:
+    """Points after so many steps of a motion."""
+    if any("$" in word for word in words):
+        return None
+    match list(words):
+        case ["linear", *velocity]:
+            way = np.array(velocity[:3], dtype=float)
+            return lambda points, steps: points + way * steps * timestep_s
+        case ["rotate", "origin", x, y, z, "axis", u, v, w, "period", period]:
+            origin, axis = np.array([x, y, z], dtype=float), np.array([u, v, w], dtype=float)
+            rate = 2 * math.pi * timestep_s / float(period)
+            return lambda points, steps: (points - origin) @ _turn(axis, rate * steps).T + origin
+        case ["wiggle", "amplitude", x, y, z, "period", period]:
+            amplitude = np.array([x, y, z], dtype=float)
+            rate = 2 * math.pi * timestep_s / float(period)
+            return lambda points, steps: points + amplitude * math.sin(rate * steps)
+    return None
+
+
+def _span(facts: Facts, fix: Fix) -> tuple[float, float]:
+    """First and last step of a fix; NaN if not known."""
+    commands = facts.script.commands
+    begin = next((c for c in commands[int(fix.begin) :] if c.words[0] == "run"), None)
+    end = math.inf if fix.end == math.inf else commands[int(fix.end)].step
+    known = begin is not None and begin.step is not None and end is not None
+    return (begin.step, end) if known else (math.nan, math.nan)  # type: ignore[union-attr,return-value]
+
+
+def speeds(facts: Facts, extent_m: float) -> Iterator[float]:
+    """Speeds of insertions, meshes and rims, m/s; NaN for one that is not known."""
+    for fix in facts.fixes:
+        words = fix.words
+        if words[0].startswith("insert/"):
+            yield from map(abs, _numbers_after(fix, "constant", 3))
+        elif words[0] == "move/mesh":
+            yield from map(abs, _numbers_after(fix, "linear", 3))
+            for period in _numbers_after(fix, "period", 1):
+                reach = np.linalg.norm(_numbers_after(fix, "amplitude", 3)) or extent_m
+                yield 2 * math.pi * float(reach) / abs(period)
+            if words[3:4] and words[3] not in ("linear", "rotate", "wiggle", "riggle"):
+                yield math.nan
+        elif words[0].startswith("mesh/surface"):
+            yield from map(abs, _numbers_after(fix, "surface_vel", 3))
+            for rate in _numbers_after(fix, "omega", 1):
+                yield abs(rate) * extent_m
+        elif words[0] in ("move", "adapt", "set/force", "setforce"):
+            yield math.nan
+
+
+def _numbers_after(fix: Fix, keyword: str, count: int) -> list[float]:
+    words = fix.after(keyword, count)
+    return [math.nan if number(word) is None else float(word) for word in words]
