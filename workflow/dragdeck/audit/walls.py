@@ -1,7 +1,7 @@
 """The walls of a script where they are at a step: planes, cylinders, and meshes that move."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -12,6 +12,7 @@ from dragdeck.arrays import Floats, Ints
 from dragdeck.physics.contact_mechanics import touching_pairs
 from dragdeck.script.facts import Facts, Fix, number, numbers
 
+Towards = Callable[[Floats, Floats, float], Floats]
 Place = Callable[[Floats, float], Floats]
 """Points of a wall, (..., 3), at a time step."""
 
@@ -26,10 +27,14 @@ class Wall:
     towards : callable
         Vectors from (N, 3) centres to the nearest points of the wall at a step, for spheres of (N,)
         radii; NaN where it is out of reach.
+    begin, end : float
+        Steps between which it is there.
     """
 
     type: int
-    towards: Callable[[Floats, Floats, float], Floats]
+    towards: Towards
+    begin: float
+    end: float
 
 
 def walls_of(facts: Facts) -> tuple[list[Wall], list[str]]:
@@ -38,24 +43,32 @@ def walls_of(facts: Facts) -> tuple[list[Wall], list[str]]:
     unknown: list[str] = []
     meshes = {fix.id: fix for fix in facts.styled("mesh/surface")}
     for fix in facts.styled("wall/gran"):
-        (type_, *_) = facts.wall_types(fix) or [1]
-        if "primitive" in fix.words:
-            shape = fix.after("type", 2)[1:]
-            sizes = numbers(fix.after(shape[0], 1 if "plane" in shape[0] else 3)) if shape else None
-            if sizes:
-                walls.append(Wall(type_ - 1, _primitive(shape[0], sizes)))
-            else:
-                unknown.append(fix.id)
-        for name in facts.meshes_of(fix):
-            mesh = meshes.get(name)
-            triangles = _triangles(mesh, facts.script.file.parent) if mesh else None
-            motions = _motions(facts, name)
-            if mesh is None or triangles is None or motions is None:
+        begin, end = _span(facts, fix)
+        if fix.end == math.inf:
+            begin = -math.inf  # nothing is known of frames before
+        elif math.isnan(begin):
+            unknown.append(fix.id)
+            continue
+        type_ = [*facts.wall_types(fix), 1][0] - 1
+        for name, towards in _shapes(facts, fix, meshes):
+            if towards is None:
                 unknown.append(name)
-                continue
-            (word,) = mesh.after("type") or ("1",)
-            walls.append(Wall(int(number(word) or 1) - 1, _mesh(triangles, motions)))
+            else:
+                walls.append(Wall(type_, towards, begin, end if fix.end < math.inf else math.inf))
     return walls, unknown
+
+
+def _shapes(facts: Facts, fix: Fix, meshes: Mapping[str, Fix]) -> Iterator[tuple[str, Towards | None]]:
+    """The shapes of a wall; None for one that is not known."""
+    if "primitive" in fix.words:
+        shape = "".join(fix.after("type", 2)[1:])
+        sizes = numbers(fix.after(shape, 1 if "plane" in shape else 3)) if shape else None
+        yield fix.id, _primitive(shape, sizes) if sizes else None
+    for name in facts.meshes_of(fix):
+        triangles = _triangles(meshes[name], facts.script.file.parent) if name in meshes else None
+        motions = _motions(facts, name)
+        known = triangles is not None and motions is not None
+        yield name, _mesh(triangles, motions) if known else None  # type: ignore[arg-type]
 
 
 def contacts_with(
@@ -70,6 +83,8 @@ def contacts_with(
     """
     parts = [touching_pairs(centre, radius)]
     for body, wall in enumerate(walls, start=len(radius)):
+        if not wall.begin <= step <= wall.end:
+            continue
         away = wall.towards(centre, radius, step)
         distance = np.linalg.norm(away, axis=1)
         hit = np.flatnonzero((distance < radius) & (distance > 0))
@@ -79,7 +94,7 @@ def contacts_with(
     return np.concatenate(bodies, axis=1), np.concatenate(normals), np.concatenate(overlaps)
 
 
-def _primitive(shape: str, sizes: Sequence[float]) -> Callable[[Floats, Floats, float], Floats]:
+def _primitive(shape: str, sizes: Sequence[float]) -> Towards:
     axis = "xyz".index(shape[0])
 
     def plane(centre: Floats, radius: Floats, step: float) -> Floats:
@@ -99,7 +114,7 @@ def _primitive(shape: str, sizes: Sequence[float]) -> Callable[[Floats, Floats, 
     return plane if "plane" in shape else cylinder
 
 
-def _mesh(triangles: Floats, place: Place) -> Callable[[Floats, Floats, float], Floats]:
+def _mesh(triangles: Floats, place: Place) -> Towards:
     middle = triangles.mean(axis=1)
     size = np.linalg.norm(triangles - middle[:, None], axis=2).max(axis=1)
 

@@ -61,7 +61,7 @@ def lines_of(deck: str) -> Iterator[tuple[int, str]]:
 
 def without_comment(line: str) -> str:
     """A line up to its comment."""
-    comment = _COMMENT.fullmatch(line)
+    comment = _COMMENT.fullmatch(line) if "#" in line else None
     return comment[1] if comment else line
 
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -80,10 +80,12 @@ class Facts:
         active: dict[str, tuple[str, ...]] = {}
         for place, command in enumerate(self.script.commands):
             words = command.words
-            if words[0] == "unfix" and active.get("".join(words[1:2])) in fixes:
-                key = active.pop(words[1])
-                fixes[key] = Fix(*(fixes[key].__dict__ | {"end": place}).values())
-            elif words[0] == "fix" and len(words) > 3:
+            ended = active if words[0] == "clear" else words[1:2] if words[0] == "unfix" else ()
+            for key in filter(None, [active.pop(name, None) for name in list(ended)]):
+                fixes[key] = replace(fixes[key], end=place)
+            if words[0] == "clear":
+                continue
+            if words[0] == "fix" and len(words) > 3:
                 key = tuple(words)
                 active[words[1]] = key
                 fixes.setdefault(key, Fix(words[1], words[3:], command, place))

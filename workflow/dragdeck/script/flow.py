@@ -86,8 +86,10 @@ def read_script(
         A file cannot be read, or is no input script.
     """
     script = Script(file)
-    for source in filter(None, [after, file]):
-        _Reader(script, source, variables or {}, text if source == file else None).follow()
+    if after is not None:
+        _Reader(script, after, variables or {}, None).follow()
+        script.commands.append(EngineCommand("clear", ["clear"]))
+    _Reader(script, file, variables or {}, text).follow()
     return script
 
 
@@ -127,14 +129,15 @@ class _Reader:
         self.variables = {name: _Variable("index", v) for name, v in variables.items()}
         self.missing: dict[str, EngineCommand] = {}
         self.passes: dict[tuple[str, ...], int] = {}
+        self.lines: dict[str, tuple[list[tuple[int, str]], dict[str, int]]] = {}
         self.stack: list[tuple[str, Iterator[tuple[int, str]]]] = []
         self.timestep: float | None = None
         self.step: float | None = 0.0
         self.skips_jump = self.ended = False
         self.count = self.depth = 0
         self.left_out: dict[str, None] = {}
-        self.name = file.name
-        script.texts[file.name] = text_of(file) if text is None else text
+        self.name = str(file)
+        script.texts[self.name] = text_of(file) if text is None else text
 
     def follow(self) -> None:
         self._enter(self.name)
@@ -151,22 +154,23 @@ class _Reader:
                 self.script.undefined.setdefault(name, command)
 
     def _enter(self, file: str, label: str = "") -> bool:
-        lines = lines_of(self.script.texts[file])
-        if label:
-            marks = ((words_of(line), line) for _, line in lines)
-            if not any(words[:2] == ["label", label] for words, _ in marks):
-                return False
-        self.stack.append((file, lines))
+        if file not in self.lines:
+            lines = [*lines_of(self.script.texts[file])]
+            every = [(words_of(line), at) for at, (_, line) in enumerate(lines) if "label" in line]
+            labels = {"".join(words[1:2]): at for words, at in reversed(every) if words[:1] == ["label"]}
+            self.lines[file] = lines, labels
+        lines, labels = self.lines[file]
+        if label and label not in labels:
+            return False
+        self.stack.append((file, iter(lines[labels[label] if label else 0 :])))
         return True
 
     def _read(self, command: EngineCommand, name: str) -> bool:
         """Whether another script is there, and read."""
         if "$" in name or len(self.stack) > 10:
             self._note(command, f"{command.words[0]} {name}")
-        elif name in self.script.texts:
-            return True
         elif (file := self.folder / name).is_file():
-            self.script.texts[name] = text_of(file)
+            self.script.texts.setdefault(str(file), text_of(file))
             return True
         else:
             self.script.absent.append((command, name))
@@ -202,7 +206,7 @@ class _Reader:
                 if words[:2] == ["jump", "SELF"]:
                     self.left_out.update(dict.fromkeys(words[2:3]))
             case "include" if len(words) > 1 and self._read(command, words[1]):
-                self._enter(words[1])
+                self._enter(str(self.folder / words[1]))
             case "jump" if len(words) > 1:
                 self._jump(command)
             case "quit":
@@ -255,12 +259,13 @@ class _Reader:
             self.skips_jump = False
             return
         file, label = command.words[1], "".join(command.words[2:3])
-        file = self.stack[-1][0] if file == "SELF" else file
+        there = file == "SELF" or self._read(command, file)
+        file = self.stack[-1][0] if file == "SELF" else str(self.folder / file)
         key = (command.file, str(command.line), file, label)
         self.passes[key] = self.passes.get(key, 0) + 1
         if self.passes[key] > _MOST_PASSES:
             self._note(command, f"a loop after its first {_MOST_PASSES} passes")
-        elif file in self.script.texts or self._read(command, file):
+        elif there:
             before = self.stack.pop()
             if not self._enter(file, label):
                 self._note(command, f"jump to the label {label}, which is not there")
