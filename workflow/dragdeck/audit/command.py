@@ -121,7 +121,8 @@ class Report:
         from dragdeck.audit.measures import removal
         from dragdeck.audit.run_log import balance_of, log_findings
 
-        outlets = [fix.id for fix in self.facts.styled("massflow/mesh")]
+        meters = self.facts.styled("massflow/mesh")
+        outlets = [fix.id for fix in meters if "delete_atom" in fix.words]
         balance = balance_of(log.read_text(encoding="utf-8", errors="replace"), outlets)
         unknown = "" if balance and balance.counted else removal(self.facts)
         if self.facts.styled("multisphere", "particletemplate/multisphere"):

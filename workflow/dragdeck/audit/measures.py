@@ -12,13 +12,15 @@ from dragdeck.arrays import Floats
 from dragdeck.audit.materials import constants_of, masses_of, radii_of, types_of
 from dragdeck.audit.walls import contacts_with, speeds, walls_of
 from dragdeck.dumps.frame import Frame
-from dragdeck.physics.contact_mechanics import network_number
+from dragdeck.physics.contact_mechanics import fall_speed, network_number
 from dragdeck.physics.coulomb import within_friction
-from dragdeck.physics.run_limits import thrown_speed
 from dragdeck.script.facts import Facts
 from dragdeck.script.findings import Finding, NotApplied
 
 _MOST_OVERLAP = 0.1
+_REBOUND = 2.0
+"""Speed of a particle over that of the wall that hits it, at most."""
+
 _FRAMES = 20
 """Frames whose stability number is evaluated, as in the acceptance check of the time step."""
 
@@ -179,12 +181,12 @@ class Measures:
         box = self.facts.box
         if box is not None:
             extent = np.maximum(extent, [high - low for low, high in box])
-        causes = [self.first_speed, *speeds(self.facts, float(np.linalg.norm(extent)))]
+        causes = [self.first_speed, *speeds(self.facts, self.bounds)]
         if gravity is None or any(map(math.isnan, causes)):
             return None
         size = float(np.linalg.norm(gravity))
         height = float(np.abs(np.array(gravity) / size) @ extent) if size else 0.0
-        return thrown_speed(size, height, max(causes)) or None
+        return (fall_speed(height, size) + _REBOUND * max(causes)) or None
 
     def _speeds(self) -> Result:
         limit = self.speed_limit

@@ -41,8 +41,8 @@ def walls_of(facts: Facts) -> tuple[list[Wall], list[str]]:
     """The walls whose places are known, and names of the others."""
     walls: list[Wall] = []
     unknown: list[str] = []
-    meshes = {fix.id: fix for fix in facts.styled("mesh/surface")}
-    for fix in facts.styled("wall/gran"):
+    meshes = {fix.id: fix for fix in facts.present("mesh/surface")}
+    for fix in facts.present("wall/gran"):
         begin, end = _span(facts, fix)
         if fix.end == math.inf:
             begin = -math.inf  # nothing is known of frames before
@@ -122,17 +122,14 @@ def _mesh(triangles: Floats, place: Place) -> Towards:
         from scipy.spatial import KDTree
         from trimesh.triangles import closest_point
 
+        moved = place(triangles, step)
+        near = KDTree(centre).query_ball_point(moved.mean(axis=1), size + radius.max())
+        rows = np.concatenate([np.empty(0, np.int64), *map(np.int64, filter(None, near))])
+        facets = np.repeat(np.arange(len(moved)), [len(each) for each in near])
+        ways = closest_point(moved[facets], centre[rows]) - centre[rows]
+        farthest_first = np.argsort(-np.linalg.norm(ways, axis=1))
         away = np.full_like(centre, np.nan)
-        moved, tree = place(triangles, step), KDTree(centre)
-        nearest = np.full(len(centre), np.inf)
-        for facet, near in enumerate(tree.query_ball_point(moved.mean(axis=1), size + radius.max())):
-            if near:
-                rows = np.array(near)
-                facets = np.broadcast_to(moved[facet], (len(rows), 3, 3))
-                way = closest_point(facets, centre[rows]) - centre[rows]
-                distance = np.linalg.norm(way, axis=1)
-                closer = distance < nearest[rows]
-                nearest[rows[closer]], away[rows[closer]] = distance[closer], way[closer]
+        away[rows[farthest_first]] = ways[farthest_first]
         return away
 
     return towards
@@ -167,7 +164,7 @@ def _turn(axis: Floats, angle: float) -> Floats:
 
 def _motions(facts: Facts, mesh: str) -> Place | None:
     """How a mesh moves; None where that cannot be followed."""
-    motions = [fix for fix in facts.styled("move/mesh") if mesh in fix.words]
+    motions = [fix for fix in facts.present("move/mesh") if mesh in fix.words]
     spans = sorted((*_span(facts, fix), fix.words[3:]) for fix in motions)
     if any(first[1] > second[0] for first, second in pairwise(spans)) or facts.timestep_s is None:
         return None if motions else lambda points, step: points
@@ -214,27 +211,46 @@ def _span(facts: Facts, fix: Fix) -> tuple[float, float]:
     return (begin.step, end) if known else (math.nan, math.nan)  # type: ignore[union-attr,return-value]
 
 
-def speeds(facts: Facts, extent_m: float) -> Iterator[float]:
-    """Speeds of insertions, meshes and rims, m/s; NaN for one that is not known."""
-    for fix in facts.fixes:
+def speeds(facts: Facts, bounds_m: Floats) -> Iterator[float]:
+    """Speeds of insertions, meshes and rims, m/s; NaN for one that is not known.
+
+    Parameters
+    ----------
+    facts : Facts
+    bounds_m : (2, 3) ndarray
+        Of the particles: a rim is where they are.
+    """
+    for fix in facts.present(""):
         words = fix.words
         if words[0].startswith("insert/"):
-            yield from map(abs, _numbers_after(fix, "constant", 3))
-        elif words[0] == "move/mesh":
-            yield from map(abs, _numbers_after(fix, "linear", 3))
-            for period in _numbers_after(fix, "period", 1):
-                reach = np.linalg.norm(_numbers_after(fix, "amplitude", 3)) or extent_m
-                yield 2 * math.pi * float(reach) / abs(period)
-            if words[3:4] and words[3] not in ("linear", "rotate", "wiggle", "riggle"):
-                yield math.nan
+            yield _length(fix, "constant")
+        elif words[0] == "move/mesh" and words[3:4] in (["linear"], ["rotate"], ["wiggle"]):
+            yield _length(fix, "linear")
+            rate = 2 * math.pi / abs(_number(fix, "period") or math.inf)
+            yield rate * (_length(fix, "amplitude") or _reach(fix, bounds_m))
         elif words[0].startswith("mesh/surface"):
-            yield from map(abs, _numbers_after(fix, "surface_vel", 3))
-            for rate in _numbers_after(fix, "omega", 1):
-                yield abs(rate) * extent_m
-        elif words[0] in ("move", "adapt", "set/force", "setforce"):
+            yield _length(fix, "surface_vel")
+            yield abs(_number(fix, "omega")) * _reach(fix, bounds_m)
+        elif words[0] in ("move", "move/mesh", "adapt", "setforce"):
             yield math.nan
 
 
-def _numbers_after(fix: Fix, keyword: str, count: int) -> list[float]:
-    words = fix.after(keyword, count)
-    return [math.nan if number(word) is None else float(word) for word in words]
+def _number(fix: Fix, keyword: str) -> float:
+    """The number after a keyword; 0 without it, NaN if it is not known."""
+    value = number("".join(fix.after(keyword) or ["0"]))
+    return math.nan if value is None else value
+
+
+def _length(fix: Fix, keyword: str) -> float:
+    """Length of the vector after a keyword; 0 without it, NaN if it is not known."""
+    values = numbers(fix.after(keyword, 3))
+    return math.nan if values is None else math.hypot(*values)
+
+
+def _reach(fix: Fix, bounds_m: Floats) -> float:
+    """Largest distance of particles from the axis of a rotation, m; 0 without one."""
+    origin, axis = numbers(fix.after("origin", 3)), numbers(fix.after("axis", 3))
+    if not origin or not axis:
+        return 0.0 if origin == axis == [] else math.nan
+    corners = np.array(np.meshgrid(*bounds_m.T)).reshape(3, -1).T - origin
+    return float(np.linalg.norm(np.cross(corners, axis), axis=1).max() / np.linalg.norm(axis))

@@ -78,15 +78,15 @@ class Facts:
         """Every fix, one that is set again in a loop once."""
         fixes: dict[tuple[str, ...], Fix] = {}
         active: dict[str, tuple[str, ...]] = {}
+        cleared = 0
         for place, command in enumerate(self.script.commands):
             words = command.words
             ended = active if words[0] == "clear" else words[1:2] if words[0] == "unfix" else ()
             for key in filter(None, [active.pop(name, None) for name in list(ended)]):
                 fixes[key] = replace(fixes[key], end=place)
-            if words[0] == "clear":
-                continue
+            cleared += words[0] == "clear"
             if words[0] == "fix" and len(words) > 3:
-                key = tuple(words)
+                key = (str(cleared), *words)
                 active[words[1]] = key
                 fixes.setdefault(key, Fix(words[1], words[3:], command, place))
         return list(fixes.values())
@@ -94,6 +94,11 @@ class Facts:
     def styled(self, *styles: str) -> list[Fix]:
         """Fixes whose style begins with one of these."""
         return [fix for fix in self.fixes if fix.words[0].startswith(styles)]
+
+    def present(self, *styles: str) -> list[Fix]:
+        """Those that are set after the last ``clear``."""
+        cleared = [at for at, c in enumerate(self.script.commands) if c.words[0] == "clear"]
+        return [fix for fix in self.styled(*styles) if fix.begin > max(cleared, default=-1)]
 
     def named(self, *names: str) -> Iterator[EngineCommand]:
         """Commands of these names."""

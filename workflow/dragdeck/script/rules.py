@@ -274,7 +274,7 @@ def unmeasurable(facts: Facts) -> Result:
         yield at("DK112", dumps[0], f"no dump has {' and '.join(lacking)}")
     ran = False
     for command in facts.script.commands:
-        ran = ran or command.words[0] == "run"
+        ran = (ran or command.words[0] == "run") and command.words[0] != "clear"
         if ran and command.words[0] == "compute" and command.words[3:4] == ["pair/gran/local"]:
             message = "compute pair/gran/local after the first run, which LIGGGHTS refuses"
             yield at("DK112", command, message, "error")
