@@ -161,7 +161,7 @@ def guarded(program: str, call: Callable[[], int | None]) -> int:
     Returns
     -------
     int
-        The exit status: what the function returns, 1 after an error, 130 if the user interrupted it.
+        The exit status: that of the function, 1 after an error, 130 if the user interrupted it.
     """
     status: int | None = 0
     try:

@@ -88,9 +88,16 @@ class Report:
     """
 
     def __init__(
-        self, file: Path, variables: dict[str, list[str]], after: Path | None, select: str, ignore: str
+        self,
+        file: Path,
+        variables: dict[str, list[str]],
+        after: Path | None,
+        select: str,
+        ignore: str,
     ) -> None:
-        self.selected, self.ignored = (tuple(filter(None, ids.split(","))) for ids in (select, ignore))
+        self.selected, self.ignored = (
+            tuple(filter(None, ids.split(","))) for ids in (select, ignore)
+        )
         check_ids([*self.selected, *self.ignored])
         self.script: Script = read_script(file, variables, after=after)
         self.facts = Facts(self.script)
@@ -107,7 +114,9 @@ class Report:
                 self.skipped.append(result)
             elif self._wanted(result.rule) and result.file != self.after:
                 self.every.append(result)
-        self.applied |= {id for id in ids if self._wanted(id)} - {skip.rule for skip in self.skipped}
+        self.applied |= {id for id in ids if self._wanted(id)} - {
+            skip.rule for skip in self.skipped
+        }
 
     def _wanted(self, id: str) -> bool:
         return id.startswith(self.selected) and not (self.ignored and id.startswith(self.ignored))
@@ -145,7 +154,9 @@ class Report:
             files.sort(key=lambda file: [int(part) for part in re.findall(r"\d+", file.name)])
             for file in files:
                 binary = ".bin" in file.suffixes[-2:]
-                yield from read_frames([file], layout_of(file, self._columns(file) if binary else None))
+                yield from read_frames(
+                    [file], layout_of(file, self._columns(file) if binary else None)
+                )
 
         for frame, touching in matched(frames(dump), frames(contacts)):
             lacking = {"id", "x", "y", "z"} - set(frame.columns)
@@ -158,7 +169,10 @@ class Report:
                 sums.add(touching, ids, forces, run, run.last)
         self.add(run.results(), [f"DK20{n}" for n in range(1, 7)])
         self.known |= {"frames": run.frames, "contacts of": run.scope}
-        self.known |= {"largest overlap over radius": run.overlap.value, "largest speed, m/s": run.speed.value}
+        self.known |= {
+            "largest overlap over radius": run.overlap.value,
+            "largest speed, m/s": run.speed.value,
+        }
         if run.stability is not None:
             self.known["stability number"] = run.stability
         if run.energies:
@@ -199,7 +213,10 @@ class Report:
         lines = [f"{finding}\n    {rules()[finding.rule].remedy}" for finding in findings]
         lines += [f"{note} (unused comment)" for note in unused]
         if self.known:
-            shown = (f"{name} {v:.4g}" if isinstance(v, float) else f"{name} {v}" for name, v in self.known.items())
+            shown = (
+                f"{name} {v:.4g}" if isinstance(v, float) else f"{name} {v}"
+                for name, v in self.known.items()
+            )
             lines.append("measured: " + "; ".join(shown))
         if self.facts.dialect:
             lines.append(f"dialect: {self.facts.dialect}")
@@ -213,8 +230,8 @@ class Report:
         """The same for programs."""
         findings, unused = without_accepted(self.every, self.script, self.applied)
         rows = [
-            {"rule": f.rule, "severity": f.graded, "file": f.file, "line": f.line, "message": f.message,
-             "remedy": rules()[f.rule].remedy, "values": dict(f.values)}
+            {"rule": f.rule, "severity": f.graded, "file": f.file, "line": f.line,
+             "message": f.message, "remedy": rules()[f.rule].remedy, "values": dict(f.values)}
             for f in findings
         ]  # fmt: skip
         document = {

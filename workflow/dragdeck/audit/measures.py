@@ -51,6 +51,9 @@ class Extreme(NamedTuple):
     step: int = 0
 
 
+NOTHING = Extreme()
+
+
 class Energy(NamedTuple):
     """Of a frame: step, mean kinetic energy, and m g d or 0, per mass, J/kg."""
 
@@ -79,8 +82,8 @@ class Measures:
 
     facts: Facts
     source: str
-    overlap: Extreme = Extreme()
-    speed: Extreme = Extreme()
+    overlap: Extreme = NOTHING
+    speed: Extreme = NOTHING
     energies: list[Energy] = field(default_factory=list)
     ids: set[int] = field(default_factory=set)
     last_ids: set[int] = field(default_factory=set)
@@ -257,7 +260,9 @@ class Measures:
             at = int(np.where(spins, rate, 0).argmax())
             message = f"particle {int(self.last.columns['id'][at])} spins at {rate[at]:.3g} rad/s "
             message += f"at rest; {int(spins.sum())} such particles"
-            yield self._finding("DK205", message, spin_rad_s=float(rate[at]), count=int(spins.sum()))
+            yield self._finding(
+                "DK205", message, spin_rad_s=float(rate[at]), count=int(spins.sum())
+            )
 
     def _rest(self) -> Result:
         if not self.energies or self.rests:
@@ -329,7 +334,9 @@ class ContactSums:
     force_n: float = 0.0
     error_n: float = 0.0
 
-    def add(self, frame: Frame, ids: Sequence[str], forces: Sequence[str], run: Measures, at: Frame) -> None:
+    def add(
+        self, frame: Frame, ids: Sequence[str], forces: Sequence[str], run: Measures, at: Frame
+    ) -> None:
         """Add the contacts of a frame between particles of the frame `at`."""
         frame_ids = at.columns["id"].astype(np.int64)
         order = np.argsort(frame_ids)
@@ -358,7 +365,9 @@ class ContactSums:
         if weight is not None and "fx" in at.columns and not run.walls[1]:
             self._add_closure(rows, force, weight, run, at)
 
-    def _add_closure(self, rows: Floats, force: Floats, weight: Floats, run: Measures, at: Frame) -> None:
+    def _add_closure(
+        self, rows: Floats, force: Floats, weight: Floats, run: Measures, at: Frame
+    ) -> None:
         total = np.zeros((at.rows, 3))
         np.add.at(total, rows[0], force)
         np.add.at(total, rows[1], -force)
@@ -384,7 +393,9 @@ class ContactSums:
             yield Finding("DK207", message, source, values={"error": error})
 
 
-def matched(particles: Iterable[Frame], contacts: Iterable[Frame]) -> Iterator[tuple[Frame, Frame | None]]:
+def matched(
+    particles: Iterable[Frame], contacts: Iterable[Frame]
+) -> Iterator[tuple[Frame, Frame | None]]:
     """Frames of particles, each with the contacts of its step, if there are any."""
     rest = iter(contacts)
     waiting = next(rest, None)

@@ -24,7 +24,9 @@ class Balance:
     last: int
 
 
-def log_findings(file: Path, outlets: Sequence[str], unknown: str) -> Iterator[Finding | NotApplied]:
+def log_findings(
+    file: Path, outlets: Sequence[str], unknown: str
+) -> Iterator[Finding | NotApplied]:
     """What DK203 and DK208 say of a log.
 
     Parameters

@@ -58,7 +58,9 @@ def walls_of(facts: Facts) -> tuple[list[Wall], list[str]]:
     return walls, unknown
 
 
-def _shapes(facts: Facts, fix: Fix, meshes: Mapping[str, Fix]) -> Iterator[tuple[str, Towards | None]]:
+def _shapes(
+    facts: Facts, fix: Fix, meshes: Mapping[str, Fix]
+) -> Iterator[tuple[str, Towards | None]]:
     """The shapes of a wall; None for one that is not known."""
     if "primitive" in fix.words:
         shape = "".join(fix.after("type", 2)[1:])

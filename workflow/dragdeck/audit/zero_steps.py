@@ -14,8 +14,8 @@ from dragdeck.script.findings import Finding, NotApplied, at
 from dragdeck.script.flow import Script
 
 _LEFT_OUT = {
-    "dump", "dump_modify", "undump", "restart", "write_restart", "write_data", "write_dump", "shell",
-    "log", "processors", "jump", "label", "include", "quit", "echo", "info",
+    "dump", "dump_modify", "undump", "restart", "write_restart", "write_data", "write_dump",
+    "shell", "log", "processors", "jump", "label", "include", "quit", "echo", "info",
 }  # fmt: skip
 _WRITES = ("print", "ave/", "massflow/mesh", "balance")
 _MARK = "DRAGDECK AUDIT "
@@ -49,7 +49,7 @@ def engine_findings(script: Script) -> Iterator[Finding | NotApplied]:
 
 def _screen(folder: Path) -> str:
     """What LIGGGHTS prints with limits of time, memory and size of files."""
-    limits = f"ulimit -v {_MEMORY_KB}; ulimit -f {_FILE_BLOCKS}; exec \"$@\""
+    limits = f'ulimit -v {_MEMORY_KB}; ulimit -f {_FILE_BLOCKS}; exec "$@"'
 
     def watch(seconds: float) -> None:
         if seconds > _SECONDS:

@@ -174,7 +174,9 @@ class Facts:
 
     def _shape(self, name: str) -> tuple[float, Bounds] | None:
         words = next((c.words[2:] for c in self.named("region") if c.words[1:2] == [name]), [])
-        begin, end = {"block": (1, 7), "cylinder": (2, 7), "sphere": (1, 5)}.get(words[0] if words else "", (0, 0))
+        begin, end = {"block": (1, 7), "cylinder": (2, 7), "sphere": (1, 5)}.get(
+            words[0] if words else "", (0, 0)
+        )
         values = numbers(words[begin:end])
         if not values or len(values) < end - begin or {"side", "lattice", "move"} & set(words):
             return None
@@ -216,7 +218,9 @@ class Facts:
     def dialect(self) -> str:
         """Which LIGGGHTS the script is for, as far as it shows: empty for the public 3.8."""
         seeds = [seed for _, seed in self.seeds]
-        if any(c.words[1:2] == ["gran"] and "model" not in c.words for c in self.named("pair_style")):
+        if any(
+            c.words[1:2] == ["gran"] and "model" not in c.words for c in self.named("pair_style")
+        ):
             return "a fork, or a version before 3.0: a contact law without `model`"
         if any(c.words[1].startswith("gran/") for c in self.named("pair_style") if c.words[1:]):
             return "a version before 3.0: contact laws as styles of their own"

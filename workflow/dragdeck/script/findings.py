@@ -75,7 +75,9 @@ class NotApplied:
     why: str
 
 
-def at(rule: str, command: EngineCommand, message: str, severity: str = "", **values: float) -> Finding:
+def at(
+    rule: str, command: EngineCommand, message: str, severity: str = "", **values: float
+) -> Finding:
     """A finding at a command."""
     return Finding(rule, message, command.file, command.line, values, severity)
 

@@ -34,6 +34,8 @@ class Script:
     Attributes
     ----------
     file : Path
+    in_memory : bool
+        Whether it is no file, and has no folder.
     texts : mapping of str to str
         Content of every file that was read, by name; the script itself is first.
     commands : list of EngineCommand
@@ -48,6 +50,7 @@ class Script:
     """
 
     file: Path
+    in_memory: bool = False
     texts: dict[str, str] = field(default_factory=dict)
     commands: list[EngineCommand] = field(default_factory=list)
     not_followed: list[str] = field(default_factory=list)
@@ -85,7 +88,7 @@ def read_script(
     InputError
         A file cannot be read, or is no input script.
     """
-    script = Script(file)
+    script = Script(file, text is not None)
     if after is not None:
         _Reader(script, after, variables or {}, None).follow()
         script.commands.append(EngineCommand("clear", ["clear"]))
@@ -157,7 +160,9 @@ class _Reader:
         if file not in self.lines:
             lines = [*lines_of(self.script.texts[file])]
             every = [(words_of(line), at) for at, (_, line) in enumerate(lines) if "label" in line]
-            labels = {"".join(words[1:2]): at for words, at in reversed(every) if words[:1] == ["label"]}
+            labels = {
+                "".join(words[1:2]): at for words, at in reversed(every) if words[:1] == ["label"]
+            }
             self.lines[file] = lines, labels
         lines, labels = self.lines[file]
         if label and label not in labels:

@@ -15,7 +15,7 @@ _BYTES_PER_BIN = 4
 _RANDOM_FRACTION = 0.3
 """Solid fraction up to which spheres are inserted at random places without fail."""
 
-SOFTEST_PA, HARD_PA = 5e6, 1e9
+
 _COEFFICIENTS = {
     "tangential": "coefficientFriction",
     "rolling_friction": "coefficientRollingFriction",
@@ -34,10 +34,7 @@ Result = Iterator[Finding | NotApplied]
 
 
 def script_findings(script: Script) -> list[Finding | NotApplied]:
-    """What the rules DK101 to DK112 say of a script, in the order of its lines.
-
-    Files that are not there are not told of a script without a folder of its own.
-    """
+    """What the rules DK101 to DK112 say of a script, in the order of its lines."""
     facts = Facts(script)
     results = [result for rule in _RULES for result in rule(facts)]
     order = list(script.texts)
@@ -84,7 +81,9 @@ def _at_wall(facts: Facts, wall: Fix, name: str) -> float:
 
 def unused_property(facts: Facts) -> Result:
     """DK103: a property that no contact law reads."""
-    if not facts.laws or len([*facts.named("pair_style")]) > len([w for w in facts.laws if not w.wall]):
+    if not facts.laws or len([*facts.named("pair_style")]) > len(
+        [w for w in facts.laws if not w.wall]
+    ):
         return
     for name, (keyword, others) in _NEEDS.items():
         models = {law.has(keyword) for law in facts.laws}
@@ -157,15 +156,19 @@ def too_dense(facts: Facts) -> Result:
 
 def refused_value(facts: Facts) -> Result:
     """DK107: values that LIGGGHTS 3.8.0 refuses."""
+    from dragdeck.physics.contact_mechanics import ENGINE_HARD_PA, ENGINE_SOFTEST_PA
+
     if facts.dialect:
         yield NotApplied("DK107", f"the script is for {facts.dialect}")
         return
-    allowed = {c.words[0] for c in facts.named("soft_particles", "hard_particles") if "yes" in c.words}
+    allowed = {
+        c.words[0] for c in facts.named("soft_particles", "hard_particles") if "yes" in c.words
+    }
     if facts.last("units")[:1] == ["si"]:
         for fix in facts.properties("youngsModulus"):
             for value in numbers(fix.words[3:]) or []:
-                soft = value < SOFTEST_PA and "soft_particles" not in allowed
-                hard = value > HARD_PA and "hard_particles" not in allowed
+                soft = value < ENGINE_SOFTEST_PA and "soft_particles" not in allowed
+                hard = value > ENGINE_HARD_PA and "hard_particles" not in allowed
                 if soft or hard:
                     needed = "soft_particles" if soft else "hard_particles"
                     message = f"a Young's modulus of {value:g} Pa without {needed} yes"
@@ -200,7 +203,7 @@ def absent(facts: Facts) -> Result:
         yield at("DK108", command, f"the script {name} is not there")
     read = {name: command for command in script.commands for name in names_read(command.words)}
     written = {w for c in script.commands if not names_read(c.words) for w in c.words}
-    for name, command in read.items() if script.file.is_file() else ():
+    for name, command in read.items() if not script.in_memory else ():
         there = "*" in name or "$" in name or (script.file.parent / name).exists()
         if not there and name not in written:
             restart = command.words[0] in ("read_restart", "variable")
@@ -213,7 +216,8 @@ def mesh_without_wall(facts: Facts) -> Result:
         users = [
             command
             for command in facts.script.commands
-            if command.words[0] not in ("unfix", "group", "variable") and command is not mesh.command
+            if command is not mesh.command
+            and command.words[0] not in ("unfix", "group", "variable")
             and (mesh.id in command.words[2:] or _refers(command, mesh.id))
             and command.words[3:4] != ["move/mesh"]
         ]  # fmt: skip
