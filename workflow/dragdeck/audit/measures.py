@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dragdeck.arrays import Floats
+from dragdeck.arrays import Floats, Ints
 from dragdeck.audit.materials import constants_of, masses_of, radii_of, types_of
 from dragdeck.audit.walls import contacts_with, speeds, walls_of
 from dragdeck.dumps.frame import Frame
@@ -298,7 +298,8 @@ def is_driven(facts: Facts) -> bool:
     last = places[-1] if places else math.inf
     for fix in facts.fixes:
         turns = {"surface_vel", "surface_ang_vel", "shear"} & set(fix.words)
-        if fix.begin < last <= fix.end and (fix.words[0].startswith(_DRIVES) or turns):
+        once = "once" in fix.after("insert_every")
+        if fix.begin < last <= fix.end and not once and (fix.words[0].startswith(_DRIVES) or turns):
             return True
     return False
 
@@ -366,7 +367,7 @@ class ContactSums:
             self._add_closure(rows, force, weight, run, at)
 
     def _add_closure(
-        self, rows: Floats, force: Floats, weight: Floats, run: Measures, at: Frame
+        self, rows: Ints, force: Floats, weight: Floats, run: Measures, at: Frame
     ) -> None:
         total = np.zeros((at.rows, 3))
         np.add.at(total, rows[0], force)

@@ -92,8 +92,8 @@ def contacts_with(
         hit = np.flatnonzero((distance < radius) & (distance > 0))
         bodies = np.stack([hit, np.full(len(hit), body)])
         parts.append((bodies, away[hit] / distance[hit, None], radius[hit] - distance[hit]))
-    bodies, normals, overlaps = zip(*parts, strict=True)
-    return np.concatenate(bodies, axis=1), np.concatenate(normals), np.concatenate(overlaps)
+    every, normals, overlaps = zip(*parts, strict=True)
+    return np.concatenate(every, axis=1), np.concatenate(normals), np.concatenate(overlaps)
 
 
 def _primitive(shape: str, sizes: Sequence[float]) -> Towards:

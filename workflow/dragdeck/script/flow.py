@@ -300,10 +300,7 @@ class _Reader:
 
     def _holds(self, condition: str, command: EngineCommand) -> bool | None:
         text = self._resolved(condition, command)
-        sides = re.fullmatch(r"\s*([^\s=!<>]+)\s*(==|!=)\s*([^\s=!<>]+)\s*", text)
         value = value_of(text, self._word)
-        if value is None and sides and "$" not in text and self._word(sides[1]) is None:
-            return (sides[1] == sides[3]) == (sides[2] == "==")
         if value is None:
             self._note(command, f"if {condition}: both ways are followed")
         return None if value is None else bool(value)

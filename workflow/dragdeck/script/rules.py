@@ -55,9 +55,9 @@ def no_friction(facts: Facts) -> Result:
 
 def different_wall(facts: Facts) -> Result:
     """DK102: walls without a model that the particles have, and with a coefficient for it."""
-    particles = next((law for law in facts.laws if law.wall is None), None)
+    particles = [law for law in facts.laws if law.wall is None]
     for keyword, name in _COEFFICIENTS.items() if particles else ():
-        model, several = particles.has(keyword), len(facts.values(name)) > 1
+        model, several = particles[0].has(keyword), len(facts.values(name)) > 1
         lacking = [
             (law, law.wall, value)
             for law in facts.laws
@@ -73,9 +73,10 @@ def different_wall(facts: Facts) -> Result:
 
 def _at_wall(facts: Facts, wall: Fix, name: str) -> float:
     """The largest coefficient of particles with a wall."""
-    values = facts.values(name)
-    types = math.isqrt(len(values))
-    pairs = [facts.of_pair(name, a, b) for b in facts.wall_types(wall) for a in range(1, types + 1)]
+    types = math.isqrt(len(facts.values(name)))
+    kinds = {"".join(fix.after("atom_type")) for fix in facts.styled("particletemplate/")}
+    inserted = {int(kind) for kind in kinds if kind.isdigit()} or range(1, types + 1)
+    pairs = [facts.of_pair(name, a, b) for b in facts.wall_types(wall) for a in inserted]
     return max((value for value in pairs if value is not None), default=0.0)
 
 
