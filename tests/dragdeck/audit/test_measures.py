@@ -114,8 +114,8 @@ def test_spin_and_rest(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> No
     assert hits(report(tmp_path, capsys))["DK205"] == {"spin_rad_s": 408, "count": 1}
     settled(tmp_path, sphere(1, 0.01, v=0.1))
     assert hits(report(tmp_path, capsys)) == {"DK206": {"energy_j_kg": pytest.approx(0.005)}}
-    driven = DECK.replace("run 8000", "fix turn all move/mesh mesh p rotate origin 0 0 0 axis 0 0 1 "
-                          "period 1\nrun 8000")  # fmt: skip
+    turn = "fix turn all move/mesh mesh p rotate origin 0 0 0 axis 0 0 1 period 1\n"
+    driven = DECK.replace("run 8000", f"{turn}run 8000")
     dump(tmp_path, *([sphere(1, 0.01, v=v)] for v in (0.1, 0.1, 0.1, 0.1, 0.1, 0.1)))
     assert hits(report(tmp_path, capsys, text=driven)) == {}
     dump(tmp_path, *([sphere(1, 0.01, v=v)] for v in (0.1, 0.1, 0.1, 0.1, 0.2, 0.2)))
