@@ -5,7 +5,9 @@ from pathlib import Path
 import audit_decks
 import pytest
 from audit_decks import DECK, LAW, PRESS, SIDES, without
+from paths import ROOT
 
+from dragdeck.decks.render import findings_on
 from dragdeck.errors import InputError
 from dragdeck.script.findings import Finding, NotApplied, acceptances, rules, without_accepted
 from dragdeck.script.flow import read_script
@@ -153,3 +155,31 @@ def test_comments_accept_findings_and_unused_ones_are_noted(tmp_path: Path) -> N
     file = audit_decks.write(tmp_path, DECK.replace("DK111 the", "DK999 the"))
     with pytest.raises(InputError, match="no such rule"):
         acceptances(read_script(file))
+
+
+GOLDEN = sorted((ROOT / "tests" / "golden").glob("*.liggghts"))
+
+
+@pytest.mark.parametrize("file", GOLDEN, ids=lambda file: file.name)
+def test_scripts_of_the_project_have_no_finding(file: Path) -> None:
+    text = file.read_text()
+    assert findings_on(text) == []
+    assert sum("dragdeck: ignore" in line for line in text.splitlines()) <= 1
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "rule"),
+    [
+        ("pair_style gran model hertz tangential history", "pair_style gran model hertz", "DK101"),
+        (f"wall/gran model {LAW} primitive", "wall/gran model hertz primitive", "DK102"),
+        (
+            "dump write_contacts",
+            "compute late all pair/gran/local id\ndump write_contacts",
+            "DK112",
+        ),
+    ],
+)
+def test_what_a_template_spoils_is_found(old: str, new: str, rule: str) -> None:
+    (text,) = (file.read_text() for file in GOLDEN if "process" in file.name)
+    assert old in text
+    assert [finding.rule for finding in findings_on(text.replace(old, new))] == [rule]
