@@ -250,12 +250,15 @@ class Measures:
             yield NotApplied("DK205", "no velocities and spins in the last frame")
             return
         gravity = float(np.linalg.norm(self.facts.gravity or [0.0]))
+        if not gravity:
+            yield NotApplied("DK205", "no gravity, with which the energy of a spin is compared")
+            return
         radius = radii_of(self.last)
         moving = 0.5 * (self.last.vectors("vx", "vy", "vz") ** 2).sum(axis=1)
         unit = 2 * gravity * radius
         spins = (_of_spin(self.last, radius) > _SPINS * unit) & (moving < _AT_REST * unit)
         slow = np.median(moving) <= _AT_REST * np.median(unit)
-        if gravity and slow and spins.any():
+        if slow and spins.any():
             rate = np.linalg.norm(self.last.vectors("omegax", "omegay", "omegaz"), axis=1)
             at = int(np.where(spins, rate, 0).argmax())
             message = f"particle {int(self.last.columns['id'][at])} spins at {rate[at]:.3g} rad/s "
