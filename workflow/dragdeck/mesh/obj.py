@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -68,45 +69,61 @@ _Piece = tuple[Floats, Integers, Integers]
 
 def _quickly(piece: str) -> _Piece | None:
     """What is in a piece if it is written as nearly every program does."""
-    text = one_space(f"\n{piece}\n")
+    text = one_space("\n" + piece.strip("\n") + "\n")
     if any(mark in text for mark in _SLOWLY) or not text.replace("\n", "").isprintable():
         return None
-    lines = text.split("\n")
-    nodes = [line for line in lines if line.startswith("v ")]
-    layout = ["v", NUMBER, NUMBER, NUMBER, *[ANY] * (nodes[0].count(" ") - 3 if nodes else 0)]
-    points = _columns(nodes, layout)
-    facets: dict[int, list[str]] = {}
-    for line in lines:
-        if line.startswith("f "):
-            facets.setdefault(line.count(" "), []).append(line)
-    corners = [_facets(rows, count) for count, rows in facets.items()]
-    if points is None or any(named is None for named in corners):
+    points, corners, sizes = np.empty((0, 3)), [np.empty(0, int)], [np.empty(0, int)]
+    for key, rows in _alike(text):
+        columns = _nodes(rows) if key == "v" else _facets(rows)
+        if columns is None:
+            return None
+        if key == "v":
+            points = np.column_stack(columns)
+        else:
+            corners.append(np.column_stack(columns).ravel() - 1)
+            sizes.append(np.full(len(columns[0]), len(columns)))
+    named = np.concatenate(corners)
+    return (points, named, np.concatenate(sizes)) if named.min(initial=0) >= 0 else None
+
+
+def _alike(text: str) -> Iterator[tuple[str, bytes]]:
+    """Rows of nodes, and those of facets with the same number of words; each with its key."""
+    every = text.count("\n") - 1
+    for key in "vf":
+        if text.count(f"\n{key} ") == every and (key == "v" or _is_uniform(text[1:].encode())):
+            yield key, text[1:].encode()
+            return
+    if text.count("\nv ") + text.count("\nf ") == 0:
+        return
+    rows: dict[tuple[str, int], list[str]] = {}
+    for line in text.split("\n"):
+        if line.startswith(("v ", "f ")):
+            key = line[0]
+            rows.setdefault((key, line.count(" ") if key == "f" else 0), []).append(line)
+    for (key, _), lines in rows.items():
+        yield key, "\n".join([*lines, ""]).encode()
+
+
+def _nodes(rows: bytes) -> list[Any] | None:
+    """Coordinates of nodes, (N,) each; more numbers may stand behind them."""
+    more = rows[: rows.find(b"\n")].count(b" ") - 3
+    return quick_columns(rows, ["v", *[NUMBER] * 3, *[ANY] * more])
+
+
+def _is_uniform(rows: bytes) -> bool:
+    """Whether all rows have the same words but for their digits."""
+    form = rows[: rows.find(b"\n") + 1].translate(None, _DIGITS)
+    return rows.translate(None, _DIGITS) == rows.count(b"\n") * form
+
+
+def _facets(rows: bytes) -> list[Any] | None:
+    """Numbers of nodes of each corner, (M,), if all are named in the same way and from the first."""
+    first = rows[: rows.find(b"\n")].decode()
+    match, count = _FACET.fullmatch(first), first.count(" ")
+    if not match or not 3 <= count <= _FEW_CORNERS or not _is_uniform(rows):
         return None
-    sizes = [np.full(len(rows), count) for count, rows in facets.items()]
-    named = [rows.ravel() for rows in corners if rows is not None]
-    start = [np.empty(0, int)]
-    return points.reshape(-1, 3), np.concatenate(start + named), np.concatenate(start + sizes)
-
-
-def _facets(lines: list[str], count: int) -> Integers | None:
-    """Nodes of polygons, (M, count), if all name them in the same way and from the first."""
-    first, text = _FACET.fullmatch(lines[0]), "".join(f"{line}\n" for line in lines).encode()
-    if first is None or not 3 <= count <= _FEW_CORNERS:
-        return None
-    form = f"{lines[0]}\n".encode().translate(None, _DIGITS)
-    if text.translate(None, _DIGITS) != len(lines) * form:
-        return None
-    layout = ["f", *[WHOLE, *[ANY] * first["beside"].count("/")] * count]
-    columns = quick_columns(text.replace(b"/", b" "), layout)
-    named = None if columns is None else np.column_stack(columns) - 1
-    return None if named is None or named.min() < 0 else named
-
-
-def _columns(lines: list[str], layout: Sequence[str]) -> Floats | None:
-    if not lines:
-        return np.empty((0, 3))
-    columns = quick_columns("".join(f"{line}\n" for line in lines).encode(), layout)
-    return None if columns is None else np.column_stack(columns)
+    layout = ["f", *[WHOLE, *[ANY] * match["beside"].count("/")] * count]
+    return quick_columns(rows.replace(b"/", b" "), layout)
 
 
 def _slowly(piece: str, first: int, before: int) -> _Piece:
