@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -166,6 +167,7 @@ def _vtk(path: Path) -> Polygons:
     """Read legacy VTK or VTU; meshio's own `read` ends the interpreter on bad files."""
     import meshio
 
+    _refuse_cut(path)
     content = {".vtk": meshio.vtk.read, ".vtu": meshio.vtu.read}[path.suffix.lower()](path)
     blocks = [block for block in content.cells if block.type not in ("vertex", "line")]
     for block in blocks:
@@ -178,6 +180,19 @@ def _vtk(path: Path) -> Polygons:
             )
     points = np.asarray(content.points, dtype=np.float64).reshape(len(content.points), 3)
     return Polygons(points, [np.asarray(block.data, dtype=np.int64) for block in blocks])
+
+
+def _refuse_cut(path: Path) -> None:
+    """Refuse a file that ends before what it announces, which meshio may take long to see."""
+    content = path.read_bytes()
+    if path.suffix.lower() == ".vtk":
+        counts = re.findall(rb"^POINTS\s+(\d{1,18})|^CELLS\s+\d+\s+(\d{1,18})", content, re.M)
+        numbers = sum(3 * int(points or 0) + int(cells or 0) for points, cells in counts)
+        if 2 * numbers > len(content):
+            value = f"{len(content)} bytes, {numbers} numbers announced"
+            raise InputError("the file was cut short", value=value)
+    elif not content.rstrip().endswith(b"</VTKFile>"):
+        raise InputError("the file was cut short", limit='"</VTKFile>" at its end')
 
 
 def _bytes(read: Callable[[bytes], Polygons]) -> Callable[[Path], Polygons]:

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import islice, takewhile
+from itertools import takewhile
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -241,63 +241,70 @@ class _Lines:
     unit = "lines"
 
     def __init__(self, body: bytes, head: re.Match[bytes]) -> None:
-        text = text_of(head.string[: head.end()])
         rows = mesh_text(body)
         refuse_two_marks(rows, "^.*")
         self._pieces = pieces(rows, _LINE, "a line")
-        self._before, self._lines = text.count("\n"), iter(list[tuple[int, str]]())
-        self._kept: list[tuple[int, str]] = []
-        self._likely = _FEW
-
-    def _next(self, most: int) -> list[tuple[int, str]]:
-        """The next lines, with their numbers, as many as stand in one piece."""
-        if self._kept:
-            kept, self._kept = self._kept[:most], self._kept[most:]
-            return kept
-        while not (lines := [*islice(self._lines, most)]):
-            line, piece = next(self._pieces, (0, ""))
-            if not piece:
-                return []
-            first = self._before + line
-            numbered = enumerate(one_space(piece).split("\n"), first)
-            self._lines = iter([each for each in numbered if each[1]])
-        return lines
+        self._before = text_of(head.string[: head.end()]).count("\n")
+        self._text, self._line, self._likely = "", 0, _FEW
 
     def take(self, element: _Element, most: int) -> tuple[int, _Values]:
         """As in `_Rows`."""
-        lines = self._next(most)
-        if not lines:
-            raise element.wrong_row("the end of the file")
-        (number, first), words = lines[0], lines[0][1].split(" ")
+        self._fill()
+        first, words = self._text.partition("\n")[0], self._text.partition("\n")[0].split(" ")
         lengths = _lengths(element, words)
         if lengths is None:
-            raise element.wrong_row(first[:60], line=number)
-        spaces = first.count(" ")
-        run = [*takewhile(lambda each: each[1].count(" ") == spaces, lines[: self._likely])]
-        text = "".join(f"{line}\n" for _, line in run).encode()
-        columns = quick_columns(text, [NUMBER] * len(words)) if len(run) > _FEW else None
+            value, line = (first[:60], self._line) if first else ("the end of the file", None)
+            raise element.wrong_row(value, line=line)
+        rows = _cut(self._text, min(most, self._likely))[0]
+        columns = quick_columns(f"{rows}\n".encode(), [NUMBER] * len(words))
         if columns is None:
-            columns = [*np.array([numbers(line.split(" "), line_no) for line_no, line in run]).T]
-        alike = np.ones(len(run), dtype=bool)
+            self._likely = _FEW
+            lines = _cut(rows, _FEW)[0].split("\n")
+            alike_lines = takewhile(lambda line: line.count(" ") == len(words) - 1, lines)
+            numbered = enumerate(alike_lines, self._line)
+            columns = [*np.array([numbers(line.split(" "), number) for number, line in numbered]).T]
+        alike = np.ones(len(columns[0]), dtype=bool)
         values, place = dict[str, Any](), 0
         for each, length in zip(element.properties, lengths, strict=True):
             if each.count:
                 alike &= columns[place] == length
-                values[each.name] = np.array(columns[place + 1 : place + 1 + length]).T
-                values[each.name] = values[each.name].reshape(len(run), length)
+                listed = np.array(columns[place + 1 : place + 1 + length]).T
+                values[each.name] = listed.reshape(len(alike), length)
             else:
                 values[each.name] = columns[place]
             place += 1 + length
         count, self._likely = _alike(alike, self._likely)
-        self._kept = lines[count:] + self._kept
+        self._text = _cut(self._text, count)[1]
+        self._line += count
         return count, {name: column[:count] for name, column in values.items()}
+
+    def _fill(self) -> None:
+        """Go on to the next line that is not blank."""
+        while not (text := self._text.lstrip("\n")):
+            line, piece = next(self._pieces, (0, ""))
+            if not piece:
+                break
+            self._text, self._line = one_space(piece), self._before + line
+        self._line += len(self._text) - len(text)
+        self._text = text
 
     def rest(self) -> int:
         """As in `_Rows`."""
-        rest = len(self._kept)
-        while lines := self._next(1 << 20):
-            rest += len(lines)
-        return rest
+        rest = 0
+        while True:
+            self._fill()
+            if not self._text:
+                return rest
+            rest += self._text.count("\n") + (not self._text.endswith("\n"))
+            self._text = ""
+
+
+def _cut(text: str, lines: int) -> tuple[str, str]:
+    """So many lines, without the end of the last, and the rest."""
+    if text.count("\n") < lines:
+        return text, ""
+    parts = text.split("\n", lines)
+    return "\n".join(parts[:lines]), parts[lines]
 
 
 def _lengths(element: _Element, words: Sequence[str]) -> list[int] | None:
