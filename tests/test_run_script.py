@@ -211,7 +211,10 @@ def test_every_option_of_snakemake_is_passed_on_or_refused(clone: Clone) -> None
         for word in action.option_strings
     ]
     assert {*NOTHING.split()} <= {action.dest for action in options}
-    script = 'set -eu; . "$1"; shift; for word in "$@"; do (refuse_partial "$word" 2>/dev/null) || echo "$word"; done'
+    script = """
+set -eu; . "$1"; shift
+for word in "$@"; do (refuse_partial "$word" 2>/dev/null) || echo "$word"; done
+"""
     words = [word for word, _ in refusals]
     asked = [clone.root / "workflow/run.sh", *words]
     shown = subprocess.run(["sh", "-c", script, "sh", *asked], cwd=clone.root, text=True,
@@ -222,7 +225,7 @@ def test_every_option_of_snakemake_is_passed_on_or_refused(clone: Clone) -> None
 @pytest.mark.parametrize(
     ("word", "refusal"),
     [
-        *((word, "runs nothing") for word in ("--unt", "--touc", "--until=a", "-kt", "-pU", "--unlock")),
+        *((word, "runs nothing") for word in ("--unt", "--touc", "--until=a", "-kt", "-pU")),
         *((word, "the folder of this script") for word in ("-d", "-pd", "--directory=a", "--dir")),
     ],
 )  # fmt: skip

@@ -66,8 +66,8 @@ def ply(vertex: str = "property float x\nproperty float y\nproperty float z\n",
 
 
 def binary_ply(list_count: str = "uchar", row: str = "<B3i", count: int = 3) -> bytes:
-    head = ply("property double x\nproperty double y\nproperty double z\n",
-               f"property list {list_count} int vertex_indices\n").split("end_header")[0]  # fmt: skip
+    axes = "property double x\nproperty double y\nproperty double z\n"
+    head = ply(axes, f"property list {list_count} int vertex_indices\n").split("end_header")[0]
     return (
         head.replace("ascii", "binary_little_endian").encode()
         + b"end_header\n"

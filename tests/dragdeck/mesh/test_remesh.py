@@ -112,7 +112,7 @@ def test_however_mmg_ends_the_remedy_is_one_for_a_surface(
         return subprocess.CompletedProcess([], code, b"", b"")
 
     monkeypatch.setattr(subprocess, "run", ended)
-    with pytest.raises(InputError, match="too long|damaged") as caught:
+    with pytest.raises(InputError, match=r"too long|damaged") as caught:
         files.read(bar, "mm", SIZE_M)
     assert "facet_size_m" in str(caught.value.remedy)
     assert not re.search("edge_facet_size_m|STEP", str(caught.value.remedy))

@@ -53,8 +53,8 @@ def read(
 ) -> Trimesh:
     """Read a surface from STL (ASCII or binary), OBJ, PLY, legacy VTK or VTU, or mesh a STEP part.
 
-    STL, OBJ and PLY are read by modules here, the rest by meshio. VTK polygon data is refused: meshio
-    does not know it, and VTK's own reader fills a file that was cut short with whatever the memory
+    Modules here read STL, OBJ and PLY, meshio the rest. VTK polygon data is refused: meshio does
+    not know it, and VTK's own reader fills a file that was cut short with whatever the memory
     holds. gmsh meshes STEP; MMG meshes a closed surface anew for which a facet size is given.
 
     Parameters

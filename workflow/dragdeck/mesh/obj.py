@@ -117,7 +117,7 @@ def _is_uniform(rows: bytes) -> bool:
 
 
 def _facets(rows: bytes) -> list[Any] | None:
-    """Numbers of nodes of each corner, (M,), if all are named in the same way and from the first."""
+    """Numbers of nodes of each corner, (M,), if all are named alike and from the first."""
     first = rows[: rows.find(b"\n")].decode()
     match, count = _FACET.fullmatch(first), first.count(" ")
     if not match or not 3 <= count <= _FEW_CORNERS or not _is_uniform(rows):

@@ -59,10 +59,7 @@ class _Element(NamedTuple):
         """A row that is not what the header announces."""
         names = (f"list {each.name}" if each.count else each.name for each in self.properties)
         return InputError(
-            f"not a row of the element {self.name!a}",
-            value=value,
-            limit=" ".join(names),
-            **place,
+            f"not a row of the element {self.name!a}", value=value, limit=" ".join(names), **place
         )
 
 

@@ -6,7 +6,15 @@ import numpy as np
 
 from dragdeck.arrays import ANY, NUMBER, quick_columns
 from dragdeck.errors import InputError
-from dragdeck.mesh.polygons import Polygons, by_size, mesh_text, numbers, one_space, pieces, refuse_two_marks
+from dragdeck.mesh.polygons import (
+    Polygons,
+    by_size,
+    mesh_text,
+    numbers,
+    one_space,
+    pieces,
+    refuse_two_marks,
+)
 from dragdeck.mesh.surface import Floats
 
 _SPACES = r"\s+\S+" * 3
