@@ -18,6 +18,7 @@ import pytest
 from entry import write_entry
 from packaging.requirements import Requirement
 from paths import ROOT
+from snakemake.cli import get_argument_parser
 
 SYSTEM_TOOLS = """
     bash cat cksum df dirname env false find flock grep id readlink rm sed sh sleep tr true
@@ -188,6 +189,54 @@ def test_a_dry_run_ends_after_what_it_can_tell(clone: Clone, command: str, optio
     called = [line for line in ended.stdout.splitlines() if line.startswith("snakemake")]
     assert len(called) == (2 if command == "compare" else 1)
     assert len(called) == len(ended.stdout.splitlines())
+
+
+NOTHING = """
+    allowed_rules archive batch cleanup_metadata cleanup_shadow conda_cleanup_envs
+    conda_create_envs_only container_cleanup_images containerize d3dag dag delete_all_output
+    delete_temp_output detailed_summary draft_notebook edit_notebook export_cwl filegraph
+    generate_unit_tests help immediate_submit lint list_changes list_conda_envs list_input_changes
+    list_params_changes list_rules list_target_rules list_untracked mode omit_from
+    print_compilation report rulegraph summary target_jobs touch unlock until version
+"""
+"""What Snakemake calls its options with which it runs nothing, or not all."""
+
+
+def test_every_option_of_snakemake_is_passed_on_or_refused(clone: Clone) -> None:
+    """Those that keep a study from its end, by all their names; no other one."""
+    options = get_argument_parser()._actions
+    refusals = [
+        (word, action.dest in NOTHING.split())
+        for action in options
+        for word in action.option_strings
+    ]
+    assert {*NOTHING.split()} <= {action.dest for action in options}
+    script = """
+set -eu; . "$1"; shift
+for word in "$@"; do (refuse_partial "$word" 2>/dev/null) || echo "$word"; done
+"""
+    words = [word for word, _ in refusals]
+    asked = [clone.root / "workflow/run.sh", *words]
+    shown = subprocess.run(["sh", "-c", script, "sh", *asked], cwd=clone.root, text=True,
+                           capture_output=True, check=True)  # fmt: skip
+    assert shown.stdout.split() == [word for word, refused_ in refusals if refused_]
+
+
+@pytest.mark.parametrize(
+    ("word", "refusal"),
+    [
+        *((word, "runs nothing") for word in ("--unt", "--touc", "--until=a", "-kt", "-pU")),
+        *((word, "the folder of this script") for word in ("-d", "-pd", "--directory=a", "--dir")),
+    ],
+)  # fmt: skip
+def test_an_option_is_seen_in_any_form(clone: Clone, word: str, refusal: str) -> None:
+    assert refused(clone.run("compare", "--config", "studies=a", word, "a"), refusal)
+
+
+@pytest.mark.parametrize("word", ["-j4", "-c1", "-k", "-Rtouch", "--jobs=2", "--keep-going", "-T2"])
+def test_an_option_that_keeps_all_jobs_is_passed_on(clone: Clone, word: str) -> None:
+    ended = clone.run("compare", "--config", "studies=a", word)
+    assert f"[{word}]" in ended.stdout and "dragchain [compare]" in ended.stdout
 
 
 STEPS = """\

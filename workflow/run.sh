@@ -83,35 +83,62 @@ ensure_writable() {
 
 check_profile() {
     case " $* " in
-        *" --profile profiles/slurm"*) fail "this profile would be combined with profiles/default" \
+        *" --profile profiles/slurm"* | *" --profile=profiles/slurm"*) fail \
+            "this profile would be combined with profiles/default" \
             "value:  --profile profiles/slurm" "limit:  the cores of profiles/default would limit the MPI ranks of a run" \
             "remedy: --workflow-profile profiles/slurm" ;;
     esac
 }
 
-# Letters behind one - may be several options: -np is -n and -p.
+# The letters of a word such as -np; those behind one that takes a value belong to the value.
+letters_of() {
+    case $1 in --* | -) return ;; -*) ;; *) return ;; esac
+    letters=${1#-}
+    printf '%s' "${letters%%[sjcCePRqwT]*}"
+}
+
 is_dry_run() {
     for word in "$@"; do
-        case $word in
-            --dry-run | --dryrun) return 0 ;;
-            --* | -*[!A-Za-z]*) ;;
-            -*n*) return 0 ;;
-        esac
+        case $word in --dry*) return 0 ;; esac
+        case $(letters_of "$word") in *n*) return 0 ;; esac
     done
     return 1
 }
 
-# Refuse options with which Snakemake runs nothing, or not all: the next step would not come.
+# Results would be written elsewhere, where this script does not look for them.
+refuse_elsewhere() {
+    for word in "$@"; do
+        letters=$(letters_of "$word")
+        case $word:$letters in
+            --dir*:* | *:*d*) fail "results are written to the folder of this script" "value:  $word" \
+                "remedy: copy the project, or make one there with: dragdeck init FOLDER" ;;
+        esac
+    done
+}
+
+# Options with which Snakemake runs nothing, or not all, and those letters that are short for one.
+partial_options="--allowed-rules --archive --batch --cleanup-metadata --cleanup-shadow --cm
+    --conda-cleanup-envs --conda-create-envs-only --container-cleanup-images --containerize --d3dag
+    --dag --delete-all-output --delete-temp-output --detailed-summary --draft-notebook
+    --edit-notebook --export-cwl --filegraph --generate-unit-tests --help --immediate-submit --is
+    --lc --li --lint --list --list-changes --list-conda-envs --list-input-changes
+    --list-params-changes --list-rules --list-target-rules --list-untracked --lp --lt --lu --mode
+    --omit-from --print-compilation --report --rulegraph --summary --target-jobs --touch --unlock
+    --until --version"
+partial_letters=DOSUhltv
+
+# Refuse them, abbreviated too: the next step would not come.
 refuse_partial() {
     for word in "$@"; do
+        refused=
+        case $(letters_of "$word") in *[$partial_letters]*) refused=$word ;; esac
         case $word in
-            --list* | --summary | --detailed-summary | -D | -S | -l | --dag | --d3dag | --rulegraph* | --filegraph* | --lint* | \
-                --unlock | --cleanup-* | --delete-* | --archive* | --report* | --touch | -t | --until* | -U | --omit-from* | -O | \
-                --batch* | --containerize | --conda-create-envs-only | --generate-unit-tests* | --print-compilation | --version | -v)
-                fail "this option runs nothing, or not all of it" "value:  $word" \
-                    "remedy: leave it out, or give it with a target of one study: ./run report"
-                ;;
+            --?*) for option in $partial_options; do
+                case $option in "${word%%=*}"*) refused=$word ;; esac
+            done ;;
         esac
+        [ -z "$refused" ] || fail "this option runs nothing, or not all of it" "value:  $word" \
+            "remedy: leave it out, or give it with a target of one study: ./run report"
     done
 }
 
@@ -178,6 +205,7 @@ call() {
         dragdeck | dragchain) exec "$@" ;;
         status | open) exec dragdeck "$@" ;;
         *)
+            refuse_elsewhere "$@"
             ensure_writable
             # Snakemake finds a logger plugin in folders of Python's path only, and a clone that is
             # installed has its packages in none of them.

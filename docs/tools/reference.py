@@ -21,6 +21,7 @@ from worked_examples import EXAMPLES, study_text
 
 from dragchain.cli import PROGRAM as DRAGCHAIN
 from dragdeck.cli import PROGRAM as DRAGDECK
+from dragdeck.script.findings import rules
 from dragdeck.study.model import BUILT_IN_FIDELITIES, Fidelity, Study
 from dragdeck.study.plausible import plausible_range
 
@@ -310,6 +311,12 @@ def bibliography() -> str:
     return "\n\n".join(f"## {entry.key}\n\n{entry.text.render(backend)}" for entry in formatted)
 
 
+def audit_rules() -> str:
+    """The rules of ``dragdeck audit``."""
+    rows = [(rule.id, rule.severity, rule.title) for rule in rules().values()]
+    return markdown_table(("id", "severity", "title"), rows)
+
+
 TEXTS: dict[str, Callable[[], str]] = {
     "fields": fields,
     "fidelities": fidelities,
@@ -317,6 +324,7 @@ TEXTS: dict[str, Callable[[], str]] = {
     "dragchain": lambda: command_sections(DRAGCHAIN.parser()),
     "columns": columns,
     "bibliography": bibliography,
+    "rules": audit_rules,
     **{f"study_{name}": partial(study_text, name) for name in EXAMPLES},
 }
 """What a page can enclose by two comments."""

@@ -21,6 +21,10 @@ STUDY = "quickstart"
 WAYPOINTS = "time_s,x_m,y_m\n0,0.02,0\n2,0,0.02\n5,-0.02,0\n"
 """A recorded path that examples name."""
 
+SPEEDS = {"speed_m_s": 0.02, "plunge_speed_m_s": 0.2, "approach_speed_m_s": 0.2}
+SHORT = {"motion.path.revolutions": 0.2, **{f"motion.{name}": v for name, v in SPEEDS.items()}}
+"""Fields of the study without `--long`."""
+
 pytestmark = [pytest.mark.engine, pytest.mark.slow]
 
 
@@ -53,11 +57,11 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def clone(project: Path, pytestconfig: pytest.Config) -> Path:
     """The project with the results of its first study; from then on it has preloaded programs.
 
-    Without `--long` the study has a shorter path.
+    Without `--long` the study has a shorter path and a faster workpiece.
     """
     if not pytestconfig.getoption("--long"):
         study = project / "studies" / STUDY / "study.yaml"
-        put(plain := read_yaml(study), {"motion.path.revolutions": 0.2})
+        put(plain := read_yaml(study), SHORT)
         study.write_text(yaml.safe_dump(plain))
     runs(f"./run all --cores 1 --config study={STUDY}", project)
     for program in programs()[0].glob("[ds]*"):

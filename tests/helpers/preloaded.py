@@ -39,7 +39,7 @@ PRELOADED = (
     *("dragdeck.commands", "dragdeck.engine.run_folder", "dragdeck.rules"),
     *("dragchain.tables.write", "dragchain.network.write", "dragchain.loading.write"),
     *("dragchain.report.run_figures", "dragchain.report.study_report"),
-    *("meshio", "pyvista", "snakemake.cli", "trimesh"),
+    *("meshio", "pyvista.plotting", "scipy.signal", "snakemake.cli", "trimesh"),
 )
 PLACE = "DRAGDECK_TESTS_PRELOADED"
 """Variable with the socket of the process that forks."""

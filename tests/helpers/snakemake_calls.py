@@ -21,6 +21,13 @@ def copy_of_project(folder: Path, study: dict[str, Any] | None = None, name: str
     return folder
 
 
+def tiny_study() -> dict[str, Any]:
+    """The tiny study with time steps as long as other studies have, which nobody needs to kill."""
+    data: dict[str, Any] = yaml.safe_load((DATA / "tiny_study.yaml").read_text())
+    data["fidelities"]["quick"] |= {"timestep_fraction": 0.4, "filling_timestep_fraction": 0.2}
+    return data
+
+
 def snakemake(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     """Call Snakemake, preloaded with its commands unless a queue is to start them."""
     queued = "profiles/slurm" in arguments

@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 import yaml
 from preloaded import environment
-from snakemake_calls import copy_of_project, snakemake, succeed
+from snakemake_calls import copy_of_project, snakemake, succeed, tiny_study
 
 from dragdeck.cli import main
 
@@ -31,13 +31,13 @@ REJECTED = """{% extends "base/process.in.j2" %}
 
 @pytest.fixture(scope="module")
 def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return copy_of_project(tmp_path_factory.mktemp("project"), name="tiny")
+    return copy_of_project(tmp_path_factory.mktemp("project"), tiny_study(), "tiny")
 
 
 @pytest.fixture(scope="module")
 def piped(project: Path) -> str:
     """What a call without a terminal says."""
-    return succeed(project, *SHOWN, "--logger-dragdeck-every-s", "0.2", "all", *STUDY).stderr
+    return succeed(project, *SHOWN, "--logger-dragdeck-every-s", "0.1", "all", *STUDY).stderr
 
 
 @pytest.fixture

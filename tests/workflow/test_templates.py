@@ -3,18 +3,15 @@
 from pathlib import Path
 
 import pytest
-import yaml
 from doc_pages import template_examples
-from paths import DATA
-from snakemake_calls import copy_of_project, succeed
+from snakemake_calls import copy_of_project, succeed, tiny_study
 
 pytestmark = [pytest.mark.engine, pytest.mark.slow]
 
 
 def test_edited_templates_run_at_the_first_call(tmp_path: Path) -> None:
     """The contact law, damping and output of the how-to, after a filling without them."""
-    study = yaml.safe_load((DATA / "tiny_study.yaml").read_text())
-    project = copy_of_project(tmp_path, study)
+    project = copy_of_project(tmp_path, tiny_study())
     succeed(project, "filling", "--config", "study=small")
     folder = project / "studies/small/templates"
     folder.mkdir()

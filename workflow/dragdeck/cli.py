@@ -135,6 +135,30 @@ COMMANDS = (
                   help="terminate LIGGGHTS after this many seconds without output (default: "
                   "%(default)s)")),
             "./run dragdeck run results/uhlmann2015/filling/RUN"),
+    Command("audit", "check an input script that dragdeck did not write, and its dumps",
+            "Check any input script of LIGGGHTS, and what its run left: overlaps, speeds, lost "
+            "particles, stability of the time step, rest at the end. It needs no study and writes "
+            "nothing. Exit status: 1 with an error or a warning, 2 if an input cannot be read.",
+            "audit.command:audit", (
+        Argument("script", nargs="?", type=Path, metavar="SCRIPT", help="input script"),
+        Argument("--dump", nargs="+", default=[], metavar="PATTERN",
+                  help="dump custom of the run: a file, or a pattern with * for the step"),
+        Argument("--contacts", nargs="+", default=[], metavar="PATTERN",
+                  help="dump local of compute pair/gran/local with id and force"),
+        Argument("--log", type=Path, metavar="FILE", help="log of the run"),
+        Argument("--after", type=Path, metavar="SCRIPT",
+                  help="script that wrote the restart file from which this one starts"),
+        Argument("--var", nargs="+", action="append", default=[], metavar=("NAME", "VALUE"),
+                  help="value of a variable, as with -var of LIGGGHTS"),
+        Argument("--engine", action="store_true",
+                  help="also let LIGGGHTS read a copy of the script, up to a run of zero steps"),
+        Argument("--select", default="DK", metavar="IDS",
+                  help="apply only these rules: ids or their beginnings, separated by commas"),
+        Argument("--ignore", default="", metavar="IDS", help="do not apply these rules"),
+        Argument("--format", default="text", choices=("text", "json"),
+                  help="format of the output (default: %(default)s)"),
+        Argument("--explain", metavar="ID", help="explain a rule, with the evidence behind it")),
+            "./run dragdeck audit in.script --dump 'post/*.dump' --log log.liggghts"),
 )  # fmt: skip
 """What a user calls."""
 

@@ -37,7 +37,7 @@ class Command:
     """A command: the function that it calls, and that function's parameters.
 
     `help` is for the list of commands, `about` for the command's own help. What the function
-    returns is printed if it is text.
+    returns is printed if it is text, and the exit status if it is a number.
     """
 
     name: str
@@ -47,12 +47,13 @@ class Command:
     arguments: tuple[Argument, ...]
     example: str = ""
 
-    def run(self, package: str, options: Mapping[str, object]) -> None:
-        """Import the function, which is named within a package, and call it."""
+    def run(self, package: str, options: Mapping[str, object]) -> int:
+        """Import the function, which is named within a package, and call it: its exit status."""
         module, _, name = self.function.partition(":")
         said = getattr(import_module(f"{package}.{module}"), name)(**options)
         if isinstance(said, str):
             print(said)
+        return said if isinstance(said, int) else 0
 
 
 @dataclass(frozen=True)
@@ -152,7 +153,7 @@ def _add(parsers: Any, commands: Sequence[Command]) -> None:
         parser.set_defaults(_command=command)
 
 
-def guarded(program: str, call: Callable[[], None]) -> int:
+def guarded(program: str, call: Callable[[], int | None]) -> int:
     """Call a function; whatever goes wrong becomes one message on standard error.
 
     An unexpected error is written to a log file with its traceback; the message names the file.
@@ -160,10 +161,11 @@ def guarded(program: str, call: Callable[[], None]) -> int:
     Returns
     -------
     int
-        The exit status: 0, 1 after an error, 130 if the user interrupted it.
+        The exit status: that of the function, 1 after an error, 130 if the user interrupted it.
     """
+    status: int | None = 0
     try:
-        call()
+        status = call()
         sys.stdout.flush()
     except BrokenPipeError:  # who reads the output has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -173,7 +175,7 @@ def guarded(program: str, call: Callable[[], None]) -> int:
     except Exception as error:
         print(f"{program}: {_message(error, program)}", file=sys.stderr)
         return 1
-    return 0
+    return status or 0
 
 
 def _message(error: Exception, program: str) -> str:

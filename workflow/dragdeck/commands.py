@@ -23,7 +23,6 @@ from dragdeck.advice.forecast import (
 from dragdeck.cases.bed import clump_of
 from dragdeck.cases.case import Case
 from dragdeck.cases.ranks import check_ranks, cores_here
-from dragdeck.decks.engine_commands import contact_laws
 from dragdeck.decks.render import (
     changed_scripts,
     deck_text,
@@ -61,6 +60,7 @@ from dragdeck.scenes.lead import with_leads
 from dragdeck.scenes.process import SCENES
 from dragdeck.scenes.scene import SceneType, StudyScene, read_bed
 from dragdeck.scenes.workpiece import remeshing
+from dragdeck.script.commands import contact_laws
 from dragdeck.study.check import explained, warnings
 from dragdeck.study.contact_law import coefficients, modelled
 from dragdeck.study.recorded import recorded_file
@@ -158,7 +158,8 @@ class _Findings:
         except InputError as error:
             self.errors.append(error)
             raise
-        for text in (*map(str, scene.warnings), *_friction_unknown(used_templates)):
+        more = (*_friction_unknown(used_templates), *used_templates["script_findings"])
+        for text in (*map(str, scene.warnings), *more):
             self.warnings.setdefault(text, {})[case.name] = None
         notes = [not_corrected(case) if kind.needs_bed else ""]
         notes.append(changed_in_words(used_templates["changed_scripts"]))

@@ -238,6 +238,8 @@ class Workflow:
         self.cases: list[Case] = or_stop(project.cases, study, fidelity or None)
         self.points_of = cache(partial(or_stop, project.points, study))
         self.points_by_run = cache(self._points_by_run)
+        self.runs_of = cache(self._runs_of)
+        self.digest = cache(self._digest)
         self.templates_of = cache(self._templates_of)
 
     # --- paths -----------------------------------------------------------------------------
@@ -347,15 +349,20 @@ class Workflow:
         kind, cases = SCENES[scene], self.points_of(plan).of(SCENES[scene])
         return by_run(with_leads(cases) if leads and kind.needs_bed else cases, kind)
 
-    def _origins(self, place: str) -> Iterator[tuple[str, dict[str, Case]]]:
-        """Where cases of a folder's runs come from: how to name them, and by run."""
+    def _runs_of(self, place: str) -> dict[str, Case]:
+        """A case of the study for each folder of runs; of those that lead to others too."""
         scene, cases = PLACES[place], self.cases
         if place == WINDOWS:
             cases = [part for case in cases for part in (*windows_of(case), *whole_drag(case))]
         elif scene.needs_bed:
             cases = with_leads(cases)
+        return by_folder(cases, scene)
+
+    def _origins(self, place: str) -> Iterator[tuple[str, dict[str, Case]]]:
+        """Where cases of a folder's runs come from: how to name them, and by run."""
+        scene = PLACES[place]
         if place != POINTS:
-            yield self.fidelity_option, by_folder(cases, scene)
+            yield self.fidelity_option, self.runs_of(place)
         for plan in (self.plan, self.validation):
             try:
                 runs = self.points_by_run(scene.name, plan, leads=True)
@@ -414,7 +421,10 @@ class Workflow:
 
     def digest_of(self, place: str) -> FromRun[str]:
         """Hash of what a run's files say."""
-        return lambda wildcards: PLACES[place].digest(self.case_of(place, wildcards.run))
+        return lambda wildcards: self.digest(place, wildcards.run)
+
+    def _digest(self, place: str, run: str) -> str:
+        return PLACES[place].digest(self.case_of(place, run))
 
     def ranks_of(self, place: str) -> int | FromRun[int]:
         """Number of LIGGGHTS processes of a run."""

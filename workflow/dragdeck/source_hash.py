@@ -35,7 +35,7 @@ def source_hash(*modules: str) -> str:
     for name, file in sorted(files.items()):
         code = file.read_bytes()
         total.update(name.encode() + code)
-        data |= {*file.parent.glob("*.csv")}
+        data |= _tables(file.parent)
         data |= {known for known in _records(name) if f'{known.name}"'.encode() in code}
     for read in sorted(data):
         total.update(read.read_bytes())
@@ -60,19 +60,30 @@ def source_files(*modules: str) -> dict[str, Path]:
 def _file(name: str) -> Path | None:
     """The file of a module, found without importing what it stands in; None for another name."""
     package, *inner = name.split(".")
-    top = find_spec(package)
-    if top is None or top.origin is None:
+    folder = _folder(package)
+    if folder is None:
         return None
-    place = Path(top.origin).parent.joinpath(*inner)
+    place = folder.joinpath(*inner)
     files = (place / "__init__.py", place.with_suffix(".py"))
     return next((file for file in files if file.is_file()), None)
 
 
 @cache
+def _folder(package: str) -> Path | None:
+    top = find_spec(package)
+    return None if top is None or top.origin is None else Path(top.origin).parent
+
+
+@cache
+def _tables(folder: Path) -> frozenset[Path]:
+    return frozenset(folder.glob("*.csv"))
+
+
+@cache
 def _records(module: str) -> tuple[Path, ...]:
     """The files in the folder ``data/`` of a module's package."""
-    top = _file(module.partition(".")[0])
-    return tuple(top.parent.glob("data/*.*")) if top else ()
+    folder = _folder(module.partition(".")[0])
+    return tuple(folder.glob("data/*.*")) if folder else ()
 
 
 @cache
@@ -81,12 +92,14 @@ def _imports(file: Path, package: str) -> tuple[str, ...]:
     return tuple(name for name in _imported(file) if name.partition(".")[0] in packages)
 
 
+_BLOCKS = ("body", "orelse", "handlers", "finalbody", "cases")
+"""Where a statement has others inside; no expression imports anything."""
+
+
 def _imported(file: Path) -> Iterator[str]:
     statements: list[ast.AST] = [ast.parse(file.read_bytes())]
-    for node in statements:  # and those inside them: no expression imports anything
-        statements += (
-            child for child in ast.iter_child_nodes(node) if not isinstance(child, ast.expr)
-        )
+    for node in statements:
+        statements += (child for block in _BLOCKS for child in getattr(node, block, ()))
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module is not None:

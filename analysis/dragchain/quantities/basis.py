@@ -157,8 +157,9 @@ def _why_not(case: CaseOfRun) -> str:
 def notes(case: CaseOfRun) -> list[str]:
     """What each setting of a process run does to its numbers, one sentence each."""
     changed = changed_in_words(case.changed_scripts)
-    own = [f"{changed[0].upper()}{changed[1:]}."] if changed else []
-    return [*own, *_of_modulus_and_speed(case), _of_step(case)]
+    of_script = [f"{changed[0].upper()}{changed[1:]}."] if changed else []
+    of_script += [f"{finding}." for finding in case.script_findings]
+    return [*of_script, *_of_modulus_and_speed(case), _of_step(case)]
 
 
 def _of_modulus_and_speed(case: CaseOfRun) -> Iterator[str]:

@@ -1,7 +1,7 @@
 """The report on a study's runs, and on those without a result: a table and one page."""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
+from dragchain.arrays import Floats
 from dragchain.errors import MissingRunsError, TableError
 from dragchain.report.cases import (
     ReportedCase,
@@ -22,6 +23,7 @@ from dragchain.report.cases import (
 from dragchain.report.findings import Findings
 from dragchain.report.page import NETWORK_PAGE, data_uri, file_uri, render_page, write_bundle
 from dragchain.report.removal import UM_PER_H, RemovalOfCase, removal_of, touch_rows, touches_per_s
+from dragchain.report.roughness import RoughnessOfCase, roughness_of
 from dragchain.report.spreadsheet import summary_workbook
 from dragchain.report.summary import summary
 from dragchain.report.tolerance import answers
@@ -213,9 +215,10 @@ def write_study_report(
         table = summary(studies)
         cases = cases_of(studies)
         removed = [(one, *found) for one in cases if (found := _removed(one))]
+        rough = {one.key: course for one, of, _ in removed if (course := roughness_of(one, of))}
         signals = _signals(cases, signal)
         picture = file_uri(preview) if preview else None
-        page = _render(sections, cases, missing, picture, removed, signals)
+        page = _render(sections, cases, missing, picture, removed, rough, signals)
         earlier = {file.resolve() for name in _OF_CASES for file in out_dir.glob(name)}
         for file in earlier - {section.network for section in sections}:
             file.unlink()
@@ -224,6 +227,8 @@ def write_study_report(
                 write_bytes(out_dir / name, section.network.read_bytes())
         assumed = {one.study.process.case.run: one.assumptions for one in sections}
         maps = {f"{one.key}-removal": found.facets for one, found, _ in removed}
+        for key, course in rough.items():
+            maps[f"{key}-removal"] = maps[f"{key}-removal"].join(course.ra)
         write_bundle(
             out_dir,
             tables={"summary": table, **maps} | _tables(signals),
@@ -300,6 +305,7 @@ def _render(
     missing: Sequence[MissingRun],
     preview: str | None,
     removed: Sequence[tuple[ReportedCase, RemovalOfCase, str]],
+    rough: Mapping[str, RoughnessOfCase],
     signals: Sequence["SignalComparison"],
 ) -> str:
     """The page: HTML that needs no other file and no network."""
@@ -323,6 +329,7 @@ def _render(
         shown=_SHOWN,
         asked=[(one, answer) for one in cases for answer in answers(one)],
         removed=removed,
+        rough=[(one, of, _ra_map(one, of)) for one in cases if (of := rough.get(one.key))],
         largest_error=LARGEST_ERROR,
         touched=[(one, rows, *touches_per_s(one)) for one in cases if (rows := touch_rows(one))],
     )
@@ -333,17 +340,27 @@ def _removed(one: ReportedCase) -> tuple[RemovalOfCase, str] | None:
     found = removal_of(one)
     if found is None:
         return None
+    label = "depth of removal (µm/h), mean over areas of a particle's radius"
+    title = f"{one.name}: depth of removal by {found.removal.law}"
+    depth = found.facets["depth_m_s"].to_numpy(np.float64)
+    return found, _surface_map(one, UM_PER_H * depth, label, title)
+
+
+def _ra_map(one: ReportedCase, found: RoughnessOfCase) -> str:
+    """The map of the roughness of a case as a picture."""
+    title = f"{one.name}: roughness after {found.map_minutes:.3g} min"
+    return _surface_map(one, 1e6 * found.ra["ra_m"].to_numpy(np.float64), "Ra (µm)", title)
+
+
+def _surface_map(one: ReportedCase, values: Floats, label: str, title: str) -> str:
+    """Values of the facets of a case as a picture."""
     from dragchain.figures.style import drawing, png
     from dragchain.loading.figure import surface_figure
 
     run = one.first.process
-    label = "depth of removal (µm/h), mean over areas of a particle's radius"
-    title = f"{one.name}: depth of removal by {found.removal.law}"
     with drawing():
         surface = read_surface(run.folder, run.case)
-        depth = found.facets["depth_m_s"].to_numpy(np.float64)
-        figure = surface_figure(run.case, surface, UM_PER_H * depth, label, title)
-        return found, data_uri(png(figure))
+        return data_uri(png(surface_figure(run.case, surface, values, label, title)))
 
 
 def _network_pages(sections: Sequence[RunSection]) -> list[str]:

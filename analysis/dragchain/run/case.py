@@ -88,10 +88,14 @@ def attracts(case: CaseOfRun) -> bool:
 def with_changes(run_dir: Path, case: CaseOfRun) -> CaseOfRun:
     """The case of a process run, with what templates change in the scripts of all its runs."""
     scripts = dict.fromkeys(case.changed_scripts)
+    findings = dict.fromkeys(case.script_findings)
     for folder in upstream_folders(run_dir, case).values():
         with suppress(DragdeckError):  # whoever needs that run says what is wrong
-            scripts |= dict.fromkeys(load_case(folder).changed_scripts)
-    return case.model_copy(update={"changed_scripts": tuple(scripts)})
+            upstream = load_case(folder)
+            scripts |= dict.fromkeys(upstream.changed_scripts)
+            findings |= dict.fromkeys(upstream.script_findings)
+    changes = {"changed_scripts": tuple(scripts), "script_findings": tuple(findings)}
+    return case.model_copy(update=changes)
 
 
 def upstream_folders(run_dir: Path, case: CaseOfRun) -> dict[str, Path]:

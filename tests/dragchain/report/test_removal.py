@@ -206,6 +206,7 @@ def report(
     wear: bool = True,
     corrected: float | None = None,
     told: dict[str, Any] | None = None,
+    roughness: dict[str, Any] | None = None,
 ) -> Path:
     """The report on runs whose contacts are those made by hand, 50 % more with each seed."""
     runs = []
@@ -218,6 +219,7 @@ def report(
         (made / "case.json").write_text(json.dumps(contact_case({"removal": removal})))
         write_without_picture(made)
         study = {"materials.steel.density_kg_m3": 7800.0, "seed": seed, "removal": removal}
+        study |= {"roughness": roughness} if roughness else {}
         case = case_json("process", f"run-{seed}", study)
         run = make_run(tmp_path / "results", case, process_findings(), PICTURES)
         for file in ("tables/loading.json", *(["tables/wear.json"] if wear else [])):
@@ -252,6 +254,32 @@ def test_the_report_has_depth_mass_and_minutes(tmp_path: Path) -> None:
     assert " min (" in page.words and ") (mean depth)" in page.words
     assert "Young's modulus \N{MULTIPLICATION SIGN} 0.01" in page.words
     assert "not corrected" in page.words
+
+
+TRIANGLE = {"form": {"shape": "triangle", "ra_m": 1e-6}}
+
+
+def test_the_roughness_falls_as_the_peaks_are_removed(tmp_path: Path) -> None:
+    """Of a triangle of height 4 um, Ra is m^2 / 4 um with the mean height m that is left."""
+    out = report(tmp_path, GIVEN, roughness=TRIANGLE | {"target_ra_m": 0.25e-6})
+    facets, page = pd.read_csv(out / "run-0-removal.csv"), page_of(out)
+    mean = facets["depth_m_s"].mean()  # after 1 um / mean, a facet with all the load is flat
+    depth = facets["depth_m_s"] / mean * 1e-6
+    assert facets["ra_m"].to_numpy() == pytest.approx((2e-6 - depth) ** 2 / 4e-6, abs=1e-9)
+    assert (facets["ra_ci95_low_m"] <= facets["ra_m"]).all()
+    load = Loading.read(tmp_path / "made-0/tables/loading.json")
+    per_s = 2e-11 * load.totals["force_slide_n_m"] / load.path_m * 0.01 / 4e-4
+    assert mean == pytest.approx(10 * per_s)  # the run is ten times as fast
+    assert f"is reached after {1e-6 / per_s / 60:.3g} min (" in page.words
+    assert "Ra falls from 1.00 µm to 0.063 µm (" in page.words  # 1.5 um of 2 um are removed
+    assert "No steady roughness is given" in page.words and "smearing" in page.words
+
+
+def test_measured_roughness_gives_the_depth_per_time(tmp_path: Path) -> None:
+    times = [600.0, 1200.0, 2400.0, 3600.0]
+    rows = [{"time_s": time, "ra_m": (2e-6 - 3e-10 * time) ** 2 / 4e-6} for time in times]
+    out = report(tmp_path, GIVEN, roughness=TRIANGLE | {"measured": rows, "steady_ra_m": 1e-12})
+    assert f"fitted to the measured Ra: {3600e6 * 3e-10:#.4g} µm/h" in page_of(out).words
 
 
 def test_the_mean_depth_is_without_what_is_removed_above_the_bed(tmp_path: Path) -> None:

@@ -62,7 +62,7 @@ def contacts(
     flight = 3 * speed * chance.choice([-1.0, 1.0], places.shape) / np.sqrt(3)
     rows = [f"{n} 1 {2 * RADIUS} 2500 {x} {y} {z}" for n, (x, y, z) in enumerate(places, 1)]
     speeds = [f"{n} {u} {v} {w} 0 0 0" for n, (u, v, w) in enumerate(flight, 1)]
-    box = "".join(f"-0.2 0.2 {axis}lo {axis}hi\n" for axis in "xyz")
+    box = "".join(f"-0.04 0.04 {axis}lo {axis}hi\n" for axis in "xyz")
     (folder / "spheres.data").write_text(
         "spheres\n\n216 atoms\n1 atom types\n\n" + box
         + "\n".join(["\nAtoms\n", *rows, "\nVelocities\n", *speeds, ""])

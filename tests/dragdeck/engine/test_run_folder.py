@@ -99,7 +99,7 @@ def test_a_changed_deck_moves_the_old_run_aside(filling: Path) -> None:
 
 def slow_filling(made: Made, project: Project, ranks: int = 1) -> Path:
     """A rendered fill of a few seconds, not yet run."""
-    return small_filling(made, project, ranks=ranks, filling_timestep_fraction=0.1)
+    return small_filling(made, project, ranks=ranks, filling_timestep_fraction=0.2)
 
 
 def start(folder: Path) -> subprocess.Popen[bytes]:

@@ -11,8 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dragdeck.errors import InputError
-from dragdeck.mesh import formats
 from dragdeck.mesh.files import _triangles
+from dragdeck.mesh.obj import obj
+from dragdeck.mesh.ply import ply
+from dragdeck.mesh.polygons import Polygons
+from dragdeck.mesh.stl import stl
 from dragdeck.mesh.surface import surface, weld
 
 RING = [(np.cos(turn), np.sin(turn)) for turn in np.arange(6) * np.pi / 3]
@@ -30,14 +33,14 @@ TRUTH = trimesh.Trimesh(
 TRIANGLES = TRUTH.triangles
 
 
-def measured(polygons: formats.Polygons) -> tuple[int, float, float, bool]:
+def measured(polygons: Polygons) -> tuple[int, float, float, bool]:
     """Triangles, area, volume, and whether the surface is closed."""
     triangles = [_triangles(nodes, polygons.points) for nodes in polygons.cells]
     mesh = weld(surface(polygons.points, np.concatenate([np.empty((0, 3), int), *triangles])))
     return len(mesh.faces), mesh.area, mesh.volume, mesh.is_watertight
 
 
-def is_the_bar(polygons: formats.Polygons) -> bool:
+def is_the_bar(polygons: Polygons) -> bool:
     expected = (len(TRUTH.faces), TRUTH.area, TRUTH.volume, True)
     return bool(np.allclose(measured(polygons), expected, rtol=1e-6, atol=0))
 
@@ -73,7 +76,7 @@ def test_an_obj_file_of_any_style_gives_the_same_surface(
     joint = " \\" + end if goes_on else " "
     rows = ["f " + joint.join(face) + (" # facet" if comment else "") for face in corners]
     lines = [*beside[:4], *halves[0], *beside[4:], *chain(*halves[1:]), *rows, ""]
-    assert is_the_bar(formats.obj(end.join(lines).encode(coding)))
+    assert is_the_bar(obj(end.join(lines).encode(coding)))
 
 
 def stl_text(end: str, number: str = "{:.4f}", name: str = "bar", closing: bool = True) -> str:
@@ -104,7 +107,7 @@ def test_an_stl_text_of_any_style_gives_the_same_surface(
     if end == " ":
         name = "bar"
     text = stl_text(end, number, name, closing).replace(".", mark).replace("e+", f"{exponent}+")
-    assert is_the_bar(formats.stl((text.upper() if capitals else text).encode(coding)))
+    assert is_the_bar(stl((text.upper() if capitals else text).encode(coding)))
 
 
 def stl_bytes(count: int, head: bytes = b"solid or not") -> bytes:
@@ -114,22 +117,22 @@ def stl_bytes(count: int, head: bytes = b"solid or not") -> bytes:
 
 @given(rest=st.one_of(st.binary(max_size=49), st.binary(max_size=40).map(bytes(50).__add__)))
 def test_bytes_after_whole_facets_are_passed_over(rest: bytes) -> None:
-    assert is_the_bar(formats.stl(stl_bytes(len(TRIANGLES)) + rest))
+    assert is_the_bar(stl(stl_bytes(len(TRIANGLES)) + rest))
 
 
 @given(st.integers(0, 84 + 50 * len(TRIANGLES) - 1))
 def test_of_a_binary_stl_nothing_is_left_out(length: int) -> None:
     with pytest.raises(InputError):
-        formats.stl(stl_bytes(len(TRIANGLES), b"a part")[:length])
+        stl(stl_bytes(len(TRIANGLES), b"a part")[:length])
     for count in (0, len(TRIANGLES) - 1, len(TRIANGLES) + 1):
         with pytest.raises(InputError):
-            formats.stl(stl_bytes(count, b"a part"))
+            stl(stl_bytes(count, b"a part"))
 
 
 PLY_TYPES = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 
 
-def ply(order: str, coordinate: str, names: Sequence[str], first: bool, extra: bool) -> bytes:
+def ply_bytes(order: str, coordinate: str, names: Sequence[str], first: bool, extra: bool) -> bytes:
     kinds = {"float": "f", "double": "d"}
     before, after = (["confidence"], []) if first else ([], ["red"])
     columns = [*before, "x", "y", "z", *after]
@@ -175,15 +178,15 @@ STYLES = {
 
 @given(st.fixed_dictionaries(STYLES))
 def test_a_ply_file_of_any_style_gives_the_same_surface(style: dict[str, object]) -> None:
-    assert is_the_bar(formats.ply(ply(**style)))  # type: ignore[arg-type]
+    assert is_the_bar(ply(ply_bytes(**style)))  # type: ignore[arg-type]
 
 
 @given(style=st.fixed_dictionaries(STYLES), part=st.floats(0, 1, exclude_max=True))
 def test_a_ply_file_that_was_cut_is_refused(style: dict[str, object], part: float) -> None:
-    whole = ply(**style)  # type: ignore[arg-type]
+    whole = ply_bytes(**style)  # type: ignore[arg-type]
     kept = whole[: int(part * len(whole.rstrip()))]
     with pytest.raises(InputError):
-        formats.ply(kept)
+        ply(kept)
 
 
 @given(part=st.floats(0, 1, exclude_max=True), kind=st.sampled_from(["stl", "obj"]))
@@ -194,7 +197,7 @@ def test_a_text_that_was_cut_is_refused_or_open(part: float, kind: str) -> None:
     whole = stl_text("\n") if kind == "stl" else text
     cut = whole[: int(part * len(whole))]
     try:
-        polygons = getattr(formats, kind)(cut.encode())
+        polygons = {"stl": stl, "obj": obj}[kind](cut.encode())
     except InputError:
         return
     assert not measured(polygons)[3] or is_the_bar(polygons)
@@ -206,5 +209,5 @@ def test_a_text_that_was_cut_is_refused_or_open(part: float, kind: str) -> None:
 )
 def test_a_number_that_could_be_two_is_refused_with_its_line(number: str, problem: str) -> None:
     with pytest.raises(InputError, match=problem) as refused:
-        formats.obj(f"v 0 0 0\nv {number}\n".encode())
+        obj(f"v 0 0 0\nv {number}\n".encode())
     assert refused.value.line == 2

@@ -1,6 +1,9 @@
 """Closed surfaces with sharp facets, meshed anew: what is kept, and how far they are off."""
 
 import json
+import re
+import signal
+import subprocess
 import sys
 from pathlib import Path
 
@@ -99,3 +102,17 @@ def test_without_mmg_the_remedy_is_named(tmp_path: Path, monkeypatch: pytest.Mon
     given.write_text(json.dumps({"points": [[0, 0, 0]], "triangles": [[0, 1, 2]]}))
     remesher.main(str(given), str(answer), "1.0")
     assert "dragdeck[cad]" in json.loads(answer.read_text())["refused"][3]
+
+
+@pytest.mark.parametrize("code", [-signal.SIGXCPU, -signal.SIGSEGV])
+def test_however_mmg_ends_the_remedy_is_one_for_a_surface(
+    bar: Path, monkeypatch: pytest.MonkeyPatch, code: int
+) -> None:
+    def ended(*_: object, **__: object) -> subprocess.CompletedProcess[bytes]:
+        return subprocess.CompletedProcess([], code, b"", b"")
+
+    monkeypatch.setattr(subprocess, "run", ended)
+    with pytest.raises(InputError, match=r"too long|damaged") as caught:
+        files.read(bar, "mm", SIZE_M)
+    assert "facet_size_m" in str(caught.value.remedy)
+    assert not re.search("edge_facet_size_m|STEP", str(caught.value.remedy))

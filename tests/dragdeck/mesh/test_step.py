@@ -170,7 +170,7 @@ def sphere_beside_a_box() -> None:
         (
             lambda: gmsh.model.occ.addRectangle(0, 0, 0, 9, 9),
             "contains no solid",
-            "0 solids, 1 faces",
+            "no BREP of a solid",
         ),
     ],
 )

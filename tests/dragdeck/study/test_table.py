@@ -58,6 +58,26 @@ EXPORTS: dict[str, tuple[str | bytes, str]] = {
         + ROWS.replace(".", ",").replace("\t", ";").replace("\n", ";;\n"), "fx_n",
     ),
     "commas alone": ("time_s,fx_n\n0,000,-0,06\n0,005,0,42\n0,010,-1234,5\n0,015,2,0\n", "fx_n"),
+    "LabVIEW, decimal commas, units in its head": (
+        "LabVIEW Measurement\t\nDecimal_Separator\t,\n***End_of_Header***\t\n\t\nChannels\t1\t\n"
+        "Y_Unit_Label\tN\t\nDelta_X\t0,005\n***End_of_Header***\t\t\nX_Value\tFx\tComment\n"
+        + ROWS.replace(".", ","), "Fx [N]",
+    ),
+    "DynoWare": (
+        "Kistler DynoWare\n3\n200\n\nTime\tFx\tFy\n[s]\t[N]\t[N]\n"
+        + ROWS.replace("\n", "\t1\n"), "Fx / N",
+    ),
+    "DIAdem": (
+        "DIADEMHEADER\nTitel;Versuch 3\nKanäle;3\nZeit;Fx;Fy\ns;N;N\n"
+        + ROWS.replace(".", ",").replace("\t", ";").replace("\n", ";1,0\n"), "Fx in N",
+    ),
+    "catman": (
+        "Catman\nChannels\t3\n\nZeit / s\tFx / N\n" + ROWS.replace(".", ","), "fx_n",
+    ),
+    "separators behind all rows": (
+        "time_s;fx_n\n" + ROWS.replace("\t", ";").replace("\n", ";;\n"), "fx_n",
+    ),
+    "signs of typesetters": ("time_s\tfx_n\n" + ROWS.replace("-", "\u2212"), "fx_n"),
     "milliseconds": ("t [ms],Fx [kN]\n0,-6e-5\n5,4.2e-4\n10,-1.2345\n15,2e-3\n", "fx_kn"),
     "UTF-16": (("time_s\tfx_n\n" + ROWS).encode("utf-16"), "fx_n"),
     "Latin-1": (("Prüfstand 3\ntime_s\tfx_n\n" + ROWS).encode("latin-1"), "fx_n"),
@@ -77,6 +97,22 @@ def test_exports_of_programs_give_the_same_numbers(program: str, tmp_path: Path)
         else content
     )
     assert [*lines] == [*range(lines[0], len(text.splitlines()) + 1)]
+
+
+def test_lines_of_separators_alone_are_blank(tmp_path: Path) -> None:
+    content = "time_s;fx_n\n" + ROWS.replace("\t", ";") + ";\n;;\n"
+    _, force, lines = read_samples(written(tmp_path, content), "fx_n")
+    assert (force.tolist(), [*lines]) == (FORCE, [2, 3, 4, 5])
+
+
+def test_a_file_of_labview_without_times_needs_the_rate(tmp_path: Path) -> None:
+    rows = "".join(f"\t{force}\n" for force in FORCE)
+    head = "LabVIEW Measurement\nX_Columns\tNo\nY_Unit_Label\tN\n***End_of_Header***\n"
+    file = written(tmp_path, f"{head}X_Value\tFx\tComment\n{rows}")
+    time, force, _ = read_samples(file, "fx_n", 200)
+    assert (time.tolist(), force.tolist()) == (TIME, FORCE)
+    with pytest.raises(InputError, match="no column"):
+        read_samples(file, "fx_n")
 
 
 def test_the_reading_is_told_with_its_first_and_last_row(tmp_path: Path) -> None:
@@ -125,6 +161,7 @@ REFUSED: dict[str, tuple[str | bytes, dict[str, Any], int | None, str]] = {
     "a longer row": (HEAD + "0,1\n0.005,2,3\n", {}, 3, "3 values, but the header has 2 names"),
     "a shorter row": (HEAD + "0,1\n0.005\n", {}, 3, "1 values, but the header has 2 names"),
     "a missing value": (HEAD + "0,1\n0.005,\n", {}, 3, "fx_n: the value is missing"),
+    "spaces between": ("time_s fx_n\n0 1\n1 2\n", {}, 1, "no column(s)"),
     "not finite": (HEAD + "0,inf\n", {}, 2, "'inf' is text"),
     "too large": (HEAD + "0,1e999\n", {}, 2, "a finite number"),
     "underscore": (HEAD + "0,1_000\n", {}, 2, "'1_000' is text"),

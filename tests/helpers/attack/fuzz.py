@@ -20,8 +20,9 @@ from dragdeck.decks.outputs import OutputOfRun
 from dragdeck.dumps.reader import read_dump, read_prints
 from dragdeck.errors import DragdeckError
 from dragdeck.mesh.checks import findings
-from dragdeck.mesh.files import read
+from dragdeck.mesh.files import _polygons, _triangles, read
 from dragdeck.study.table import read_table
+from dragdeck.sweep.cases import load_cases
 
 _TOKENS = [
     *(b"nan", b"-1", b"1e999", b"-0", b"9" * 40, b"0x10", b"1_000", b"1.5", b"--1", b"+", b"e5"),
@@ -198,8 +199,33 @@ def _try_table(folder: Path, content: bytes) -> None:
 
 def _meshes(kind: str) -> list[bytes]:
     box = trimesh.creation.cylinder(radius=4.0, height=30.0, sections=6)
-    found = box.export(file_type={"ascii.stl": "stl_ascii", "stl": "stl"}.get(kind, kind))
-    return [found if isinstance(found, bytes) else found.encode()]
+    if kind == "vtk":
+        return [_vtk(box)]
+    types = {"ascii.stl": ["stl_ascii"], "ply": ["ply"]}.get(kind, [kind])
+    exported = [box.export(file_type=each) for each in types]
+    if kind == "ply":
+        exported.append(box.export(file_type="ply", encoding="ascii"))
+    if kind == "obj":
+        exported.append(_relative(box))
+    return [each if isinstance(each, bytes) else each.encode() for each in exported]
+
+
+def _relative(mesh: trimesh.Trimesh) -> str:
+    """An OBJ file whose facets name the nodes backwards, with normals."""
+    nodes = "".join(f"v {x:.9g} {y:.9g} {z:.9g}\n" for x, y, z in mesh.vertices)
+    corners = (mesh.faces - len(mesh.vertices)).tolist()
+    facets = "".join("f " + " ".join(f"{node}//-1" for node in facet) + "\n" for facet in corners)
+    return f"# a bar\n{nodes}vn 0 0 1\n{facets}"
+
+
+def _vtk(mesh: trimesh.Trimesh) -> bytes:
+    rows = ["# vtk DataFile Version 3.0", "a bar", "ASCII", "DATASET UNSTRUCTURED_GRID",
+            f"POINTS {len(mesh.vertices)} double"]  # fmt: skip
+    rows += [f"{x:.9g} {y:.9g} {z:.9g}" for x, y, z in mesh.vertices]
+    rows += [f"CELLS {len(mesh.faces)} {4 * len(mesh.faces)}"]
+    rows += [f"3 {a} {b} {c}" for a, b, c in mesh.faces]
+    rows += [f"CELL_TYPES {len(mesh.faces)}", *["5"] * len(mesh.faces), ""]
+    return "\n".join(rows).encode()
 
 
 def _try_mesh(suffix: str, folder: Path, content: bytes) -> None:
@@ -217,6 +243,45 @@ def _try_mesh(suffix: str, folder: Path, content: bytes) -> None:
     assert len(mesh.faces) > 0, "no facet"
     assert mesh.faces.max() < len(mesh.vertices), "a facet without its corner"
     assert mesh.is_watertight, "an open body"
+    wanted = _by_trimesh(file)
+    if wanted is not None:
+        points, cells = _polygons(file)  # nodes closer than 10 nm are still apart
+        given = trimesh.Trimesh(
+            points, np.concatenate([_triangles(nodes, points) for nodes in cells]), process=False
+        )
+        measured = len(given.faces), given.area, abs(given.volume)
+        np.testing.assert_allclose(measured, wanted, rtol=1e-9)
+
+
+def _by_trimesh(file: Path) -> tuple[int, float, float] | None:
+    """Triangles, area and volume by another reader; None where it cannot read the file."""
+    try:
+        read_by_it = trimesh.load_mesh(file, process=False)
+    except Exception:
+        return None
+    if not isinstance(read_by_it, trimesh.Trimesh) or not len(read_by_it.faces):
+        return None
+    return len(read_by_it.faces), read_by_it.area, abs(read_by_it.volume)
+
+
+def _studies() -> list[bytes]:
+    folder = Path(__file__).parents[2] / "data"
+    return [(folder / f"{name}_study.yaml").read_bytes() for name in ("small", "tiny")]
+
+
+def _try_study(folder: Path, content: bytes) -> None:
+    """A study is read or refused; what is read, written and read again is the same."""
+    file = folder / "a" / "study.yaml"
+    file.parent.mkdir()
+    file.write_bytes(content)
+    try:
+        cases = load_cases(file)
+    except DragdeckError as error:
+        assert "study.yaml" in str(error), "the message does not name the file"
+        return
+    for case in cases:
+        again = type(case.study).model_validate(case.study.model_dump(mode="json"))
+        assert again == case.study, "another study"
 
 
 FUZZES: dict[str, tuple[Callable[[], list[bytes]], Callable[[Path, bytes], None]]] = {
@@ -229,6 +294,8 @@ FUZZES: dict[str, tuple[Callable[[], list[bytes]], Callable[[Path, bytes], None]
     "mesh: binary STL": (partial(_meshes, "stl"), partial(_try_mesh, "stl")),
     "mesh: OBJ": (partial(_meshes, "obj"), partial(_try_mesh, "obj")),
     "mesh: PLY": (partial(_meshes, "ply"), partial(_try_mesh, "ply")),
+    "mesh: VTK": (partial(_meshes, "vtk"), partial(_try_mesh, "vtk")),
+    "study": (_studies, _try_study),
 }
 
 

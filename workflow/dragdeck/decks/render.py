@@ -9,14 +9,6 @@ import jinja2
 
 from dragdeck.decks import CASE_FILE, COLUMNS_FILE, DECK_FILE, END, OUTCOME_FILE, RUN_FILE
 from dragdeck.decks.deck import AnyScene
-from dragdeck.decks.engine_commands import (
-    commands,
-    contact_laws,
-    endless,
-    late_lists,
-    law_commands,
-    leaving_folder,
-)
 from dragdeck.decks.outputs import WORKPIECE_FORCE, ColumnsFile, in_writing_order
 from dragdeck.decks.templates import (
     edited,
@@ -30,6 +22,17 @@ from dragdeck.decks.templates import (
 )
 from dragdeck.errors import InputError
 from dragdeck.files import file_checksum, write_text
+from dragdeck.script.commands import (
+    commands,
+    contact_laws,
+    endless,
+    late_lists,
+    law_commands,
+    leaving_folder,
+)
+from dragdeck.script.findings import Finding, without_accepted
+from dragdeck.script.flow import read_script
+from dragdeck.script.rules import script_findings
 from dragdeck.study import contact_law
 
 
@@ -144,7 +147,20 @@ def of_its_templates(
     known = _added_forces(original)  # each has its formula in dragdeck.study.contact_law
     added = tuple(force for force in _added_forces(text) if force not in known or changed)
     scripts = changed_scripts(text, scene, templates)
-    return {"added_forces": added, "changed_law": changed, "changed_scripts": scripts}
+    findings = tuple(map(str, findings_on(text))) if scripts else ()
+    return {
+        "added_forces": added,
+        "changed_law": changed,
+        "changed_scripts": scripts,
+        "script_findings": findings,
+    }
+
+
+def findings_on(text: str) -> list[Finding]:
+    """What the rules on scripts say of a deck; see `dragdeck.script.rules`."""
+    script = read_script(Path(DECK_FILE), text=text)
+    findings = [result for result in script_findings(script) if isinstance(result, Finding)]
+    return without_accepted(findings, script, ())[0]
 
 
 def changed_scripts(text: str, scene: AnyScene, templates: jinja2.Environment) -> tuple[str, ...]:

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dragdeck.arrays import END, NUMBER, quick_columns
 from dragdeck.dumps.frame import Columns, is_integer_column
 
 Cells = NDArray[np.float64]
@@ -39,28 +40,11 @@ def cells_of_text(text: bytes, width: int) -> Cells:
 
 
 def _quickly(text: bytes, width: int) -> Cells | None:
-    """The numbers by pyarrow, whose rounding is correct; None if it is not sure of them."""
-    import pyarrow as pa
-    from pyarrow import csv
-
-    if not text.isascii():
-        return None
-    types = {str(number): pa.float64() for number in range(width)}
+    layout = [NUMBER] * width
     if text[: text.find(b"\n")].endswith(b" "):  # as the engine writes it: then nothing follows
-        types["end"] = pa.null()
-    try:
-        table = csv.read_csv(
-            pa.BufferReader(text),
-            csv.ReadOptions(column_names=list(types)),
-            csv.ParseOptions(delimiter=" ", quote_char=False, ignore_empty_lines=False),
-            csv.ConvertOptions(column_types=types, null_values=[""]),
-        )
-    except pa.ArrowInvalid:
-        return None
-    columns = table.columns[:width]
-    if len(table) != text.count(b"\n") or any(column.null_count for column in columns):
-        return None
-    return np.array([column.to_numpy() for column in columns])
+        layout.append(END)
+    columns = quick_columns(text, layout)
+    return None if columns is None else np.array(columns)
 
 
 def _one_by_one(text: bytes, width: int) -> Cells:

@@ -99,7 +99,7 @@ def find_engine() -> Engine:
 
 @cache
 def _version(path: str) -> str:
-    words = [*_by_line(path), "-h"]
+    words = [*_by_line(path), "-log", "none", "-h"]  # else it writes log.liggghts here
     shown = subprocess.run(
         words,
         capture_output=True,
@@ -147,7 +147,7 @@ def command(engine: Engine, deck: str, ranks: int, part: int, source: Path | Non
     source : Path, optional
         The checkpoint to go on from.
     """
-    words = [*_by_line(engine.path), "-in", deck, "-log", "none", "-var", "part", str(part)]
+    words = [*plain_command(engine, deck), "-var", "part", str(part)]
     if source is not None:
         words += ["-var", "resume", "1", "-var", "from", source.name]
     if ranks == 1:
@@ -162,6 +162,11 @@ def command(engine: Engine, deck: str, ranks: int, part: int, source: Path | Non
         )
     idle = ["--mca", "mpi_yield_when_idle", "1"]  # free, and kind to whoever shares the cores
     return [launcher, "-np", str(ranks), "--bind-to", "none", "--oversubscribe", *idle, *words]
+
+
+def plain_command(engine: Engine, deck: str) -> list[str]:
+    """The command line of a script without variables, on one rank."""
+    return [*_by_line(engine.path), "-in", deck, "-log", "none"]
 
 
 def keeps_last_words() -> bool:

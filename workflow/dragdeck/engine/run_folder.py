@@ -11,7 +11,6 @@ import shutil
 from pathlib import Path
 
 from dragdeck.decks import CASE_FILE, COLUMNS_FILE, DECK_FILE, RUN_FILE
-from dragdeck.decks.engine_commands import files_read
 from dragdeck.decks.outputs import ColumnsFile
 from dragdeck.engine.checkpoints import is_whole, take_forced_restarts
 from dragdeck.engine.part import STATE_FILE, PartOfRun, why_rejected
@@ -21,6 +20,7 @@ from dragdeck.engine.space import full_disk_named
 from dragdeck.errors import InputError, RejectedRunError
 from dragdeck.files import file_checksum
 from dragdeck.records.run import CaseFile, RunRecord
+from dragdeck.script.commands import files_read
 
 _ARCHIVE = "archive"
 _OF_THE_WORKFLOW = ("logs", "benchmarks")

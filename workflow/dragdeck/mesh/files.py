@@ -4,19 +4,24 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dragdeck.errors import InputError
-from dragdeck.mesh import formats, remesher, step_mesher
+from dragdeck.mesh import remesher, step_mesher
 from dragdeck.mesh.deviation import deviation
-from dragdeck.mesh.formats import Polygons
 from dragdeck.mesh.mesher import answer_of
+from dragdeck.mesh.obj import obj
+from dragdeck.mesh.ply import ply
+from dragdeck.mesh.polygons import Polygons
 from dragdeck.mesh.step import step_text
+from dragdeck.mesh.stl import stl
 from dragdeck.mesh.surface import (
     CAD_VOLUME,
     MERGED,
@@ -48,8 +53,8 @@ def read(
 ) -> Trimesh:
     """Read a surface from STL (ASCII or binary), OBJ, PLY, legacy VTK or VTU, or mesh a STEP part.
 
-    STL, OBJ and PLY are read by `formats`, the rest by meshio. VTK polygon data is refused: meshio
-    does not know it, and VTK's own reader fills a file that was cut short with whatever the memory
+    Modules here read STL, OBJ and PLY, meshio the rest. VTK polygon data is refused: meshio does
+    not know it, and VTK's own reader fills a file that was cut short with whatever the memory
     holds. gmsh meshes STEP; MMG meshes a closed surface anew for which a facet size is given.
 
     Parameters
@@ -162,6 +167,7 @@ def _vtk(path: Path) -> Polygons:
     """Read legacy VTK or VTU; meshio's own `read` ends the interpreter on bad files."""
     import meshio
 
+    _refuse_cut(path)
     content = {".vtk": meshio.vtk.read, ".vtu": meshio.vtu.read}[path.suffix.lower()](path)
     blocks = [block for block in content.cells if block.type not in ("vertex", "line")]
     for block in blocks:
@@ -176,14 +182,27 @@ def _vtk(path: Path) -> Polygons:
     return Polygons(points, [np.asarray(block.data, dtype=np.int64) for block in blocks])
 
 
+def _refuse_cut(path: Path) -> None:
+    """Refuse a file that ends before what it announces, which meshio may take long to see."""
+    content = path.read_bytes()
+    if path.suffix.lower() == ".vtk":
+        counts = re.findall(rb"^POINTS\s+(\d{1,18})|^CELLS\s+\d+\s+(\d{1,18})", content, re.M)
+        numbers = sum(3 * int(points or 0) + int(cells or 0) for points, cells in counts)
+        if 2 * numbers > len(content):
+            value = f"{len(content)} bytes, {numbers} numbers announced"
+            raise InputError("the file was cut short", value=value)
+    elif not content.rstrip().endswith(b"</VTKFile>"):
+        raise InputError("the file was cut short", limit='"</VTKFile>" at its end')
+
+
 def _bytes(read: Callable[[bytes], Polygons]) -> Callable[[Path], Polygons]:
     return lambda path: read(path.read_bytes())
 
 
 _READERS: Mapping[str, Callable[[Path], Polygons]] = {
-    ".stl": _bytes(formats.stl),
-    ".obj": _bytes(formats.obj),
-    ".ply": _bytes(formats.ply),
+    ".stl": _bytes(stl),
+    ".obj": _bytes(obj),
+    ".ply": _bytes(ply),
     ".vtk": _vtk,
     ".vtu": _vtk,
 }
@@ -211,7 +230,7 @@ def _damage(path: Path) -> Iterator[None]:
 
 
 def _triangles(nodes: Integers, points: Floats) -> Integers:
-    """(K, 3): polygons as triangles, quadrilaterals along the shorter diagonal."""
+    """(K, 3): polygons as triangles, quadrilaterals along a diagonal."""
     corners = nodes.shape[1]
     if corners == 3:
         return nodes
@@ -224,9 +243,21 @@ def _triangles(nodes: Integers, points: Floats) -> Integers:
 
 
 def _split(quads: Integers, points: Floats) -> Integers:
-    diagonal = np.linalg.norm(points[quads[:, :2]] - points[quads[:, 2:]], axis=2)
-    turned = np.where(diagonal[:, [0]] <= diagonal[:, [1]], quads, np.roll(quads, -1, axis=1))
+    """Along the shorter diagonal, or at the corner that is bent inwards."""
+    corners = points[quads]
+    diagonal = np.linalg.norm(corners[:, :2] - corners[:, 2:], axis=2)
+    shorter = np.where(diagonal[:, 0] <= diagonal[:, 1], 0, 1)
+    folded = [_is_folded(np.roll(corners, -turn, axis=1)) for turn in (0, 1)]
+    first = np.where(folded[0] == folded[1], shorter, np.where(folded[0], 1, 0))
+    turned = np.where(first[:, None] == 0, quads, np.roll(quads, -1, axis=1))
     return turned[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
+
+
+def _is_folded(corners: Floats) -> NDArray[np.bool_]:
+    """(M,): whether quadrilaterals, (M, 4, 3), fold over along their first diagonal."""
+    first, diagonal, last = (corners[:, corner] - corners[:, 0] for corner in (1, 2, 3))
+    sides = np.cross(first, diagonal), np.cross(diagonal, last)
+    return np.asarray(np.einsum("kc,kc->k", *sides) < 0)
 
 
 def stl_text(mesh: Trimesh) -> str:

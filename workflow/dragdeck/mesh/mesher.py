@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from dragdeck.errors import InputError
-from dragdeck.mesh import step_mesher
+from dragdeck.mesh import remesher, step_mesher
 
 _CPU_LIMIT_S = 120
 """More CPU time than any sensible part needs, s."""
@@ -53,16 +53,15 @@ def answer_of(program: str, path: Path, content: str, lengths: Sequence[float]) 
 
 def _broken(path: Path, code: int, said: str) -> InputError:
     value = (said.splitlines() or [f"the mesher ended with code {code}"])[-1]
+    step = path.suffix.lower() in (".step", ".stp")
     if -code in (signal.SIGXCPU, signal.SIGKILL):
         return InputError(
             "the part takes too long to mesh",
             file=path,
             value=value,
             limit=f"{_CPU_LIMIT_S} s of CPU time",
-            remedy="use a larger facet_size_m and edge_facet_size_m",
+            remedy="use a larger facet_size_m" + (" and edge_facet_size_m" if step else ""),
         )
-    kind = "STEP file" if path.suffix.lower() in (".step", ".stp") else "surface"
-    limit = f"a whole {kind}"
-    return InputError(
-        f"the {kind} is damaged", file=path, value=value, limit=limit, remedy=step_mesher.EXPORT
-    )
+    kind = "STEP file" if step else "surface"
+    limit, remedy = f"a whole {kind}", step_mesher.EXPORT if step else remesher.OTHERWISE
+    return InputError(f"the {kind} is damaged", file=path, value=value, limit=limit, remedy=remedy)

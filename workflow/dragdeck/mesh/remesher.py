@@ -24,6 +24,9 @@ ratio of neighbouring edges."""
 
 _INSTALL = "./run setup cad; or pip install 'dragdeck[cad]'; or mesh the part anew in its program"
 
+OTHERWISE = "use another facet_size_m, or mesh the part anew in the program that made it"
+"""What helps where MMG cannot."""
+
 
 def main(given: str, answer: str, size: str) -> None:
     """Write nodes and facets of the new mesh, or why there is none, as JSON.
@@ -48,8 +51,7 @@ def main(given: str, answer: str, size: str) -> None:
         meshed = {"refused": [problem, str(error), "mmgpy 0.17 or newer", _INSTALL]}
     except Exception as error:
         problem, limit = "the surface cannot be meshed anew", "one closed surface without folds"
-        remedy = "use another facet_size_m, or mesh the part anew in the program that made it"
-        meshed = {"refused": [problem, str(error), limit, remedy]}
+        meshed = {"refused": [problem, str(error), limit, OTHERWISE]}
     Path(answer).write_text(json.dumps(meshed), encoding="ascii")
 
 

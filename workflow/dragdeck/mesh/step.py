@@ -8,6 +8,7 @@ from pathlib import Path
 
 from dragdeck.errors import InputError
 from dragdeck.files import text_of
+from dragdeck.mesh.step_mesher import NO_SOLID
 
 _LARGEST_MB = 50
 """A part with all its fillets and threads has a few MB."""
@@ -17,6 +18,7 @@ _START = "ISO-10303-21"
 _PREFIXES = {"$": 1.0, ".DECI.": 0.1, ".CENTI.": 0.01, ".MILLI.": 1e-3, ".MICRO.": 1e-6}
 """Of ISO 10303-41, in metres."""
 
+_SOLID = re.compile(r"\b(MANIFOLD_SOLID_BREP|BREP_WITH_VOIDS|FACETED_BREP)\b")
 _ENTITY = re.compile(r"#(\d+)\s*=(.*)", re.DOTALL)
 _CONVERSION = re.compile(r"CONVERSION_BASED_UNIT\s*\(\s*'([^']*)'\s*,\s*#(\d+)")
 _MEASURE = re.compile(r"MEASURE_WITH_UNIT\s*\(\s*LENGTH_MEASURE\s*\(([^()]*)\)\s*,\s*#(\d+)")
@@ -53,6 +55,9 @@ def step_text(path: Path, unit_m: float | None) -> str:
     if not text.startswith(_START):
         limit, remedy = f"{_START} at its start", "export the part as STEP"
         raise _refused(path, "the file is not a STEP file", repr(text[:20]), limit, remedy)
+    if not _SOLID.search(text):
+        value, limit = "no BREP of a solid", "one solid: the workpiece is one body"
+        raise _refused(path, "the STEP file contains no solid", value, limit, NO_SOLID)
     stated = _units(text) or {"millimetre": 1e-3}
     if unit_m is None or any(abs(length - unit_m) <= _SAME * unit_m for length in stated.values()):
         return text.encode("latin-1", "replace").decode("latin-1")
@@ -66,7 +71,8 @@ def step_text(path: Path, unit_m: float | None) -> str:
 
 def _units(text: str) -> dict[str, float]:
     """The units of length that a STEP file states, m, by their names."""
-    matches = map(_ENTITY.match, (part.strip() for part in text.split(";")))
+    told = (part.strip() for part in text.split(";") if "UNIT" in part or "MEASURE" in part)
+    matches = map(_ENTITY.match, told)
     entities = {match[1]: match[2] for match in matches if match}
     lengths = {key: entity for key, entity in entities.items() if "LENGTH_UNIT" in entity}
     assigned = [key for entity in entities.values() for listed in _ASSIGNED.findall(entity)

@@ -29,6 +29,8 @@ _GROWTH = 2.0
 EXPORT = "export the part again as STEP, as one solid; or its surface as STL"
 """What helps against a damaged file."""
 
+NO_SOLID = "close the surfaces to a solid body in the CAD program, and export it as STEP"
+
 _OPTIONS = {
     "General.Terminal": 0,
     "General.NumThreads": 1,  # the same mesh every time
@@ -113,8 +115,7 @@ def _solid(gmsh: Any, file: str) -> int:
     value = f"{len(solids)} solids, {len(gmsh.model.getEntities(2))} faces"
     limit = "one solid: the workpiece is one body"
     if not solids:
-        remedy = "close the surfaces to a solid body in the CAD program, and export it as STEP"
-        raise Refusal("the STEP file contains no solid", value, limit, remedy)
+        raise Refusal("the STEP file contains no solid", value, limit, NO_SOLID)
     parts = "join them into one solid, or remove all others, then export it as STEP"
     raise Refusal("the STEP file contains several parts", value, limit, parts)
 

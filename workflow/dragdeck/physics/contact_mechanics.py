@@ -296,21 +296,51 @@ def stability_number(
     ----------
     Otsubo, O'Sullivan and Shire (2017), Computers and Geotechnics 86, 67-79.
     """
-    bodies, normal, overlap = touching(centre_m, radius_m, bowl)
+    contacts = touching(centre_m, radius_m, bowl)
+    number = np.zeros(len(radius_m), dtype=np.int64) if classes is None else classes
+    number = np.append(number, len(constants))  # the bowl comes after the classes
+    return network_number(
+        centre_m, radius_m, density_kg_m3, contacts, constants, timestep_s, number, rigid
+    )
+
+
+def network_number(
+    centre_m: Floats,
+    radius_m: Floats,
+    density_kg_m3: Floats | float,
+    contacts: tuple[Ints, Floats, Floats],
+    constants: Sequence[Sequence[ContactConstants]],
+    timestep_s: float,
+    classes: Ints,
+    rigid: RigidBodies | None = None,
+) -> float:
+    """The `stability_number` of given contacts, with walls of any shape.
+
+    Parameters
+    ----------
+    centre_m, radius_m, density_kg_m3, timestep_s, rigid
+        As in `stability_number`.
+    contacts : (2, M), (M, 3) and (M,) ndarray
+        As in `touching`; bodies from N on are walls, which have no curvature and never move.
+    constants : sequence of sequence of ContactConstants
+        For each class of particles, those with a body of each class.
+    classes : (N + W,) ndarray of int
+        Class of each particle, then of each wall.
+    """
+    bodies, normal, overlap = contacts
+    walls = len(classes) - len(radius_m)
     if rigid is not None:
-        owner = np.append(rigid.of_sphere, len(rigid.mass_kg))
+        owner = np.append(rigid.of_sphere, np.full(walls, len(rigid.mass_kg)))
         apart = owner[bodies[0]] != owner[bodies[1]]
         bodies, normal, overlap = bodies[:, apart], normal[apart], overlap[apart]
     if not overlap.size:
         return 0.0
-    # the bowl is the last body: it has no curvature and never moves
-    curvature = np.append(1 / radius_m, 0.0)
-    inverse_mass = np.append(3 / (4 * math.pi * density_kg_m3) * np.ones_like(radius_m), 0.0)
-    inverse_mass *= curvature**3
+    curvature = np.append(1 / radius_m, np.zeros(walls))
+    inverse_mass = 3 / (4 * math.pi * density_kg_m3) * np.ones_like(radius_m)
+    inverse_mass = np.append(inverse_mass, np.zeros(walls)) * curvature**3
     if rigid is not None:
         of_bodies = np.append(1 / rigid.mass_kg, 0.0)
         inverse_mass = of_bodies[owner]
-    number = np.zeros(len(radius_m), dtype=np.int64) if classes is None else classes
     laws = np.array(
         [
             [
@@ -320,8 +350,7 @@ def stability_number(
             for row in constants
         ]
     )
-    partner = np.append(number, len(constants))[bodies[1]]  # the bowl comes after the classes
-    modulus, shear, _, friction, ratio = laws[number[bodies[0]], partner].T
+    modulus, shear, _, friction, ratio = laws[classes[bodies[0]], classes[bodies[1]]].T
     contact_radius = np.sqrt(overlap / curvature[bodies].sum(axis=0))
     stiffness = np.stack([2 * modulus, 8 * shear * (friction > 0)]) * contact_radius
     damping = 2 * math.sqrt(5 / 6) * ratio * np.sqrt(stiffness / inverse_mass[bodies].sum(axis=0))
@@ -399,6 +428,18 @@ def largest_eigenvalue(
     return float(eigsh(operator, k=1, v0=start, tol=tolerance, return_eigenvectors=False)[0])
 
 
+def touching_pairs(centre: Floats, radius: Floats) -> tuple[Ints, Floats, Floats]:
+    """Contacts of particles with each other, as in `touching`."""
+    from scipy.spatial import KDTree
+
+    first, second = KDTree(centre).query_pairs(2 * radius.max(), output_type="ndarray").T
+    away = centre[second] - centre[first]
+    distance = np.linalg.norm(away, axis=1)
+    overlap = radius[first] + radius[second] - distance
+    hit = (overlap > 0) & (distance > 0)
+    return np.stack([first, second])[:, hit], away[hit] / distance[hit, None], overlap[hit]
+
+
 def touching(centre: Floats, radius: Floats, bowl: Container) -> tuple[Ints, Floats, Floats]:
     """Contacts of particles with each other and with the walls of the bowl.
 
@@ -407,17 +448,12 @@ def touching(centre: Floats, radius: Floats, bowl: Container) -> tuple[Ints, Flo
     (2, M), (M, 3) and (M,) ndarray
         Bodies a and b, where N is the bowl; unit vector from a to b; overlap, m.
     """
-    from scipy.spatial import KDTree
-
-    first, second = KDTree(centre).query_pairs(2 * radius.max(), output_type="ndarray").T
-    between = centre[second] - centre[first]
-    distance = np.linalg.norm(between, axis=1)
-    bodies, normals = [(first, second)], [between / np.maximum(distance, 1e-300)[:, None]]
-    overlaps = [np.where(distance > 0, radius[first] + radius[second] - distance, 0.0)]
+    pairs, between, depth = touching_pairs(centre, radius)
     everyone = np.arange(count := len(radius))
+    bodies, normals, overlaps = [pairs], [between], [depth]
     for wall in bowl.walls:
         gap, normal = wall.contacts(centre)
-        bodies.append((everyone, np.full(count, count)))
+        bodies.append(np.stack([everyone, np.full(count, count)]))
         normals.append(-normal)
         overlaps.append(radius - gap)
     overlap = np.concatenate(overlaps)

@@ -95,6 +95,8 @@ class CaseFile(Document):
         Commands on contact law, constants and coefficients that come from a template.
     changed_scripts : tuple of str
         Templates that change commands of the script, with their blocks; absent if there are none.
+    script_findings : tuple of str
+        What rules say of a script that templates change; absent if they say nothing.
     entry_step : int
         Step of the drag at which it continues its lead; absent if it has none.
     marks : tuple of str
@@ -126,6 +128,7 @@ class CaseFile(Document):
     added_forces: tuple[str, ...] = ()
     changed_law: tuple[str, ...] = ()
     changed_scripts: tuple[str, ...] = omitted(())
+    script_findings: tuple[str, ...] = omitted(())
     entry_step: int = omitted(0)
     marks: tuple[str, ...] = omitted(())
     settled: SettlingCriterion | None = omitted(None)

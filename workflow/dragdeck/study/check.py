@@ -249,6 +249,8 @@ def _assumptions(study: Study) -> _Found:
 def _removal(study: Study) -> _Found:
     removal = study.removal
     if removal is None:
+        if study.roughness:
+            yield "roughness", "roughness follows from the depth of removal", "a block removal"
         return
     if any(law.impact for law in removal.laws) and not study.outputs.first_touch_fraction:
         problem = f"the law {removal.law} reads impacts, but no run writes them"

@@ -39,6 +39,7 @@ from dragdeck.study.paths.waypoints import WaypointsPath
 from dragdeck.study.quantities import QUANTITIES
 from dragdeck.study.reference import Reference
 from dragdeck.study.removal import Removal
+from dragdeck.study.roughness import Roughness
 from dragdeck.study.search import Search
 from dragdeck.study.superposed.motion import SuperposedMotion
 from dragdeck.study.superposed.oscillation import Oscillation
@@ -540,7 +541,7 @@ BUILT_IN_FIDELITIES: Mapping[str, Fidelity] = {
 
 OF_NO_RUN = (
     *("accepted", "assumptions", "calibration", "licence", "reference", "removal"),
-    *("scaling", "search", "sweep", "title"),
+    *("roughness", "scaling", "search", "sweep", "title"),
 )
 """Blocks that no input script depends on. A block that is missing here only makes runs anew."""
 
@@ -589,6 +590,7 @@ class Study(Model):
     assumptions: list[Assumption] = Field(default_factory=list)
     reference: Reference | None = None
     removal: Removal | None = Field(default=None, exclude_if=lambda value: value is None)
+    roughness: Roughness | None = Field(default=None, exclude_if=lambda value: value is None)
     search: Search | None = Field(default=None, exclude_if=lambda value: value is None)
 
     def of_each_workpiece(self) -> Sequence["Study"]:

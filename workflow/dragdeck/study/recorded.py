@@ -16,6 +16,7 @@ from dragdeck.mesh.surface import upright
 from dragdeck.study.base import Json
 from dragdeck.study.media import MOST_SIEVES, Sieve
 from dragdeck.study.paths.waypoints import MOST_POINTS, Waypoint
+from dragdeck.study.roughness import MOST_HEIGHTS, Height
 from dragdeck.study.table import read_table
 from dragdeck.study.workpiece import MeshShape
 from dragdeck.study.yaml import located, mesh_beside, study_folders
@@ -56,6 +57,10 @@ def with_recording(data: Json, study: Path) -> tuple[Json, Places, Mapping[str, 
             k: filled(value[k], f"{field}.{k}", recorded) for k, recorded in known.items()
         }
 
+    roughness = data.get("roughness")
+    if isinstance(roughness, dict) and "profile" in roughness:
+        profile = filled(roughness["profile"], "roughness.profile", _profiled)
+        data = {**data, "roughness": {**roughness, "profile": profile}}
     if isinstance(motion, dict) and "path" in motion:
         path = filled(motion["path"], "motion.path", _waypoints)
         data = {**data, "motion": {**motion, "path": path}}
@@ -95,6 +100,13 @@ def _sieved(sieve: Any, field: str, study: Path, places: dict[str | None, _Place
     if not isinstance(sieve, str):
         return sieve
     return _read(recorded_file(sieve, study, field), Sieve, MOST_SIEVES, field, places)
+
+
+def _profiled(profile: Any, field: str, study: Path, places: dict[str | None, _Place]) -> Any:
+    """A roughness profile, if it is the name of a file of one."""
+    if not isinstance(profile, str):
+        return profile
+    return _read(recorded_file(profile, study, field), Height, MOST_HEIGHTS, field, places)
 
 
 def mesh_errors(data: Json, study: Path) -> Iterator[InputError]:

@@ -6,6 +6,7 @@ programs write a head before the names of the columns, and units below them or i
 
 import csv
 import re
+from collections import Counter
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import islice, zip_longest
@@ -34,17 +35,28 @@ _UNITS = {
 }  # fmt: skip
 """Units as programs write them, and as names of columns end with them."""
 
+_BLANK = " \t;,"
+"""What lines without a value consist of: Excel writes its separators below a table."""
+
 _MISSING = ("", "nan", "n/a", "#n/a", "#nv", "null")
 MOST_MISSING = 0.01
 """Part of the values of a column that may be missing where its reader can do without them."""
 
 _BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]")
+_BEHIND = re.compile(r"(.*\S)\s*(?:/|,|\sin)\s*(\S+)")
+"""A unit in brackets, and one behind a mark, as in ``Fx / N``."""
 _LABVIEW_TIME = "x_value"
 _TIMES = ("time", "t", "zeit", "temps", _LABVIEW_TIME)
 """Names of a column of times without its unit; LabVIEW's is in s."""
 
 _COMMENT = "comment"
 """The last column of LabVIEW, which its rows do not have."""
+
+_LONGEST_HEAD = 1000
+"""Lines within which the names of columns stand."""
+
+_LABVIEW_UNITS = "Y_Unit_Label"
+"""First word of the line of its head with the units of all columns but that of the times."""
 
 _COMMA = (
     "if these are decimal commas, export with a decimal point, or with a semicolon or tab between "
@@ -174,6 +186,8 @@ class Table:
 
 
 def _said(cell: str) -> str:
+    if len(cell.split()) > 1 and all(map(_is_number, cell.split())):
+        return f"{cell[:60]!r} is several numbers, without a semicolon, tab or comma between them"
     return f"{cell!r} is text, not a number" if cell else "the value is missing"
 
 
@@ -194,16 +208,16 @@ def read_table(file: Path, most: int | None = None) -> Table:
         The file cannot be read as text of at most 64 MB, or is no CSV file.
     """
     texts = _text(file).split("\n")
-    used = [n for n, text in enumerate(texts) if text.strip() and text.lstrip()[0] != "#"]
+    used = [n for n, text in enumerate(texts) if text.strip(_BLANK) and text.lstrip()[0] != "#"]
     if used and re.fullmatch("sep=.", texts[used[0]].strip(), re.IGNORECASE):  # of Excel
         del used[0]
     if not used:
         raise InputError("the file is empty", file=file, limit="a header line, and rows of numbers")
     before, has_units = _head(texts, used)
-    del used[:before]
+    head, used = used[:before], used[before:]
     header = used[0] + 1
     separator = _separator(texts[used[0]])
-    units = _cells(texts[used.pop(1)], separator) if has_units else []
+    units = _cells(texts[used.pop(1)], separator) if has_units else _labview_units(texts, head)
     lines, rows = [], []
     reader = csv.reader((texts[n] for n in used), delimiter=separator, skipinitialspace=True)
     try:
@@ -216,6 +230,10 @@ def read_table(file: Path, most: int | None = None) -> Table:
         raise InputError(f"not a CSV file: {error}", file=file, line=line) from None
     if before and names[-1].lower() == _COMMENT and {*map(len, rows)} == {len(names) - 1}:
         names.pop()
+    rows = [_without_ends(row, len(names)) for row in rows]
+    if names[0].lower() == _LABVIEW_TIME and not any(row[0].strip() for row in rows if row):
+        names[0] = ""  # its file has no times
+    units = _without_ends(units, len(names))
     try:
         named = tuple(column_name(*column) for column in zip_longest(names, units, fillvalue=""))
     except InputError as error:
@@ -229,14 +247,17 @@ def read_table(file: Path, most: int | None = None) -> Table:
 def column_name(name: str, unit: str = "") -> str:
     """Name of a column in lower case with its unit at the end.
 
-    The unit is in brackets, as in ``Fx [N]``, or in a row below the names.
+    The unit is in brackets, as in ``Fx [N]``, behind a mark, as in ``Fx / N`` or ``Fx in N``, or in
+    a row below the names.
 
     Raises
     ------
     InputError
         Units contradict each other.
     """
-    bracketed = _BRACKETS.fullmatch(name.strip())
+    bracketed, behind = _BRACKETS.fullmatch(name.strip()), _BEHIND.fullmatch(name.strip())
+    if not bracketed and behind and behind[2] in _UNITS:
+        bracketed = behind
     base, units = re.sub(r"\s+", "_", name.strip().lower()), {unit.strip("[]() ")}
     if bracketed:
         base = re.sub(r"\s+", "_", bracketed[1].lower())
@@ -255,6 +276,18 @@ def column_name(name: str, unit: str = "") -> str:
             "a column has two units", field=name, value=" and ".join(sorted(known)), limit="one"
         )
     return base if end in known else f"{base}_{known.pop()}"
+
+
+def _without_ends(row: list[str], count: int) -> list[str]:
+    """A row without empty cells beyond the header, which stand behind trailing separators."""
+    while len(row) > count and not row[-1].strip():
+        row = row[:-1]
+    return row
+
+
+def _labview_units(texts: Sequence[str], head: Sequence[int]) -> list[str]:
+    lines = (_cells(texts[n]) for n in head)
+    return next((["", *units] for key, *units in lines if key == _LABVIEW_UNITS), [])
 
 
 def _joined(rows: Sequence[Sequence[str]], count: int) -> list[list[str]]:
@@ -279,7 +312,10 @@ def _head(texts: Sequence[str], used: Sequence[int]) -> tuple[int, bool]:
     Names stand before the first two rows of numbers. Where what stands there cannot be names, the
     first line has them, and the others are rows, of which `Table.numbers` says what is wrong.
     """
-    numeric = [_is_row(texts[n]) for n in used]
+    used = used[:_LONGEST_HEAD]
+    widths = [_width(texts[n]) for n in used]
+    usual = max(Counter(filter(None, widths)).items(), key=lambda item: item[1], default=(0, 0))[0]
+    numeric = [bool(width) and width == usual for width in widths]
     first = next((k for k in range(len(used)) if all(numeric[k : k + 2])), 0)
     units = first > 1 and _is_units(texts[used[first - 1]])
     names = first - 1 - units
@@ -300,9 +336,10 @@ def _is_number(cell: str) -> bool:
     return _NUMBER.fullmatch(cell.replace(",", ".", 1)) is not None
 
 
-def _is_row(text: str) -> bool:
-    cells = [cell for cell in _cells(text) if cell]
-    return bool(cells) and all(map(_is_number, cells))
+def _width(text: str) -> int:
+    """How many numbers are in a row of numbers alone, missing ones included; 0 of another line."""
+    cells = _cells(text.strip().rstrip(_BLANK))
+    return len(cells) if all(_is_number(cell) or not cell for cell in cells) else 0
 
 
 def _is_units(text: str) -> bool:
@@ -315,7 +352,7 @@ def _text(file: Path) -> str:
         if (size := file.stat().st_size) > _MOST_BYTES:
             value, limit = f"{size / 1e6:.0f} MB", f"at most {_MOST_BYTES / 1e6:.0f} MB"
             raise InputError("the file is too large", file=file, value=value, limit=limit)
-        text = text_of(file.read_bytes())
+        text = text_of(file.read_bytes()).replace("\u2212", "-")
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror}", file=file) from None
     before, zero, _ = text.partition("\0")

@@ -213,6 +213,9 @@ def _facets(part: Path, unit: str | None, axis: str, scene: _Scene) -> tuple[flo
             check(mesh, file=part, surroundings=around)
             if len(mesh.faces) <= 2 * _MOST_FACETS:
                 return None, f"{size:g}  # would mesh the surface anew"
+    many = len(read(part, unit, size).faces) / _MOST_FACETS
+    if many > 1:  # not all facets scale alike
+        size *= 1.1 * math.sqrt(many)
     for tried in (size / 1.5**number for number in range(_TRIES)):
         tried = rounded(tried, up=False)
         mesh = upright(read(part, unit, tried), axis)

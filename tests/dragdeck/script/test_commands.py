@@ -2,7 +2,7 @@
 
 import pytest
 
-from dragdeck.decks.engine_commands import leaving_folder
+from dragdeck.script.commands import leaving_folder
 
 SOURCE = "../../filling/bed/packing.restart"
 

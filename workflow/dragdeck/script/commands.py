@@ -10,6 +10,9 @@ _PROGRAMS = ("include", "partition", "python", "shell")
 
 _WORD = re.compile(r'"""(.*?)"""|"([^"]*)"|\'([^\']*)\'|(\S+)', re.DOTALL)
 
+_COMMENT = re.compile(r"""((?:[^#'"]|'[^']*'|"[^"]*")*)#.*""", re.DOTALL)
+"""A line up to the first ``#`` that is in no quotation marks, and the rest."""
+
 _OUTSIDE = re.compile(r"[/~].|.*(\.\.|\})/|.*\.gz$", re.DOTALL)
 """An absolute path, one upwards or through a variable, or a file that gzip is started for."""
 
@@ -25,26 +28,60 @@ class EngineCommand:
         Without quotation marks; at least one.
     within : str
         The command that carries it: ``if`` or ``run``; empty for one that stands alone.
+    line : int
+        Where it begins in its file, from 1.
+    file : str
+        Its file, if several were read.
+    step : float or None
+        The time step that the run has reached before it, if that is known.
     """
 
     text: str
     words: list[str]
     within: str = ""
+    line: int = 0
+    file: str = ""
+    step: float | None = None
+
+
+def lines_of(deck: str) -> Iterator[tuple[int, str]]:
+    """The lines of an input script without comments, each with what ``&`` adds, and its number."""
+    held, begin = "", 0
+    for number, line in enumerate(deck.splitlines(), start=1):
+        begin = begin if held else number
+        held += line.rstrip(" \t")
+        if held.endswith("&"):
+            held = held[:-1] or " "
+            continue
+        yield begin, without_comment(held)
+        held = ""
+    if held:
+        yield begin, without_comment(held)
+
+
+def without_comment(line: str) -> str:
+    """A line up to its comment."""
+    comment = _COMMENT.fullmatch(line) if "#" in line else None
+    return comment[1] if comment else line
 
 
 def commands(deck: str) -> Iterator[EngineCommand]:
     """The commands of an input script, those that another one carries after it."""
-    for line in re.sub(r"&[ \t]*\r?\n", "", deck).splitlines():
-        if not line.lstrip().startswith("#"):
-            yield from _commands(line, "")
+    for number, line in lines_of(deck):
+        yield from _commands(line, "", number)
 
 
-def _commands(text: str, within: str) -> Iterator[EngineCommand]:
-    words = [next(filter(None, groups), "") for groups in _WORD.findall(text)]
+def words_of(text: str) -> list[str]:
+    """The words of a command, without quotation marks."""
+    return [next(filter(None, groups), "") for groups in _WORD.findall(text)]
+
+
+def _commands(text: str, within: str, line: int) -> Iterator[EngineCommand]:
+    words = words_of(text)
     if words:
-        yield EngineCommand(text, words, within)
-        for inner in _inner(words):
-            yield from _commands(inner, within or words[0])
+        yield EngineCommand(text, words, within, line)
+        for inner in inner_commands(words):
+            yield from _commands(without_comment(inner), within or words[0], line)
 
 
 def leaving_folder(deck: str, source: str) -> Iterator[tuple[str, str]]:
@@ -78,13 +115,13 @@ def files_read(deck: str) -> set[str]:
     """
     read, others = set(), set()
     for command in commands(deck):
-        names = _names_read(command.words)
+        names = names_read(command.words)
         read.update(names)
         others.update([] if names else command.words)
     return {name for name in read - others if "$" not in name}
 
 
-def _names_read(words: list[str]) -> list[str]:
+def names_read(words: list[str]) -> list[str]:
     """The files that a command reads."""
     kind = " ".join([words[0], *words[2:4]])
     if words[0] in ("read_data", "read_dump", "read_restart"):
@@ -156,7 +193,7 @@ def law_commands(deck: str) -> list[str]:
     return list(dict.fromkeys(law_lines))
 
 
-def _inner(words: list[str]) -> Iterator[str]:
+def inner_commands(words: list[str]) -> Iterator[str]:
     """The commands that ``if`` and ``run every`` carry as words."""
     if words[0] == "if":
         before = ["", *words]

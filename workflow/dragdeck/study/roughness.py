@@ -1,0 +1,88 @@
+"""Roughness of the workpiece before the process, and what is known of it later."""
+
+from typing import Annotated, Literal, NamedTuple
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from dragdeck.study.base import Model, Number, Positive
+
+MOST_HEIGHTS = 20_000
+"""Of a profile, which stands in the case of each run."""
+
+_UNEVEN = 0.01
+"""Largest relative deviation of a spacing from the mean one."""
+
+SAMPLING_LENGTHS = 5
+"""Of equal length, in which a measured profile is divided (ISO 4287)."""
+
+
+class Height(NamedTuple):
+    """A point of a measured profile, without form and waviness."""
+
+    x_m: Number
+    z_m: Number
+
+
+class Turned(Model):
+    """Grooves of a turning tool: arcs of its nose, a feed apart."""
+
+    feed_m: Positive = Field(description="feed per revolution, m")
+    nose_radius_m: Positive = Field(description="radius of the tool's nose, m")
+
+    @model_validator(mode="after")
+    def _arcs_meet(self) -> "Turned":
+        if self.feed_m >= 2 * self.nose_radius_m:
+            raise ValueError("feed_m is twice the nose_radius_m or more: the arcs do not meet")
+        return self
+
+
+class Form(Model):
+    """A periodic profile of a stated form."""
+
+    shape: Literal["sine", "triangle"] = Field(description="form of a period")
+    ra_m: Positive = Field(description="arithmetic mean deviation Ra, m")
+
+
+class MeasuredRa(Model):
+    """A roughness that was measured during the process."""
+
+    time_s: Positive = Field(description="process time, s")
+    ra_m: Positive = Field(description="arithmetic mean deviation Ra, m")
+
+
+class Roughness(Model):
+    """What the roughness is before the process; no run depends on it."""
+
+    profile: Annotated[list[Height], Field(min_length=100, max_length=MOST_HEIGHTS)] | None = Field(
+        default=None,
+        description="measured profile without form and waviness: a CSV file with columns x_m and "
+        "z_m, evenly spaced along x",
+    )
+    turned: Turned | None = None
+    form: Form | None = None
+    steady_ra_m: Positive | None = Field(
+        default=None, description="Ra that the process does not go below, m; none: not known"
+    )
+    target_ra_m: Positive | None = Field(
+        default=None, description="Ra for which the time is reported, m"
+    )
+    measured: Annotated[list[MeasuredRa], Field(max_length=100)] = Field(
+        default_factory=list,
+        description="Ra measured at other times: they fit the depth per time, and the steady Ra "
+        "unless it is given",
+    )
+
+    @model_validator(mode="after")
+    def _whole(self) -> "Roughness":
+        if sum(start is not None for start in (self.profile, self.turned, self.form)) != 1:
+            raise ValueError("give either profile, turned, or form")
+        steps = np.diff([height.x_m for height in self.profile or ()])
+        if len(steps) and not np.allclose(steps, steps.mean(), rtol=_UNEVEN):
+            raise ValueError("the profile is not evenly spaced along x_m: resample it")
+        fewest = 2 if self.steady_ra_m else 3
+        if 0 < len(self.measured) < fewest:
+            raise ValueError(f"{len(self.measured)} measured Ra fit nothing: give {fewest} or more")
+        if self.target_ra_m and self.steady_ra_m and self.target_ra_m <= self.steady_ra_m:
+            raise ValueError("target_ra_m is not above steady_ra_m: the process does not reach it")
+        return self
