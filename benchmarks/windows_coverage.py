@@ -32,7 +32,8 @@ TRUE, STRETCHES, BLOCKS, LENGTHS = -2.0, 16, 3, 9.0
 """Drag, N; stretches of a path; blocks of a stretch; cost of the whole drag in windows, each of
 which takes as much path before its sample as in it."""
 
-SLOPE_STD = 0.2
+SLOPE_STD, DEGREES = 0.2, 10.0
+"""What is known of a slope, and of the variance about it, from scene to scene."""
 
 Random = np.random.Generator
 
@@ -55,6 +56,8 @@ class Process:
         Slope less that of other scenes, in standard deviations.
     seeds : int
     tolerance : float
+    varied : int
+        Whether slope and scatter about it are drawn for each process, as scenes differ.
     """
 
     scatter: float = 0.1
@@ -64,6 +67,7 @@ class Process:
     unlike: float = 0.0
     seeds: int = 1
     tolerance: float = 0.1
+    varied: int = 0
 
     @property
     def record(self) -> WindowsRecord:
@@ -72,20 +76,25 @@ class Process:
 
     def said(self, random: Random) -> tuple[Estimate, bool, float]:
         """Mean drag over packings, whether all reached the tolerance, cost of one in windows."""
-        rounds = [self._of_packing(random) for _ in range(self.seeds)]
+        slope, about = self.slope + self.unlike * SLOPE_STD, _about(self.slope)
+        if self.varied:
+            slope += SLOPE_STD * random.normal()
+            about *= DEGREES / random.chisquare(DEGREES)
+        rounds = [self._of_packing(slope, about, random) for _ in range(self.seeds)]
         values = [value for value, _, _ in rounds]
         number = float(np.mean([windows for _, _, windows in rounds]))
         return mean_over_packings(values), all(reached for _, reached, _ in rounds), number
 
-    def _of_packing(self, random: Random) -> tuple[Estimate, bool, float]:
-        slope = self.slope + self.unlike * SLOPE_STD
+    def _of_packing(
+        self, slope: float, variance: float, random: Random
+    ) -> tuple[Estimate, bool, float]:
         mean = TRUE * (1.0 + self.packing * random.normal())
         of_block = self.scatter * math.sqrt(BLOCKS)
         drift = self.drift * (np.arange(STRETCHES) / (STRETCHES - 1) - 0.5)[:, None]
         noise = of_block * random.normal(size=(STRETCHES, BLOCKS))
-        about = self.scatter * math.sqrt(_about(self.slope)) * random.normal(size=STRETCHES)
+        about = self.scatter * math.sqrt(variance) * random.normal(size=STRETCHES)
         windows = mean * (1.0 + drift[:, 0] + slope * noise.mean(axis=1) + about)
-        total = of_block * math.hypot(self.slope, math.sqrt(_about(self.slope)))
+        total = of_block * math.sqrt(slope**2 + variance)
         whole = mean * (1.0 + drift + total * random.normal(size=(STRETCHES, BLOCKS)))
         return _judged(0.9 * mean * (1.0 + drift + noise), windows, whole, self)
 
@@ -99,7 +108,7 @@ def _about(slope: float) -> float:
 def _record(slope: float, packing: float) -> WindowsRecord:
     known = UNKNOWN.model_copy(
         update={
-            "slope": slope, "slope_std": SLOPE_STD, "packing_std": packing, "degrees": 10.0,
+            "slope": slope, "slope_std": SLOPE_STD, "packing_std": packing, "degrees": DEGREES,
             "variance_ratio": _about(slope),
         }
     )  # fmt: skip
@@ -141,12 +150,15 @@ def _judged(
 def settings() -> Iterator[tuple[Mapping[str, float], Process]]:
     """What is simulated, with the columns that name it."""
     cases = [
-        *product((0.05, 0.1, 0.2), (0.0, 0.6, 0.85), (0.0,), (0.0,), (0.0,), (1,), (0.05, 0.1)),
-        *product((0.1,), (0.6,), (0.15, 0.3), (0.0,), (0.0,), (1,), (0.05, 0.1)),
-        *product((0.1,), (0.6,), (0.0,), (0.0,), (-2.0, 2.0), (1,), (0.05, 0.1)),
-        *product((0.1,), (0.6,), (0.0,), (0.03, 0.05), (0.0,), (1, 2, 4, 8), (0.1,)),
+        *product(
+            (0.05, 0.1, 0.2), (0.0, 0.6, 0.85), (0.0,), (0.0,), (0.0,), (1,), (0.05, 0.1), (0,)
+        ),
+        *product((0.1,), (0.6,), (0.15, 0.3), (0.0,), (0.0,), (1,), (0.05, 0.1), (0,)),
+        *product((0.1,), (0.6,), (0.0,), (0.0,), (-2.0, 2.0), (1,), (0.05, 0.1), (0,)),
+        *product((0.1,), (0.6,), (0.0,), (0.03, 0.05), (0.0,), (1, 2, 4, 8), (0.1,), (0,)),
+        *product((0.05, 0.1, 0.2), (0.6,), (0.0,), (0.0,), (0.0,), (1,), (0.05, 0.1), (1,)),
     ]
-    names = ("scatter", "slope", "drift", "packing", "unlike", "seeds", "tolerance")
+    names = ("scatter", "slope", "drift", "packing", "unlike", "seeds", "tolerance", "varied")
     for case in cases:
         named = dict(zip(names, case, strict=True))
         yield named, Process(**named)  # type: ignore[arg-type]

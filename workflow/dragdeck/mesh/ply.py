@@ -45,19 +45,19 @@ class _Property(NamedTuple):
 
     name: str
     kind: str
-    count: str = ""
+    length: str = ""
 
 
 class _Element(NamedTuple):
     """An element of the header."""
 
     name: str
-    count: int
+    rows: int
     properties: list[_Property]
 
     def wrong_row(self, value: object, **place: Any) -> InputError:
         """A row that is not what the header announces."""
-        names = (f"list {each.name}" if each.count else each.name for each in self.properties)
+        names = (f"list {each.name}" if each.length else each.name for each in self.properties)
         return InputError(
             f"not a row of the element {self.name!a}", value=value, limit=" ".join(names), **place
         )
@@ -81,7 +81,7 @@ def ply(content: bytes) -> Polygons:
     if not content.startswith(b"ply") or head is None:
         raise InputError("not a PLY file", limit='"ply" at its start, and a line "end_header"')
     order, elements = _header(text_of(content[: head.start()]))
-    announced = sum(element.count for element in elements)
+    announced = sum(element.rows for element in elements)
     if announced > len(content):
         value = f"{len(content)} bytes, {announced} elements"
         raise InputError("the file was cut short", value=value)
@@ -128,11 +128,11 @@ def _header(text: str) -> tuple[str, list[_Element]]:
 
 def _polygons(parts: Mapping[str, list[_Values]], elements: Mapping[str, _Element]) -> Polygons:
     nodes, faces = elements.get("vertex"), elements.get("face")
-    plain = {each.name for each in nodes.properties if not each.count} if nodes else set()
+    plain = {each.name for each in nodes.properties if not each.length} if nodes else set()
     if not {"x", "y", "z"} <= plain:
         limit = 'an element "vertex" with x, y and z'
         raise InputError("no nodes", value=", ".join(elements), limit=limit)
-    lists = [each.name for each in faces.properties if each.count] if faces else []
+    lists = [each.name for each in faces.properties if each.length] if faces else []
     named = [name for name in _INDICES if name in lists]
     if len(named) != 1:
         limit = f'an element "face" with one list {" or ".join(_INDICES)}'
@@ -170,7 +170,7 @@ class _Rows(Protocol):
 
 def _values(rows: _Rows, element: _Element) -> Iterator[_Values]:
     """The values of an element, in parts in which all lists are as long as in the first row."""
-    left = element.count if element.properties else 0
+    left = element.rows if element.properties else 0
     while left:
         count, values = rows.take(element, left)
         left -= count
@@ -195,7 +195,7 @@ class _Bytes:
         rows = np.frombuffer(self._body, kind, min(most, room, self._likely), self._place)
         alike = np.ones(len(rows), dtype=bool)
         for place, each in enumerate(element.properties):
-            if each.count:
+            if each.length:
                 alike &= rows[f"{place} count"] == rows[f"{place} count"][0]
         count, self._likely = _alike(alike, self._likely)
         self._place += count * kind.itemsize
@@ -209,8 +209,8 @@ class _Bytes:
         end = self._place
         for place, each in enumerate(element.properties):
             length: tuple[int, ...] = ()
-            if each.count:
-                count = np.dtype(self._order + each.count)
+            if each.length:
+                count = np.dtype(self._order + each.length)
                 if end + count.itemsize > len(self._body):
                     raise self._short(element)
                 length = (int(np.frombuffer(self._body, count, 1, end)[0]),)
@@ -263,7 +263,7 @@ class _Lines:
         alike = np.ones(len(columns[0]), dtype=bool)
         values, place = dict[str, Any](), 0
         for each, length in zip(element.properties, lengths, strict=True):
-            if each.count:
+            if each.length:
                 alike &= columns[place] == length
                 listed = np.array(columns[place + 1 : place + 1 + length]).T
                 values[each.name] = listed.reshape(len(alike), length)
@@ -308,7 +308,7 @@ def _lengths(element: _Element, words: Sequence[str]) -> list[int] | None:
     """Lengths of the lists in a row of words, 0 of a single value; None if it is no such row."""
     lengths, place = list[int](), 0
     for each in element.properties:
-        count = words[place] if each.count and place < len(words) else "0"
+        count = words[place] if each.length and place < len(words) else "0"
         if not re.fullmatch(r"\d{1,9}", count):
             return None
         lengths.append(int(count))
