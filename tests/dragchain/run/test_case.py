@@ -17,7 +17,7 @@ def test_reads_a_process(tiny_run: Path) -> None:
         "tiny",
         StatisticsOfRun(transient_s=0.02),
     )
-    assert case.bowl.radius_m == 0.04
+    assert case.bowl.half_widths_m == (0.04, 0.04)
     assert case.motion is not None
     assert (case.motion.kind, case.motion.start_direction_rad) == ("line", 0.0)
     assert case.motion.axis_speed_m_s == pytest.approx(1e-4)
@@ -50,8 +50,12 @@ def test_a_motion_that_this_version_makes_otherwise_is_refused(tiny_run: Path, e
             r"scene: the scene is not one of a study\n  value:  stir",
         ),
         (
-            lambda c: c["bowl"].pop("radius_m"),
-            r"case\.json: bowl\.radius_m: a required key is missing",
+            lambda c: c["bowl"].pop("walls"),
+            r"case\.json: bowl\.walls: a required key is missing",
+        ),
+        (
+            lambda c: c.update(bowl={"radius_m": 0.04, "walls": "primitive"}),
+            r"bowl\.walls: .*\n  value:  'primitive'\n  remedy: .*dragdeck step render",
         ),
         (
             lambda c: c.update(study=c.pop("study_name"), inputs={"seed": 1}),

@@ -209,7 +209,7 @@ def test_a_contact_law_of_a_template_holds_for_particles_and_walls(
 
 def test_a_whole_file_may_be_replaced(case: Case, project: Project) -> None:
     walls = (project.templates / "walls.j2").read_text()
-    own_template(case, walls.replace("zplane 0.0", "zplane 0.001"), "walls.j2")
+    own_template(case, walls.replace("(wall.at_m | num)", "0.001"), "walls.j2")
     assert "zplane 0.001 store_force" in render(case, project)
 
 
