@@ -22,10 +22,10 @@ from dragchain.statistics.estimate import Estimate, finite, mean_of
 from dragdeck import __version__
 from dragdeck.cases.case import Case
 from dragdeck.decks.templates import environment
-from dragdeck.documents import Part
 from dragdeck.engine.batch import Batch
 from dragdeck.engine.reports import Report, say
 from dragdeck.errors import InputError
+from dragdeck.parts import Part
 from dragdeck.project import by_run, find_project, study_templates
 from dragdeck.records.run import RunRecord
 from dragdeck.records.tradeoff import CostEntry, CostsFile, Machine

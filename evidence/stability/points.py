@@ -8,7 +8,7 @@ from typing import get_args
 
 from pydantic import TypeAdapter, ValidationError, model_validator
 
-from dragdeck.documents import Part
+from dragdeck.parts import Part
 from dragdeck.scenes.scene import Regime
 from dragdeck.study.base import Number
 from dragdeck.study.check import explained

@@ -8,7 +8,7 @@ from dragdeck.cases.bed import bed_rayleigh_time, particle_material, skin
 from dragdeck.cases.case import Case
 from dragdeck.decks import PACKING_FILE, outputs
 from dragdeck.decks.deck import Body, Deck, Scene, data_file
-from dragdeck.documents import Part
+from dragdeck.parts import Part
 from dragdeck.physics.contact_mechanics import (
     effective_modulus,
     hertz_contact_time,

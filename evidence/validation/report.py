@@ -27,7 +27,8 @@ from dragchain.tradeoff.compare import (
     differing_inputs,
     read_plan_runs,
 )
-from dragdeck.documents import Document, Part
+from dragdeck.documents import Document
+from dragdeck.parts import Part
 from dragdeck.records.case import CaseOfRun, load_case
 
 _COMPARED = ("drag_mean", "drag_std")

@@ -12,7 +12,7 @@ from dragdeck.cases.case import digest
 from dragdeck.decks import outputs
 from dragdeck.decks.deck import Body as DataBody
 from dragdeck.decks.deck import Deck, Materials, Scene, Vector, contact_law, data_file
-from dragdeck.documents import omitted
+from dragdeck.parts import omitted
 from dragdeck.physics.contact_mechanics import rayleigh_time
 from dragdeck.physics.rounding import round_to
 from dragdeck.records.run import CaseFile, CountOfRun, RanksOfRun

@@ -4,13 +4,14 @@ import json
 from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 from pydantic_core import ErrorDetails
 
 from dragdeck.errors import DocumentError
 from dragdeck.files import write_text
+from dragdeck.parts import Part
 
 SCHEMA = 2
 """Version of the form of every document; 1 had other names (CHANGELOG.md)."""
@@ -18,17 +19,6 @@ SCHEMA = 2
 
 _MOST = 200
 """Characters of a wrong value in a message."""
-
-
-class Part(BaseModel):
-    """A part of a document: values never change, and none is infinite or NaN."""
-
-    model_config = ConfigDict(frozen=True, allow_inf_nan=False, populate_by_name=True)
-
-
-def omitted(default: Any) -> Any:
-    """A field of a part that is not written where it has its default."""
-    return Field(default=default, exclude_if=lambda value: value == default)
 
 
 class Document(Part):

@@ -12,7 +12,7 @@ from pydantic import PositiveFloat
 
 from dragdeck.cases.bed import bed_rayleigh_time, particle_material
 from dragdeck.cases.case import Case
-from dragdeck.documents import Part
+from dragdeck.parts import Part
 from dragdeck.physics import contact_mechanics as mechanics
 from dragdeck.physics.rounding import timestep
 from dragdeck.scenes.drop_test import DropFidelity

@@ -20,8 +20,8 @@ from dragchain.calibration.drops import IMPACTS, DropTest
 from dragchain.calibration.measured_impacts import Impact, Measured, pulse
 from dragchain.calibration.simulated_drops import DropRun, Drops, Emulator, Waveform
 from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate
-from dragdeck.documents import Part
 from dragdeck.errors import RecordError
+from dragdeck.parts import Part
 
 # --- sampling ------------------------------------------------------------------------------------
 

@@ -18,8 +18,8 @@ from dragchain.calibration.angles import read_angle
 from dragchain.errors import TableError
 from dragchain.statistics.bed_effects import EffectsFit, fit_effects
 from dragchain.statistics.estimate import CONFIDENCE, Estimate
-from dragdeck.documents import Part
 from dragdeck.files import write_text
+from dragdeck.parts import Part
 from dragdeck.study.calibration import Rig
 
 GRID = 121

@@ -12,8 +12,9 @@ from scipy.signal import find_peaks, peak_widths
 
 from dragchain.arrays import Floats
 from dragchain.calibration.drops import IMPACTS
-from dragdeck.documents import Document, Part
+from dragdeck.documents import Document
 from dragdeck.errors import RecordError
+from dragdeck.parts import Part
 from dragdeck.study.force_record import Note, Record, quiet_line
 
 _QUIET_SAMPLES = 20

@@ -5,7 +5,8 @@ from pathlib import Path
 
 from dragchain.loading.contact_events import Thresholds
 from dragchain.statistics.estimate import Estimate, EstimateColumns, Real
-from dragdeck.documents import Document, Part
+from dragdeck.documents import Document
+from dragdeck.parts import Part
 
 FILE = Path("tables") / "loading.json"
 

@@ -10,7 +10,7 @@ from dragchain.loading.samples import Sampled
 from dragchain.run.workpiece import Surface
 from dragchain.statistics.correlated import estimates
 from dragchain.statistics.estimate import Estimate, EstimateColumns
-from dragdeck.documents import Part
+from dragdeck.parts import Part
 
 FEATURE_DEG = 30.0
 """Facets that meet at a convex edge with a larger angle between their normals make a sharp edge."""

@@ -26,7 +26,8 @@ from dragchain.statistics.correlated import estimates
 from dragchain.statistics.estimate import Estimate
 from dragchain.tables.by_step import read_table
 from dragdeck.decks.outputs import TOUCHES, load_outputs
-from dragdeck.documents import Document, Part
+from dragdeck.documents import Document
+from dragdeck.parts import Part
 from dragdeck.physics.contact_mechanics import sphere_mass
 from dragdeck.records.case import CaseOfRun
 from dragdeck.study.removal import LAWS, Law, Wearing, impact_angle

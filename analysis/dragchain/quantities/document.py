@@ -14,7 +14,8 @@ import numpy as np
 from dragchain.quantities.blocks import Blocks, estimate_of
 from dragchain.quantities.registry import MEASURED
 from dragchain.statistics.estimate import Estimate
-from dragdeck.documents import Document, Part
+from dragdeck.documents import Document
+from dragdeck.parts import Part
 from dragdeck.records.case import FidelityOfRun, StudyOfRun
 from dragdeck.records.run import AcceptanceCheck
 from dragdeck.records.windows import UNKNOWN, Known

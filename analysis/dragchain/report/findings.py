@@ -7,7 +7,8 @@ from typing import Literal, NamedTuple
 from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import Estimate, EstimateColumns, Real
 from dragchain.tables.impacts import Restitution
-from dragdeck.documents import Document, Part, omitted
+from dragdeck.documents import Document
+from dragdeck.parts import Part, omitted
 
 FILE = Path("tables") / "findings.json"
 

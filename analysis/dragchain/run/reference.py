@@ -2,7 +2,7 @@
 
 from dragchain.errors import TableError
 from dragchain.statistics.estimate import Estimate
-from dragdeck.documents import Part
+from dragdeck.parts import Part
 from dragdeck.study.reference import Reference
 
 

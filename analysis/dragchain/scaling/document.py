@@ -5,7 +5,8 @@ from collections.abc import Mapping
 from typing import Literal, NamedTuple
 
 from dragchain.statistics.estimate import CONFIDENCE, Estimate, Verdict
-from dragdeck.documents import Document, Part
+from dragdeck.documents import Document
+from dragdeck.parts import Part
 from dragdeck.records.case import FidelityOfRun
 
 Judged = Literal[Verdict, "no expectation"]

@@ -9,8 +9,8 @@ from dragchain.arrays import Floats, Ints
 from dragchain.errors import TableError
 from dragchain.tables.by_step import read_table
 from dragchain.tables.parquet import Rows
-from dragdeck.documents import Part
 from dragdeck.dumps.frame import Columns
+from dragdeck.parts import Part
 
 
 def speed_at_plate(speed_m_s: Floats, gap_m: Floats, gravity_m_s2: float) -> Floats:

@@ -24,7 +24,7 @@ from scipy.special import erf
 from dragchain.arrays import Floats
 from dragchain.quantities.document import Extrapolated, LoadMap, Need, Reached
 from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate, student_quantile
-from dragdeck.documents import Part
+from dragdeck.parts import Part
 from dragdeck.records.windows import Known
 
 

@@ -49,10 +49,7 @@ def test_a_motion_that_this_version_makes_otherwise_is_refused(tiny_run: Path, e
             lambda c: c.update(scene="stir"),
             r"scene: the scene is not one of a study\n  value:  stir",
         ),
-        (
-            lambda c: c["bowl"].pop("walls"),
-            r"case\.json: bowl\.walls: a required key is missing",
-        ),
+        (lambda c: c["bowl"].pop("walls"), r"case\.json: bowl\.walls: a required key is missing"),
         (
             lambda c: c.update(bowl={"radius_m": 0.04, "walls": "primitive"}),
             r"bowl\.walls: .*\n  value:  'primitive'\n  remedy: .*dragdeck step render",

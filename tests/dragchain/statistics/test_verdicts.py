@@ -8,7 +8,7 @@ from typing import get_args
 import dragchain
 import evidence
 from dragchain.statistics.estimate import Verdict
-from dragdeck.documents import Part
+from dragdeck.parts import Part
 
 WORDS = {"confirmed", "not confirmed", "contradicted"}
 CHECKS = {"pass", "fail"}

@@ -12,7 +12,8 @@ from typing import ClassVar, Literal, Self
 from markupsafe import Markup
 from pydantic import Field, PositiveInt, field_validator, model_validator
 
-from dragdeck.documents import Document, Part
+from dragdeck.documents import Document
+from dragdeck.parts import Part
 
 Kind = Literal["print", "custom", "local"]
 

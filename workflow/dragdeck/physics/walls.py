@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import PositiveFloat
 
 from dragdeck.arrays import Floats
-from dragdeck.documents import Part, omitted
+from dragdeck.parts import Part, omitted
 
 _AXES = {"xplane": 0, "yplane": 1, "zplane": 2}
 

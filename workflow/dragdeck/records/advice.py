@@ -2,7 +2,8 @@
 
 from collections.abc import Mapping
 
-from dragdeck.documents import Document, Part
+from dragdeck.documents import Document
+from dragdeck.parts import Part
 from dragdeck.records.advised import AdvisedSettings
 from dragdeck.study.base import Json
 from dragdeck.study.model import Fidelity

@@ -1,6 +1,6 @@
 """What ``case.json`` keeps of the advice that a run's settings came from."""
 
-from dragdeck.documents import Part
+from dragdeck.parts import Part
 
 
 class AdvisedSettings(Part):

@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import PositiveFloat
 
 from dragdeck.arrays import Floats, Ints, class_numbers
-from dragdeck.documents import Part, omitted
+from dragdeck.parts import Part, omitted
 from dragdeck.physics.contact_mechanics import ContactConstants
 from dragdeck.physics.walls import Container
 from dragdeck.records.run import CaseFile, CountOfRun

@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import JsonValue, PlainSerializer, PositiveFloat, PositiveInt
 
-from dragdeck.documents import Part, omitted
 from dragdeck.errors import DocumentError, choices
+from dragdeck.parts import Part, omitted
 from dragdeck.physics.run_limits import RunLimits
 from dragdeck.records.advised import AdvisedSettings
 from dragdeck.records.bed import CaseOfBed

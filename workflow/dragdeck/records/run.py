@@ -7,9 +7,10 @@ from typing import Literal, NamedTuple, Self
 
 from pydantic import Field, PositiveFloat, model_validator
 
-from dragdeck.documents import Document, Part, omitted
+from dragdeck.documents import Document
 from dragdeck.errors import RejectedRunError
 from dragdeck.files import table_rows
+from dragdeck.parts import Part, omitted
 from dragdeck.physics.run_limits import RunLimits
 
 

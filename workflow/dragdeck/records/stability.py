@@ -9,7 +9,8 @@ from typing import Annotated
 
 from pydantic import BeforeValidator
 
-from dragdeck.documents import Document, Part
+from dragdeck.documents import Document
+from dragdeck.parts import Part
 from dragdeck.physics.contact_mechanics import damping_ratio
 
 _DATA = Path(str(resources.files("dragdeck"))) / "data"

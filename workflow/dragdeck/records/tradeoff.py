@@ -11,7 +11,8 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, PlainSerializer
 
-from dragdeck.documents import Document, Part
+from dragdeck.documents import Document
+from dragdeck.parts import Part
 from dragdeck.study.model import Fidelity
 
 _FILE = Path(str(resources.files("dragdeck"))) / "data" / "tradeoff.json"

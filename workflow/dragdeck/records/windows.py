@@ -8,7 +8,8 @@ from typing import Annotated
 from pydantic import AllowInfNan, BeforeValidator
 
 import dragdeck
-from dragdeck.documents import Document, Part
+from dragdeck.documents import Document
+from dragdeck.parts import Part
 
 _NORMAL_QUANTILE = 1.96
 """Of 95 % of a normal distribution."""

@@ -21,11 +21,11 @@ from dragdeck.cases.bed import (
 from dragdeck.cases.case import Case
 from dragdeck.decks import outputs
 from dragdeck.decks.deck import Body, Deck, Scene, data_file
-from dragdeck.documents import Part
 from dragdeck.errors import InputError
 from dragdeck.mesh.files import stl_text
 from dragdeck.mesh.shapes import tube
 from dragdeck.mesh.surface import surface
+from dragdeck.parts import Part
 from dragdeck.physics.contact_mechanics import ENGINE_SOFTEST_PA, fall_time
 from dragdeck.physics.estimates import SOLID_FRACTION_ESTIMATE
 from dragdeck.physics.packing import pour

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from dragdeck.documents import Document, Part
+from dragdeck.documents import Document
+from dragdeck.parts import Part
 from dragdeck.study.base import Model, Name, Number, Whole
 from dragdeck.study.quantities import QUANTITIES
 
