@@ -206,6 +206,8 @@ def _add_bowl(plotter: Any, case: CaseOfRun, view: View) -> None:
         opacity = 0.06 if view == "xy" else 0.5
         plotter.add_mesh(pv.PolyData(floor).delaunay_2d(), color="#7a8694", opacity=opacity)
     for line in case.bowl.lines(height):
+        if view == "xz" and line[:, 1].max() < 0.0:
+            continue  # it would hide what is behind it
         plotter.add_mesh(pv.MultipleLines(line).tube(radius=0.0003), color="#4a5561")
 
 

@@ -23,6 +23,7 @@ from dragchain.report.run_data import RunData, dominant_bottlenecks, of_classes,
 from dragchain.report.run_figures import energy_ratio, write_figures
 from dragchain.run.reference import reference_drags
 from dragchain.statistics.estimate import Estimate
+from dragdeck.physics.walls import round_container
 from dragdeck.records.case import CaseOfRun, load_case
 from dragdeck.records.run import figures_of
 from dragdeck.study.drive import Orientations
@@ -211,8 +212,7 @@ def test_a_rendered_contact_is_where_its_axes_say(
 
 
 def widened(case: CaseOfRun, radius_m: float) -> CaseOfRun:
-    assert case.bowl is not None
-    return changed(case, bowl=changed(case.bowl, radius_m=radius_m))
+    return changed(case, bowl=round_container(radius_m))
 
 
 def test_a_wide_bowl_is_cut_to_the_surroundings_of_the_workpiece(process: Path) -> None:

@@ -1,11 +1,12 @@
 """What tells a whole output file from one that was cut short."""
 
+import json
 import math
 from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
-from made_run import Raw, output_of_run
+from made_run import Raw, made_case, output_of_run
 
 from dragdeck.decks.outputs import OutputOfRun
 from dragdeck.dumps.grammar import whole_frames
@@ -164,12 +165,14 @@ SETTLED = SettlingCriterion(energy_ratio=1e-6, highest_m=0.05)
 
 @pytest.mark.parametrize(("z_m", "fails"), [(0.0479, set()), (0.0481, {"packing_in_bowl"})])
 def test_a_packing_above_the_rim_fails(tmp_path: Path, z_m: float, fails: set[str]) -> None:
-    columns = ["a_id", "z_m", "radius_m"]
+    columns = ["a_id", "x_m", "y_m", "z_m", "radius_m"]
     particles = output_of_run("particles", "custom", columns, 1, 0, None, binary=True)
-    frames = [[[1, 0.2, 0.002], [2, 0.01, 0.002]], [[1, z_m, 0.002], [2, 0.01, 0.002]]]
-    content = [Raw.binary(step, rows, 3) for step, rows in enumerate(frames)]
+    rest = [2, 0, 0, 0.01, 0.002]
+    frames = [[[1, 0, 0, 0.2, 0.002], rest], [[1, 0, 0, z_m, 0.002], rest]]
+    content = [Raw.binary(step, rows, 5) for step, rows in enumerate(frames)]
     (tmp_path / "particles.1").write_bytes(b"".join(content))
     (tmp_path / "screen.1.txt").write_text(GRID + "DRAGDECK SETTLED: after\nDRAGDECK END\n")
+    (tmp_path / "case.json").write_text(json.dumps(made_case("filling", "a")))
     filling = INPUTS.model_copy(update={"settled": SETTLED, "scene": "other"})
     parts = [RunPart(part=1, checkpoint=None, from_step=0)]
     checks = check_run(tmp_path, filling, {"particles": particles}, 0, parts, ranks=1)

@@ -10,11 +10,14 @@ from trimesh import Trimesh
 
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
+from dragdeck.mesh import checks
+from dragdeck.mesh.checks import Finding
 from dragdeck.project import Project
 from dragdeck.scenes.filling import expected_bed
 from dragdeck.scenes.process import PROCESS
 from dragdeck.scenes.workpiece import clearances, in_diameters
 from dragdeck.study.workpiece import MeshShape
+from dragdeck.sweep import own_part
 from dragdeck.sweep.cases import load_cases, new_study
 
 
@@ -106,6 +109,27 @@ def test_sharp_facets_are_meshed_anew(project: Project) -> None:
     assert shape.facet_size_m is not None
     assert "its facets are meshed anew" in case.file.read_text()
     assert PROCESS.build(case, None)
+
+
+def test_a_fold_that_the_mesher_makes_is_no_defect_of_the_part(
+    project: Project, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A thin edge is folded at one facet size, and not at the next."""
+    pytest.importorskip("mmgpy", reason="mmgpy is not made for every machine")
+    mesh, folded = trimesh.creation.cylinder(5.0, 80.0, sections=300), []
+    size = study_of(project, mesh)[1].facet_size_m
+
+    def findings(body: Trimesh, **around: object) -> list[Finding]:
+        if len(body.faces) != len(mesh.faces) and not folded:
+            folded.append(Finding("two facets lie on each other", "2", "none", "repair the mesh"))
+            return folded
+        return checks.findings(body, **around)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(own_part, "findings", findings)
+    new_study(project.studies, "other", str(project.root / "part.stl"))
+    shape = load_cases(project.studies / "other" / "study.yaml")[0].study.workpiece.shape
+    assert folded and isinstance(shape, MeshShape)
+    assert shape.facet_size_m == pytest.approx(size / 1.5, rel=0.1)
 
 
 def test_defects_that_no_facet_size_mends_are_all_named(project: Project) -> None:

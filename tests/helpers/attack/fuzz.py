@@ -272,7 +272,7 @@ def _studies() -> list[bytes]:
 def _try_study(folder: Path, content: bytes) -> None:
     """A study is read or refused; what is read, written and read again is the same."""
     file = folder / "a" / "study.yaml"
-    file.parent.mkdir()
+    file.parent.mkdir(exist_ok=True)
     file.write_bytes(content)
     try:
         cases = load_cases(file)

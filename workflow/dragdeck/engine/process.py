@@ -99,7 +99,7 @@ def find_engine() -> Engine:
 
 @cache
 def _version(path: str) -> str:
-    words = [*_by_line(path), "-log", "none", "-h"]  # else it writes log.liggghts here
+    words = [*_by_line(path), "-h", "-log", "none"]  # else it writes log.liggghts here
     shown = subprocess.run(
         words,
         capture_output=True,

@@ -19,6 +19,7 @@ from dragdeck.study.driven import directions
 from dragdeck.study.model import (
     BUILT_IN_FIDELITIES,
     OF_NO_RUN,
+    AnyBowl,
     AnyPath,
     Fidelity,
     Scaling,
@@ -229,11 +230,12 @@ _OF_OTHER_KINDS = [
     for block, kinds in {
         "motion.path": get_args(AnyPath),
         "workpiece.shape": get_args(get_args(Shape)[0]),
+        "bowl": [get_args(kind)[0] for kind in get_args(AnyBowl)],
     }.items()
     for kind in kinds
     for name in kind.model_fields
 ]
-"""Fields of all kinds of path and shape: a study may extend or sweep to another kind."""
+"""Fields of all kinds of path, shape and bowl: a study may extend or sweep to another kind."""
 
 
 def _assumptions(study: Study) -> _Found:
