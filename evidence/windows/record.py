@@ -33,7 +33,7 @@ from dragchain.windows.rounds import beside, of_windows, stretches, window_of
 from dragdeck.physics.contact_mechanics import damping_ratio
 from dragdeck.records.stability import StableStepLaw, StableStepRecord
 from dragdeck.records.tradeoff import SixDigits
-from dragdeck.records.windows import UNKNOWN, Known, WindowsRecord, softness
+from dragdeck.records.windows import UNKNOWN, Known, WindowsRecord, softening
 
 _SOFT = 1e-3
 _FEWEST_SCENES = 5
@@ -357,7 +357,7 @@ class Softened:
         if not stiff or not by_scale:
             return None
         number = stiff[0].run.numbers["stiffness_number"]
-        soft = [softness(number * scale ** (2 / 3)) - softness(number) for scale in by_scale]
+        soft = [softening(number, scale) for scale in by_scale]
         return cls(stiff, list(by_scale.values()), np.array(soft))
 
     @cached_property

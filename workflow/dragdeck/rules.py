@@ -240,6 +240,7 @@ class Workflow:
         self.points_by_run = cache(self._points_by_run)
         self.runs_of = cache(self._runs_of)
         self.digest = cache(self._digest)
+        self.packings_of = cache(self._packings_of)
         self.templates_of = cache(self._templates_of)
 
     # --- paths -----------------------------------------------------------------------------
@@ -539,13 +540,12 @@ class Workflow:
 
     def packings_option(self, wildcards: Wildcards) -> str:
         """How many of the cases differ from that of a process run in their packing alone."""
-        study = self.case_of("process", wildcards.run).study
-        same = [
-            case
-            for case in self.cases
-            if case.study.model_copy(update={"seed": study.seed}) == study
-        ]
-        return f"--packings {max(1, len(same))}"
+        (scene,) = _scene_texts([self.case_of("process", wildcards.run)])
+        return f"--packings {max(1, self.packings_of()[scene])}"
+
+    def _packings_of(self) -> Counter[str]:
+        """Number of packings by all that a study says but its seed."""
+        return Counter(_scene_texts(self.cases))
 
     def windows_options(self, wildcards: RoundOfRun) -> str:
         """What the windows of a run are asked for, as options of the command line."""
@@ -559,3 +559,9 @@ class Workflow:
             f" --most {len(self.windows_of_run(wildcards))}"
             f" --lengths {whole_lengths(study):.6g} {self.packings_option(wildcards)}{drag}"
         )
+
+
+def _scene_texts(cases: Iterable[Case]) -> Iterator[str]:
+    """What the studies of cases say but their seeds."""
+    for case in cases:
+        yield case.study.model_copy(update={"seed": 0}).model_dump_json()

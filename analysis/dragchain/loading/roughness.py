@@ -28,7 +28,7 @@ _PHASES = (np.arange(4000) + 0.5) / 4000
 
 
 @dataclass(frozen=True)
-class Profile:
+class RoughnessProfile:
     """Heights of a surface.
 
     Attributes
@@ -96,19 +96,21 @@ class Profile:
         if self.lengths < 2:
             return 0.0
         of_lengths = [
-            float(Profile(part).ra(0.0)) for part in np.array_split(self.z_m, self.lengths)
+            float(RoughnessProfile(part).ra(0.0)) for part in np.array_split(self.z_m, self.lengths)
         ]
         error = float(np.std(of_lengths, ddof=1)) / math.sqrt(self.lengths)
         return student_quantile(self.lengths - 1) * error / float(self.ra(0.0))
 
 
-def profile_of(roughness: Roughness) -> Profile:
+def profile_of(roughness: Roughness) -> RoughnessProfile:
     """The profile before the process."""
     if roughness.profile:
-        return Profile(np.array([height.z_m for height in roughness.profile]), SAMPLING_LENGTHS)
+        return RoughnessProfile(
+            np.array([height.z_m for height in roughness.profile]), SAMPLING_LENGTHS
+        )
     start = roughness.turned or roughness.form
     assert start is not None
-    return Profile(_turned(start) if isinstance(start, Turned) else _form(start))
+    return RoughnessProfile(_turned(start) if isinstance(start, Turned) else _form(start))
 
 
 def _turned(turned: Turned) -> Floats:
@@ -124,18 +126,18 @@ def _form(form: Form) -> Floats:
 
 
 @dataclass(frozen=True)
-class Course:
+class RoughnessCourse:
     """How the roughness falls with process time.
 
     Attributes
     ----------
-    profile : Profile
+    profile : RoughnessProfile
     steady_m : Estimate
         Ra of the scratches that the process leaves, m; zero if that is not known. The mean squares
         of both profiles add up, as those of independent ones do.
     """
 
-    profile: Profile
+    profile: RoughnessProfile
     steady_m: Estimate
 
     def ra_after(self, depth_m: Estimate) -> Estimate:
@@ -188,7 +190,7 @@ class RaFit:
     steady_m: Estimate
 
 
-def fit_measured(roughness: Roughness, profile: Profile) -> RaFit | None:
+def fit_measured(roughness: Roughness, profile: RoughnessProfile) -> RaFit | None:
     """The fit to the measured Ra, None if there are none.
 
     By least squares of the logarithms, with Student's t intervals from their scatter (Seber and

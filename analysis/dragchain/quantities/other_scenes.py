@@ -12,7 +12,7 @@ from dragchain.quantities.registry import Quantity
 from dragchain.run.case import study_of
 from dragchain.statistics.estimate import Estimate, student_quantile
 from dragdeck.records.case import CaseOfRun
-from dragdeck.records.windows import UNKNOWN, WindowsRecord, softness
+from dragdeck.records.windows import UNKNOWN, WindowsRecord, softening
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ def other_scenes(quantity: Quantity, case: CaseOfRun) -> OtherScenes | None:
         return None
     if number is None or case.added_forces or case.changed_law or _clumps(case):
         return None
-    difference = softness(number * scale ** (2 / 3)) - softness(number)
+    difference = softening(number, scale)
     return OtherScenes(
         known.per_softness * difference, known.per_softness_std * difference, known.scenes
     )

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from dragchain.loading.roughness import Course, RaFit, fit_measured, profile_of
+from dragchain.loading.roughness import RaFit, RoughnessCourse, fit_measured, profile_of
 from dragchain.report.cases import ReportedCase
 from dragchain.report.removal import UM_PER_H, RemovalOfCase
 from dragchain.statistics.estimate import Estimate
@@ -33,7 +33,7 @@ class RoughnessOfCase:
 
     Attributes
     ----------
-    course : Course
+    course : RoughnessCourse
     fit : RaFit or None
         To the measured Ra, if there are any: its depth per time holds instead of the removal's.
     fitted_share : float
@@ -47,7 +47,7 @@ class RoughnessOfCase:
         By facet, ``ra_m`` and the ends of its 95 % interval at that time.
     """
 
-    course: Course
+    course: RoughnessCourse
     fit: RaFit | None
     fitted_share: float
     moments: Sequence[Moment]
@@ -64,7 +64,7 @@ def roughness_of(case: ReportedCase, removal: RemovalOfCase) -> RoughnessOfCase 
     profile = profile_of(roughness)
     fit = fit_measured(roughness, profile)
     given = roughness.steady_ra_m or 0.0
-    course = Course(profile, fit.steady_m if fit else Estimate(given, given, given))
+    course = RoughnessCourse(profile, fit.steady_m if fit else Estimate(given, given, given))
     predicted = removal.depth_um_h.combined.over(UM_PER_H)
     rate = fit.depth_m_s if fit else predicted
     share = rate.value / predicted.value
@@ -90,7 +90,7 @@ def roughness_of(case: ReportedCase, removal: RemovalOfCase) -> RoughnessOfCase 
     )
 
 
-def _moment(course: Course, rate: Estimate, seconds: float) -> Moment:
+def _moment(course: RoughnessCourse, rate: Estimate, seconds: float) -> Moment:
     """At a time."""
     depth = Estimate(*(seconds * of for of in (rate.value, rate.ci95_low, rate.ci95_high)))
     profile, micrometres = course.profile, 1e-6
@@ -103,7 +103,7 @@ def _moment(course: Course, rate: Estimate, seconds: float) -> Moment:
     )
 
 
-def _map(course: Course, facets: pd.DataFrame, seconds: float) -> pd.DataFrame:
+def _map(course: RoughnessCourse, facets: pd.DataFrame, seconds: float) -> pd.DataFrame:
     """Ra of each facet after so many s at the depths per time of the removal."""
     ends = ("depth_m_s", "depth_ci95_low_m_s", "depth_ci95_high_m_s")
     rates = facets[list(ends)].to_numpy(np.float64)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dragchain.loading.roughness import Course, Profile, fit_measured, profile_of
+from dragchain.loading.roughness import RoughnessCourse, RoughnessProfile, fit_measured, profile_of
 from dragchain.statistics.estimate import Estimate
 from dragdeck.study.roughness import Roughness
 
@@ -15,11 +15,11 @@ SINE = {"shape": "sine", "ra_m": 1e-6}
 ZERO = Estimate(0.0, 0.0, 0.0)
 
 
-def profile(**start: object) -> Profile:
+def profile(**start: object) -> RoughnessProfile:
     return profile_of(Roughness.model_validate(start))
 
 
-def triangle(ra_m: float = 1e-6) -> Profile:
+def triangle(ra_m: float = 1e-6) -> RoughnessProfile:
     return profile(form={"shape": "triangle", "ra_m": ra_m})
 
 
@@ -61,7 +61,7 @@ def test_arcs_of_turning() -> None:
 @given(st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=60), st.floats(0.0, 1.5))
 def test_what_is_cut_is_what_is_removed(heights: list[float], share: float) -> None:
     z = np.array(heights)
-    surface, depth = Profile(z), share * (z.mean() - z.min())
+    surface, depth = RoughnessProfile(z), share * (z.mean() - z.min())
     level = float(surface.level(depth))
     left = np.minimum(z, level)
     assert z.mean() - left.mean() == pytest.approx(depth, abs=1e-9)
@@ -78,23 +78,23 @@ def test_the_depth_to_a_roughness_is_the_inverse() -> None:
 
 def test_the_interval_has_the_errors_of_depth_profile_and_steady_roughness() -> None:
     noise = np.random.default_rng(3).normal(size=5000)
-    rough = Profile(noise, 5)
+    rough = RoughnessProfile(noise, 5)
     depth, exact = Estimate(0.3, 0.25, 0.35), Estimate(0.3, 0.3, 0.3)
-    of_depth = Course(Profile(noise), ZERO).ra_after(depth)
+    of_depth = RoughnessCourse(RoughnessProfile(noise), ZERO).ra_after(depth)
     assert of_depth.ci95_low == pytest.approx(float(rough.ra(0.35)))
     assert of_depth.ci95_high == pytest.approx(float(rough.ra(0.25)))
-    of_profile = Course(rough, ZERO).ra_after(exact)
+    of_profile = RoughnessCourse(rough, ZERO).ra_after(exact)
     assert (
         of_profile.relative_half_width == pytest.approx(rough.half_width) and rough.half_width > 0
     )
     steady = Estimate(0.2, 0.15, 0.25)
-    both = Course(rough, steady).ra_after(depth)
+    both = RoughnessCourse(rough, steady).ra_after(depth)
     assert both.value == pytest.approx(math.hypot(of_depth.value, 0.2))
     assert both.half_width > max(of_profile.half_width, of_depth.half_width) * 0.8
 
 
 def test_the_time_to_a_roughness() -> None:
-    course = Course(triangle(), Estimate(2e-7, 1e-7, 3e-7))
+    course = RoughnessCourse(triangle(), Estimate(2e-7, 1e-7, 3e-7))
     rate = Estimate(1e-9, 0.8e-9, 1.25e-9)
     time = course.time_to(5e-7, rate)
     ra = course.ra_after(rate.over(1 / time.value))

@@ -99,7 +99,7 @@ def test_the_error_of_liggghts_with_its_line(
 
 
 def test_a_script_that_reaches_outside_is_not_run(tmp_path: Path) -> None:
-    file = write(tmp_path, DECK.replace("run 1\n", "print x append /tmp/x\nrun 1\n"))
+    file = write(tmp_path, DECK.replace("run 1\n", "print x append ../x\nrun 1\n"))
     assert audit(file, engine=True, select="DK3") == 0
     report = Report(file, {}, None, "DK", "")
     from dragdeck.audit.zero_steps import engine_findings

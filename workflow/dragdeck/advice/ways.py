@@ -10,7 +10,7 @@ import numpy as np
 from dragdeck.cases.bed import bed_timestep, expected_surface, full_stiffness_number
 from dragdeck.cases.case import Case, of_each_workpiece
 from dragdeck.records.tradeoff import TradeoffRecord
-from dragdeck.records.windows import Known, WindowsRecord, softness
+from dragdeck.records.windows import Known, WindowsRecord, softening
 from dragdeck.scenes.filling import FILLING, expected_time
 from dragdeck.scenes.lead import (
     FIRST_WINDOWS,
@@ -177,8 +177,7 @@ class Ways:
         """The soft run alone, times the ratio of other scenes: an estimate, no measurement."""
         blocks, _ = self._blocks
         full = full_stiffness_number(self._study)
-        scale = self.soft.youngs_modulus_scale
-        difference = softness(full * scale ** (2 / 3)) - softness(full)
+        difference = softening(full, self.soft.youngs_modulus_scale)
         half = self._largest(lambda known: known.soft_half_width(blocks, difference))
         return self._way("soft run times the ratio of other scenes", half, self.soft)
 

@@ -5,6 +5,7 @@ import re
 import sys
 from collections.abc import Iterator, Sequence
 from fnmatch import fnmatch
+from functools import cached_property
 from pathlib import Path
 
 from dragdeck.errors import DragdeckError, InputError
@@ -59,7 +60,7 @@ def audit(
     except (DragdeckError, OSError) as error:
         print(f"dragdeck: {error}", file=sys.stderr)
         return 2
-    return int(any(finding.graded in _FAILS for finding in report.findings))
+    return int(any(finding.graded in _FAILS for finding in report.judged[0]))
 
 
 def explained(id: str) -> str:
@@ -132,13 +133,14 @@ class Report:
 
         meters = self.facts.styled("massflow/mesh")
         outlets = [fix.id for fix in meters if "delete_atom" in fix.words]
-        balance = balance_of(log.read_text(encoding="utf-8", errors="replace"), outlets)
+        text = log.read_text(encoding="utf-8", errors="replace")
+        balance = balance_of(text, outlets)
         unknown = "" if balance and balance.counted else removal(self.facts)
         if self.facts.styled("multisphere", "particletemplate/multisphere"):
             unknown = "particles are clumps"
         if balance:
             self.known |= {"inserted or there": balance.expected, "at the end": balance.last}
-        self.add(log_findings(log, outlets, unknown), ["DK203", "DK208"])
+        self.add(log_findings(log, text, balance, outlets, unknown), ["DK203", "DK208"])
 
     def add_dumps(self, dump: Sequence[str], contacts: Sequence[str]) -> None:
         """Apply the rules on the dumps."""
@@ -202,14 +204,14 @@ class Report:
             self.skipped.append(NotApplied("DK207", "no compute pair/gran/local with id and force"))
         return [], []
 
-    @property
-    def findings(self) -> list[Finding]:
-        """Findings that no comment accepts."""
-        return without_accepted(self.every, self.script, self.applied)[0]
+    @cached_property
+    def judged(self) -> tuple[list[Finding], list[str]]:
+        """Of all rules: findings that no comment accepts, and notes on unused comments."""
+        return without_accepted(self.every, self.script, self.applied)
 
     def as_text(self) -> str:
         """A line for each finding with its remedy, and what was not checked."""
-        findings, unused = without_accepted(self.every, self.script, self.applied)
+        findings, unused = self.judged
         lines = [f"{finding}\n    {rules()[finding.rule].remedy}" for finding in findings]
         lines += [f"{note} (unused comment)" for note in unused]
         if self.known:
@@ -228,7 +230,7 @@ class Report:
 
     def as_json(self) -> str:
         """The same for programs."""
-        findings, unused = without_accepted(self.every, self.script, self.applied)
+        findings, unused = self.judged
         rows = [
             {"rule": f.rule, "severity": f.graded, "file": f.file, "line": f.line,
              "message": f.message, "remedy": rules()[f.rule].remedy, "values": dict(f.values)}

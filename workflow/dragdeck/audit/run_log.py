@@ -25,19 +25,22 @@ class Balance:
 
 
 def log_findings(
-    file: Path, outlets: Sequence[str], unknown: str
+    file: Path, text: str, balance: Balance | None, outlets: Sequence[str], unknown: str
 ) -> Iterator[Finding | NotApplied]:
     """What DK203 and DK208 say of a log.
 
     Parameters
     ----------
     file : Path
+    text : str
+        Its content.
+    balance : Balance or None
+        Of `balance_of`.
     outlets : sequence of str
         Ids of ``massflow/mesh``, which counts particles.
     unknown : str
         Why the balance cannot be told; empty if it can.
     """
-    text = file.read_text(encoding="utf-8", errors="replace")
     for error in engine_errors(text):
         yield Finding("DK208", f"LIGGGHTS ended with {error}", str(file), severity="error")
     for part, meaning in _WARNINGS.items():
@@ -49,8 +52,7 @@ def log_findings(
     if builds:
         message = f"{builds} neighbour lists were rebuilt too late (dangerous builds)"
         yield Finding("DK208", message, str(file), values={"builds": builds})
-    balance = None if unknown else balance_of(text, outlets)
-    if balance is None:
+    if unknown or balance is None:
         yield NotApplied("DK203", unknown or f"no thermo column Atoms in {file.name}")
     elif (missing := balance.expected - balance.counted - balance.last) > 0:
         counted = f", {balance.counted} counted at outlets" if outlets else ""

@@ -57,8 +57,7 @@ def check_run(
         That were asked for.
     """
     screens = [_text(folder / f"screen.{part.part}.txt") for part in parts]
-    fled = _through_the_top(folder, outputs, parts, screens[-1])
-    checks = [_ended(screens[-1], exit_status), _no_errors(screens[-1], fled)]
+    checks = [_ended(screens[-1], exit_status), _no_errors(folder, outputs, parts, screens[-1])]
     checks += [_packing(folder / mark, inputs.media.n_spheres, ranks) for mark in inputs.marks]
     if inputs.settled is not None:
         checks.append(_at_rest(screens[-1]))
@@ -113,11 +112,15 @@ def _ended(screen: str, exit_status: int) -> AcceptanceCheck:
     return _check("ended", "LIGGGHTS ended normally", passed, seen, "exit status 0, end reached")
 
 
-def _no_errors(screen: str, fled: str) -> AcceptanceCheck:
+def _no_errors(
+    folder: Path, outputs: Mapping[str, OutputOfRun], parts: Sequence[RunPart], screen: str
+) -> AcceptanceCheck:
     errors = log.engine_errors(screen)
     seen = "; ".join(errors) or "none"
-    seen += fled if "Lost atoms" in seen else ""
-    reason: CheckReason = "lost_particles" if "Lost atoms" in seen else "other"
+    reason: CheckReason = "other"
+    if "Lost atoms" in seen:
+        seen += _through_the_top(folder, outputs, parts, screen)
+        reason = "lost_particles"
     return _check("no_engine_error", "no LIGGGHTS error", not errors, seen, "none", reason)
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from dragdeck.arrays import Floats, Ints
 from dragdeck.errors import InputError
+from dragdeck.physics.rounding import is_prime
 from dragdeck.physics.walls import Container
 
 _SPACING = 1.2
@@ -158,7 +159,7 @@ def primes(seed: int, count: int) -> list[int]:
     candidate = int(np.random.default_rng(seed).integers(10_000, 10_000_000))
     while len(numbers) < count:
         candidate += 1
-        if all(candidate % divisor for divisor in range(2, math.isqrt(candidate) + 1)):
+        if is_prime(candidate):
             numbers.append(candidate)
     return numbers
 

@@ -1,4 +1,4 @@
-"""Rounded numbers, so that input scripts stay readable."""
+"""Rounded numbers, so that input scripts stay readable, and primes, as their seeds must be."""
 
 import math
 
@@ -21,3 +21,8 @@ def timestep(rayleigh_s: float, fraction: float) -> float:
     exact = rayleigh_s * fraction
     unit = 10.0 ** (math.floor(math.log10(exact)) - 3)
     return round_to(math.floor(exact / unit * (1 + 1e-12)) * unit, 4)
+
+
+def is_prime(number: int) -> bool:
+    """Whether a number above 1 has no divisor."""
+    return all(number % divisor for divisor in range(2, math.isqrt(number) + 1))

@@ -24,6 +24,15 @@ def softness(stiffness_number: float) -> float:
     return math.sqrt(math.sqrt(1000.0 / stiffness_number))
 
 
+def softening(stiffness_number: float, youngs_modulus_scale: float) -> float:
+    """By how much `softness` rises if every Young's modulus is multiplied by a factor.
+
+    The stiffness number is that at the physical modulus, and proportional to its power 2/3.
+    """
+    soft = stiffness_number * youngs_modulus_scale ** (2 / 3)
+    return softness(soft) - softness(stiffness_number)
+
+
 def _infinite(number: object) -> object:
     return math.inf if number is None else number
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
+from dragdeck.physics.rounding import is_prime
 from dragdeck.script.commands import EngineCommand
 from dragdeck.script.flow import Script
 
@@ -253,7 +254,7 @@ _ELSEWHERE = {
 
 
 def _accepted(seed: int) -> bool:
-    return seed > 10_000 and all(seed % n for n in range(2, math.isqrt(seed) + 1))
+    return seed > 10_000 and is_prime(seed)
 
 
 def _law(wall: Fix | None, words: Sequence[str], command: EngineCommand) -> Law:

@@ -1,5 +1,6 @@
 """An input script followed command by command, as far as that can be done without running it."""
 
+import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -96,7 +97,7 @@ def read_script(
     return script
 
 
-def text_of(file: Path) -> str:
+def script_text(file: Path) -> str:
     """The content of an input script.
 
     Raises
@@ -140,7 +141,7 @@ class _Reader:
         self.count = self.depth = 0
         self.left_out: dict[str, None] = {}
         self.name = str(file)
-        script.texts[self.name] = text_of(file) if text is None else text
+        script.texts[self.name] = script_text(file) if text is None else text
 
     def follow(self) -> None:
         self._enter(self.name)
@@ -175,7 +176,7 @@ class _Reader:
         if "$" in name or len(self.stack) > 10:
             self._note(command, f"{command.words[0]} {name}")
         elif (file := self.folder / name).is_file():
-            self.script.texts.setdefault(str(file), text_of(file))
+            self.script.texts.setdefault(str(file), script_text(file))
             return True
         else:
             self.script.absent.append((command, name))
@@ -337,7 +338,7 @@ class _Reader:
     def _word(self, word: str) -> float | None:
         """The value of a word in a formula."""
         if word == "PI":
-            return 3.141592653589793
+            return math.pi
         if word in ("dt", "step"):
             return self.timestep if word == "dt" else self.step
         variable = self.variables.get(word[2:]) if word.startswith("v_") else None

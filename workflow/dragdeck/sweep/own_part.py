@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import dataclass
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -213,12 +214,13 @@ def _facets(part: Path, unit: str | None, axis: str, scene: _Scene) -> tuple[flo
             check(mesh, file=part, surroundings=around)
             if len(mesh.faces) <= 2 * _MOST_FACETS:
                 return None, f"{size:g}  # would mesh the surface anew"
-    many = len(read(part, unit, size).faces) / _MOST_FACETS
+    meshed = cache(partial(read, part, unit))  # making one takes seconds
+    many = len(meshed(size).faces) / _MOST_FACETS
     if many > 1:  # not all facets scale alike
         size *= 1.1 * math.sqrt(many)
     for tried in (size / 1.5**number for number in range(_TRIES)):
         tried = rounded(tried, up=False)
-        mesh = upright(read(part, unit, tried), axis)
+        mesh = upright(meshed(tried), axis)
         problems = findings(mesh, surroundings=around)
         mended = not any("facet_size_m" in problem.remedy for problem in problems)
         if mended and all(problem.severity == "warning" for problem in problems):
