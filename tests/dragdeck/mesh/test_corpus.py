@@ -1,8 +1,9 @@
 """A box in files as programs write them, and as they should not: read rightly, or refused."""
 
 import gzip
+import locale
 import struct
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import product
 from pathlib import Path
 
@@ -144,6 +145,15 @@ def test_a_box_in_any_dress_is_the_box(name: str, tmp_path: Path) -> None:
     assert not [finding for finding in findings(mesh) if finding.severity == "error"]
 
 
+@pytest.fixture
+def same_locale() -> Iterator[None]:
+    """Afterwards: VTK leaves the process with the locale C when it writes or reads a .vtk file."""
+    before = locale.setlocale(locale.LC_ALL)
+    yield
+    locale.setlocale(locale.LC_ALL, before)
+
+
+@pytest.mark.usefixtures("same_locale")
 @pytest.mark.parametrize(
     ("writer", "suffix"),
     [

@@ -42,6 +42,10 @@ _SOFT_STIFFNESS = 1000.0
 _SOFTEST_START = 0.3
 """Modulus scale from which on a softer start saves nothing."""
 
+_FILLING_FRACTION = 0.5
+"""Time step of a filling over the Rayleigh time, where it is stable: the bed and its drag are those
+of smaller steps (docs/evidence/simplifications.md)."""
+
 _STABILITY_NUMBER, _FAST = 0.72, 0.1
 """Stability number that steps at the physical modulus are forecast to have, and inertial number
 above which they are no larger than those of the plain run: there, impacts decide, and a sliding
@@ -127,7 +131,12 @@ def _remedies(case: Case) -> Iterator[Mapping[str, float]]:
 
 def _with(case: Case, **settings: float | str | SoftStart) -> Case:
     """The case with these settings of a process."""
-    chosen = {"skin_m": widest_skin(case.study), "ranks": "auto", **settings}
+    chosen = {
+        "skin_m": widest_skin(case.study),
+        "ranks": "auto",
+        "filling_timestep_fraction": _FILLING_FRACTION,
+        **settings,
+    }
     fidelity = Fidelity.model_validate(chosen)
     return replace(case, study=case.study.model_copy(update={"fidelity": fidelity}))
 
