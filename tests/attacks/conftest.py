@@ -8,9 +8,16 @@ import pytest
 from attack.disk import Disk, small_disk
 from attack.ground import SEED, Undisturbed, undisturbed
 
+FOLDER = Path(__file__).parent
+
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Keep a sample of each test's attacks, unless all are wanted or one is named."""
+    """Keep a sample of each test's attacks, unless all are wanted or one is named.
+
+    Only the first file is run at the start: another process would wait for the study.
+    """
+    of_attacks = [item for item in items if item.path.parent == FOLDER]
+    items.sort(key=lambda item: item in of_attacks and item.path != of_attacks[0].path)
     tests: dict[object, list[pytest.Item]] = {}
     for item in items:
         if item.get_closest_marker("attack"):

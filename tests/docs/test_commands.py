@@ -22,7 +22,7 @@ WAYPOINTS = "time_s,x_m,y_m\n0,0.02,0\n2,0,0.02\n5,-0.02,0\n"
 """A recorded path that examples name."""
 
 SPEEDS = {"speed_m_s": 0.02, "plunge_speed_m_s": 0.2, "approach_speed_m_s": 0.2}
-SHORT = {"motion.path.revolutions": 0.2, **{f"motion.{name}": v for name, v in SPEEDS.items()}}
+SHORT = {"motion.path.revolutions": 0.16, **{f"motion.{name}": v for name, v in SPEEDS.items()}}
 """Fields of the study without `--long`."""
 
 pytestmark = [pytest.mark.engine, pytest.mark.slow]
@@ -55,7 +55,7 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def clone(project: Path, pytestconfig: pytest.Config) -> Path:
-    """The project with the results of its first study; from then on it has preloaded programs.
+    """The project, with preloaded programs, and the results of its first study.
 
     Without `--long` the study has a shorter path and a faster workpiece.
     """
@@ -63,11 +63,11 @@ def clone(project: Path, pytestconfig: pytest.Config) -> Path:
         study = project / "studies" / STUDY / "study.yaml"
         put(plain := read_yaml(study), SHORT)
         study.write_text(yaml.safe_dump(plain))
-    runs(f"./run all --cores 1 --config study={STUDY}", project)
     for program in programs()[0].glob("[ds]*"):
         tool = project / ".venv/bin" / program.name
         tool.unlink(missing_ok=True)
         tool.symlink_to(program)
+    runs(f"./run all --cores 1 --config study={STUDY}", project)
     return project
 
 

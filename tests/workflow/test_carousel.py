@@ -21,6 +21,7 @@ pytestmark = [pytest.mark.engine, pytest.mark.slow]
 
 COUNT = 3
 RADIUS_M = 0.012
+SPEED_M_S = 0.04
 AMPLITUDE_M, HERTZ = 0.001, 6.0
 REPORT = ("report", "--config", "study=small")
 
@@ -33,6 +34,7 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
     data["workpieces"] = {"count": COUNT}
     data["motion"] |= {
         "path": {"kind": "circle", "radius_m": RADIUS_M, "revolutions": 0.45},
+        "speed_m_s": SPEED_M_S,
         "spin": {"rpm": 100},
         "oscillation": {"amplitude_m": AMPLITUDE_M, "frequency_hz": HERTZ, "ramp_s": 0.0},
     }
@@ -60,11 +62,11 @@ def test_each_goes_where_it_should(workpieces: list[Path]) -> None:
     for number, folder in enumerate(workpieces):
         case, force = in_drag(folder)
         time = (force["step"] - drag_phase(case).start_step).to_numpy() * case.timestep_s
-        way = axis_speed(case) * time  # 0.02 m/s, rounded to whole steps
+        way = axis_speed(case) * time  # the speed, rounded to whole steps
         angle = way / RADIUS_M + 2 * np.pi * number / COUNT
         place = np.column_stack([RADIUS_M * np.cos(angle), RADIUS_M * np.sin(angle)])
         assert np.abs(force[["ref_x_m", "ref_y_m"]] - place).to_numpy().max() < 1e-9
-        height = force["ref_z_m"] - AMPLITUDE_M * np.sin(2 * np.pi * HERTZ * way / 0.02)
+        height = force["ref_z_m"] - AMPLITUDE_M * np.sin(2 * np.pi * HERTZ * way / SPEED_M_S)
         assert np.ptp(height) < 1e-9
 
 
@@ -115,7 +117,7 @@ def test_the_report_compares_wake_and_fresh_bed(workpieces: list[Path], project:
         case, force = in_drag(folder)
         assert case.workpiece is not None
         assert case.workpiece.wake_from_m == pytest.approx(around / COUNT)
-        way = 0.02 * (force["step"] - drag_phase(case).start_step) * case.timestep_s
+        way = SPEED_M_S * (force["step"] - drag_phase(case).start_step) * case.timestep_s
         late = force[(way > around / COUNT) & force["in_statistics"]]
         assert row["drag_in_wake_mean_n"] == pytest.approx(late["drag_n"].mean())
     page = (project / "results/small/report/report.html").read_text()

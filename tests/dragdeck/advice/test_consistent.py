@@ -46,7 +46,7 @@ def passes(case: Case, kind: SceneType) -> None:
 def test_advised_settings_of_random_scenes_pass_every_check() -> None:
     kinds = set()
 
-    @settings(max_examples=150)
+    @settings(max_examples=60)
     @given(random_scenes())
     def every_run_passes(data: dict[str, Any]) -> None:
         case = settle_case(FILE, data, {}, resolve=resolve)
