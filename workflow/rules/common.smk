@@ -6,6 +6,7 @@ from pathlib import Path
 from shlex import join, quote
 
 import yaml
+from snakemake.scheduling.job_scheduler import JobScheduler
 
 from dragdeck.cases.ranks import CORES_VARIABLE, cores_here
 from dragdeck.engine.reports import say, shown_bytes
@@ -31,6 +32,7 @@ from dragdeck.rules import (
 from dragdeck.scenes.process import SCENES
 from dragdeck.shipped import own_or_shipped
 from dragdeck.snakemake_lock import hold_lock
+from dragdeck.snakemake_timers import look_again_once
 from dragdeck.source_hash import source_hash
 from dragdeck.study.check import warnings
 from dragdeck.study.yaml import read_yaml
@@ -43,6 +45,7 @@ def locking_call():
 
 
 hold_lock(Path(".snakemake"), say, locking_call())
+look_again_once(JobScheduler)
 PROJECT = or_stop(project_here)
 CONFIG_FILE = own_or_shipped(PROJECT.root, "config/config.yaml")
 or_stop(read_yaml, CONFIG_FILE)
