@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from dragchain.cli import OUT_DIR, RUN_DIRS
+from dragchain.cli import MADE_BY, OUT_DIR, RUN_DIRS
 from dragdeck.cli import FIDELITY, STUDY
 from dragdeck.command_line import Argument, Command, Program
 
@@ -41,9 +41,7 @@ COMMANDS = (
     Command("validate", "compare the runs of a study with the publication it reproduces",
             "Compare the runs of a study with the publication it reproduces; write the report.",
             "validation.report:write_validation", (
-        OUT_DIR, RUN_DIRS,
-        Argument("--command", required=True, metavar="TEXT",
-                 help="command that made the runs, to be recorded with the results; required"))),
+        OUT_DIR, RUN_DIRS, MADE_BY)),
     Command("draw-scenes", "write studies of scenes drawn from a seed",
             "Write studies of small scenes drawn from a seed into the project.",
             "windows.drawn:draw_scenes", (

@@ -12,8 +12,8 @@ RUN_DIRS = Argument("run_dirs", type=Path, nargs="+", metavar="RUN_DIR",
                      help="folders of the runs: results/STUDY/process/RUN")  # fmt: skip
 OUT_DIR = Argument("--out", type=Path, required=True, metavar="DIR", dest="out_dir",
                     help="folder for the results; required")  # fmt: skip
-MADE_BY = Argument("--command", metavar="TEXT",
-                    help="command that made the runs, to be recorded with the results")  # fmt: skip
+MADE_BY = Argument("--command", required=True, metavar="TEXT",
+                    help="command that made the runs, to be recorded; required")  # fmt: skip
 PACKINGS = Argument("--packings", type=int, default=1, metavar="N",
                     help="packings of the case, whose mean is to be inside the tolerance "
                     "(default: 1)")  # fmt: skip
@@ -169,18 +169,10 @@ STEPS = (
             "search.report:write_round", (
         STUDY,)),
     Command("scaling", "fit a power law to the mean drag",
-            "Fit a power law of the mean drag as a function of one field of the study. It reads "
-            "the tables of the runs and writes scaling.json, .csv and .png to the folder.",
+            "Fit the power law of the mean drag that the block scaling of the study asks for. It "
+            "reads the tables of the runs and writes scaling.json, .csv and .png to the folder.",
             "scaling.fit:write_scaling", (
-        OUT_DIR, RUN_DIRS, MADE_BY,
-        Argument("--field", required=True, metavar="FIELD",
-                  help="dotted name of the field, for example motion.immersion_depth_m; required"),
-        Argument("--expected", type=float, metavar="N",
-                  help="expected exponent, with which the fitted one is compared"),
-        Argument("--source", metavar="TEXT", help="source of the expected exponent"),
-        Argument("--fit-range", type=float, nargs=2, metavar=("LOW", "HIGH"),
-                  help="lowest and highest level at which the exponent is expected (default: all "
-                  "levels)"))),
+        STUDY, OUT_DIR, RUN_DIRS, MADE_BY)),
     Command("crate", "pack a study as an RO-Crate",
             "Pack the inputs, runs and report of a study as an RO-Crate, with a checksum for each "
             "file. It reads the given folders and writes the crate to the folder.",

@@ -11,7 +11,8 @@ from paths import ROOT
 from snakemake.cli import parse_config
 from snakemake_interface_common.exceptions import WorkflowError
 
-from dragdeck.project import Project
+from dragdeck.errors import InputError
+from dragdeck.project import Project, scaling_of
 from dragdeck.rules import Workflow, checked_settings, of_whole_run
 
 SCHEMA = yaml.safe_load((ROOT / "workflow/schemas/config.schema.yaml").read_text())["properties"]
@@ -47,15 +48,16 @@ def test_what_cannot_be_used_stops_the_workflow() -> None:
         work("uhlman2015")
     with pytest.raises(WorkflowError, match="no such plan"):
         work("quickstart", plan="defult")
-    with pytest.raises(WorkflowError, match="scaling: a required key is missing"):
-        work("quickstart").scaling_options()
     with pytest.raises(WorkflowError, match="no measured drop test"):
         work("quickstart").drop_record()
 
 
-def test_options_say_what_the_study_asks_for() -> None:
-    options = work("drag-speed").scaling_options()
-    assert options.startswith("--field motion.speed_m_s --expected ")
+def test_a_study_without_a_scaling_is_refused() -> None:
+    with pytest.raises(InputError, match="scaling: a required key is missing"):
+        scaling_of(Project(ROOT).cases("quickstart")[0])
+
+
+def test_options_say_what_the_call_asks_for() -> None:
     assert work("quickstart", fidelity="draft").fidelity_option == "--fidelity draft"
     assert work("quickstart").fidelity_option == ""
 

@@ -18,6 +18,7 @@ from dragdeck.scenes.workpiece import workpiece_length
 from dragdeck.shipped import SHIPPED, own_or_shipped
 from dragdeck.study.base import NAME, NAME_LIMIT
 from dragdeck.study.check import validate
+from dragdeck.study.model import Scaling
 from dragdeck.study.search import RECORD as SEARCHED
 from dragdeck.study.workpiece import MeshShape
 from dragdeck.study.yaml import located, read_study, study_folders
@@ -204,6 +205,24 @@ def check_buildable(case: Case) -> None:
     _check_timesteps(case)
     for scene in SCENES.values():
         scene.build(case, None)
+
+
+def scaling_of(case: Case) -> Scaling:
+    """The power law that a study asks for.
+
+    Raises
+    ------
+    InputError
+        It asks for none.
+    """
+    if case.study.scaling is None:
+        raise InputError(
+            "a required key is missing",
+            file=case.file,
+            field="scaling",
+            remedy="name the field to fit a power law over, see docs/howto/sweep.md",
+        )
+    return case.study.scaling
 
 
 def find_project(start: Path) -> Project:

@@ -468,28 +468,6 @@ class Workflow:
         licence = self.cases[0].study.licence
         return quote(f"--licence={licence}") if licence else ""
 
-    def scaling_options(self, _: object = None) -> str:
-        """What the study's block scaling asks for, as options of the command line."""
-        case = self.cases[0]
-        scaling = case.study.scaling
-        if scaling is None:
-            _stop(
-                InputError(
-                    "a required key is missing",
-                    file=self.relative(case.file),
-                    field="scaling",
-                    remedy="name the field to fit a power law over, see docs/howto/sweep.md",
-                )
-            )
-        given: dict[str, Sequence[object]] = {
-            "--field": [scaling.field],
-            "--expected": [scaling.expected_exponent],
-            "--source": [scaling.source],
-            "--fit-range": scaling.fit_range or [None],
-        }
-        options = [[name, *values] for name, values in given.items() if values[0] is not None]
-        return " ".join(quote(str(word)) for option in options for word in option)
-
     # --- windows ---------------------------------------------------------------------------
 
     def windows_of_run(self, wildcards: Wildcards) -> list[Case]:

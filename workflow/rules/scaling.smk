@@ -11,9 +11,10 @@ rule write_scaling:
         prints=1,
     params:
         runs=WORK.every_folder("process"),
-        options=WORK.scaling_options,
+        study=STUDY,
+        asked=lambda wildcards: or_stop(scaling_of, CASES[0]).model_dump_json(),
         command=f"./run scaling --config study={STUDY}",
         source=source_hash("dragchain.scaling.fit"),
     shell:
-        "dragchain step scaling --out $(dirname {output.figure}) {params.options}"
+        "dragchain step scaling {params.study} --out $(dirname {output.figure})"
         " --command {params.command:q} -- {params.runs} 2>&1 | tee -i {log}"

@@ -22,8 +22,10 @@ from dragchain.scaling.document import Expectation, FittedLaw, Level, ScaledRun,
 from dragchain.statistics.bed_effects import EffectsFit, fit_effects
 from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate, EstimateColumns
 from dragdeck.files import write_bytes, write_text
+from dragdeck.project import find_project, scaling_of
 from dragdeck.records.case import CaseOfRun, load_case
 from dragdeck.records.run import RunRecord
+from dragdeck.study.model import Scaling
 from dragdeck.study.paths.circle import CirclePath
 
 _STORED = Path(__file__).parent / "data"
@@ -42,38 +44,9 @@ _LEAST_LEVELS = 3
 
 # --- the runs --------------------------------------------------------------------------------
 
-_UNLIKE = frozenset({"seed"})
-"""Inputs that runs of one scaling may differ in, beside its field."""
 
-
-@dataclass(frozen=True)
-class RunOfScaling:
-    """One run of a scaling: its row in ``scaling.json``, and its case."""
-
-    row: ScaledRun
-    case: CaseOfRun
-
-    @property
-    def gap_particles(self) -> float | None:
-        """Gap between workpiece and bowl wall in mean particle diameters; None off a circle."""
-        path = motion_of(self.case).motion.path
-        if not isinstance(path, CirclePath):
-            return None
-        bowl, workpiece = needed(self.case.bowl, "bowl"), needed(self.case.workpiece, "workpiece")
-        side = float(bowl.side_distance(np.array([path.start_point]))[0])
-        gap = side - workpiece.radius_m
-        return gap / (2.0 * self.case.media.radius_mean_m)
-
-    @property
-    def floor_particles(self) -> float:
-        """Gap between tip and floor in mean particle diameters."""
-        depth = needed(self.case.workpiece, "workpiece").immersion_depth_m
-        gap = needed(self.case.surface_m, "surface_m") - depth
-        return gap / (2.0 * self.case.media.radius_mean_m)
-
-
-def read_scaled_runs(run_dirs: Sequence[Path], field: str) -> list[RunOfScaling]:
-    """Read the runs of a scaling from their tables, ordered by level and bed.
+def read_scaled_runs(run_dirs: Sequence[Path], field: str) -> list[tuple[ScaledRun, CaseOfRun]]:
+    """Read the runs of a scaling with their cases, ordered by level and bed.
 
     Raises
     ------
@@ -81,14 +54,13 @@ def read_scaled_runs(run_dirs: Sequence[Path], field: str) -> list[RunOfScaling]
         If a run has no such field or no number there, the mean drag does not
         point against the motion, or runs differ in more than the field and the seed.
     """
-    each = {run.row.run: run for run in (_read_run(folder, field) for folder in run_dirs)}
-    runs = list(each.values())  # a run that is given again counts once
-    _check_alike([run.case for run in runs], field)
-    return sorted(runs, key=lambda run: (run.row.level, run.row.bed))
+    cases = {case.run: (folder, case) for folder in run_dirs for case in [load_case(folder)]}
+    _check_alike([case for _, case in cases.values()], field)
+    runs = [(_scaled_run(folder, case, field), case) for folder, case in cases.values()]
+    return sorted(runs, key=lambda run: (run[0].level, run[0].bed))
 
 
-def _read_run(folder: Path, field: str) -> RunOfScaling:
-    case = load_case(folder)
+def _scaled_run(folder: Path, case: CaseOfRun, field: str) -> ScaledRun:
     study = study_of(case)
     level = study.inputs().get(field)
     if isinstance(level, bool) or not isinstance(level, int | float) or level <= 0:
@@ -98,7 +70,7 @@ def _read_run(folder: Path, field: str) -> RunOfScaling:
         raise TableError(f"{folder}: the mean drag is {drag.value:+.3g} N, along the motion")
     workpiece = needed(case.workpiece, "workpiece")
     weight = case.media.weight_kg_m3 * case.gravity_m_s2 * 2.0 * workpiece.radius_m
-    row = ScaledRun(
+    return ScaledRun(
         run=case.run,
         seed=study.seed,
         level=float(level),
@@ -108,20 +80,19 @@ def _read_run(folder: Path, field: str) -> RunOfScaling:
         eta=-drag.value / (weight * workpiece.immersion_depth_m**2),
         bed=case.upstream.get("filling", case.run),
     )
-    return RunOfScaling(row, case)
 
 
 def _check_alike(cases: Sequence[CaseOfRun], field: str) -> None:
+    """Refuse runs that differ in more than the field and the seed."""
     first, *others = (
         {**study_of(case).inputs(), "fidelity": case.fidelity.model_dump()} for case in cases
     )
-    for case, case_inputs in zip(cases[1:], others, strict=True):
-        changed = changed_inputs(case_inputs, first)
-        name = next((name for name in changed if name not in (field, *_UNLIKE)), None)
-        if name is not None:
+    for case, inputs in zip(cases[1:], others, strict=True):
+        changed = [name for name in changed_inputs(inputs, first) if name not in (field, "seed")]
+        if changed:
             raise TableError(
-                f"{case.run}: {name} is {case_inputs.get(name)!r}, in {cases[0].run} it is "
-                f"{first.get(name)!r}; the runs of a scaling differ in {field} and seed only"
+                f"{case.run}: {changed[0]} is {inputs.get(changed[0])!r}, in {cases[0].run} it is "
+                f"{first.get(changed[0])!r}; the runs of a scaling differ in {field} and seed only"
             )
 
 
@@ -177,18 +148,15 @@ def fit_power_law(rows: Sequence[ScaledRun]) -> PowerLaw:
     return PowerLaw(levels, fit_effects(design, drag, [row.bed for row in rows]))
 
 
-def find(
-    run_dirs: Sequence[Path], field: str, expected: Expectation, commands: Sequence[str] = ()
-) -> ScalingFile:
+def find(run_dirs: Sequence[Path], asked: Scaling, commands: Sequence[str] = ()) -> ScalingFile:
     """The power law of a field from runs.
 
     Parameters
     ----------
     run_dirs : sequence of Path
         Folders of runs, with their tables made.
-    field : str
-        Dotted name.
-    expected : Expectation
+    asked : Scaling
+        The field, and what is expected of it.
     commands : sequence of str
         What made the runs, for the record.
 
@@ -197,31 +165,28 @@ def find(
     TableError, SeriesError
         If the runs do not make a scaling.
     """
-    runs = read_scaled_runs(run_dirs, field)
-    low, high = expected.within or (0.0, math.inf)
-    fitted = [run.row for run in runs if low <= run.row.level <= high]
-    law = fit_power_law(fitted)
-    first = runs[0].case
+    runs = read_scaled_runs(run_dirs, asked.field)
+    low, high = asked.fit_range or (0.0, math.inf)
+    fitted = [row for row, _ in runs if low <= row.level <= high]
+    law, expected, first = fit_power_law(fitted), asked.expected_exponent, runs[0][1]
     files = [folder / "run.json" for folder in run_dirs]
     records = [RunRecord.read(file) for file in files if file.is_file()]
-    levels = dict.fromkeys(run.row.level for run in runs)
+    levels = dict[float, list[tuple[ScaledRun, CaseOfRun]]]()
+    for row, case in runs:
+        levels.setdefault(row.level, []).append((row, case))
     return ScalingFile(
         study=first.study_name,
-        field=field,
-        expected=expected,
-        verdict=(
-            "no expectation"
-            if expected.exponent is None
-            else law.exponent.agrees_with(expected.exponent)
-        ),
+        field=asked.field,
+        expected=Expectation(exponent=expected, source=asked.source, within=asked.fit_range),
+        verdict="no expectation" if expected is None else law.exponent.agrees_with(expected),
         fit=FittedLaw(
             exponent=law.exponent,
             change_per_decade=law.exponent.exp(factor=math.log(10.0), minus=1.0),
             runs=len(fitted),
         ),
         eta=_mean_eta(fitted),
-        levels=tuple(_level(law, x, [run for run in runs if run.row.level == x]) for x in levels),
-        runs=tuple(run.row for run in runs),
+        levels=tuple(_level(law, level, of_level) for level, of_level in levels.items()),
+        runs=tuple(row for row, _ in runs),
         scene={
             **{name: float(first.numbers[name]) for name in SCENE if name in first.numbers},
             "particle_diameter_m": 2.0 * first.media.radius_mean_m,
@@ -242,42 +207,51 @@ def _mean_eta(rows: Sequence[ScaledRun]) -> Estimate:
     return fit.estimate([1.0]).exp()
 
 
-def _level(law: PowerLaw, x: float, runs: Sequence[RunOfScaling]) -> Level:
-    case = runs[0].case
+def _level(law: PowerLaw, level: float, runs: Sequence[tuple[ScaledRun, CaseOfRun]]) -> Level:
+    rows, cases = [row for row, _ in runs], [case for _, case in runs]
     return Level(
-        x=x,
-        runs=len(runs),
-        eta=_geometric_mean([run.row.eta for run in runs]),
-        inertial_number=case.numbers.get("inertial_number"),
-        gap_particles=runs[0].gap_particles,
-        floor_particles=float(np.mean([run.floor_particles for run in runs])),
-        drag_n=_geometric_mean([run.row.drag_n for run in runs]),
-        fitted_n=law.at(x).value,
+        x=level,
+        runs=len(rows),
+        eta=_geometric_mean([row.eta for row in rows]),
+        inertial_number=cases[0].numbers.get("inertial_number"),
+        gap_particles=gap_particles(cases[0]),
+        floor_particles=float(np.mean([floor_particles(case) for case in cases])),
+        drag_n=_geometric_mean([row.drag_n for row in rows]),
+        fitted_n=law.at(level).value,
     )
+
+
+def gap_particles(case: CaseOfRun) -> float | None:
+    """Gap between workpiece and bowl wall in mean particle diameters; None off a circle."""
+    path = motion_of(case).motion.path
+    if not isinstance(path, CirclePath):
+        return None
+    bowl, workpiece = needed(case.bowl, "bowl"), needed(case.workpiece, "workpiece")
+    gap = float(bowl.side_distance(np.array([path.start_point]))[0]) - workpiece.radius_m
+    return gap / (2.0 * case.media.radius_mean_m)
+
+
+def floor_particles(case: CaseOfRun) -> float:
+    """Gap between tip and floor in mean particle diameters."""
+    depth = needed(case.workpiece, "workpiece").immersion_depth_m
+    return (needed(case.surface_m, "surface_m") - depth) / (2.0 * case.media.radius_mean_m)
 
 
 def _geometric_mean(values: Sequence[float]) -> float:
     return float(np.exp(np.mean(np.log(values))))
 
 
-def write_scaling(
-    out_dir: Path,
-    run_dirs: Sequence[Path],
-    field: str,
-    expected: float | None = None,
-    source: str | None = None,
-    fit_range: Sequence[float] | None = None,
-    command: str | None = None,
-) -> str:
+def write_scaling(study: str, out_dir: Path, run_dirs: Sequence[Path], command: str) -> str:
     """Write ``scaling.json``, ``scaling.csv`` (one row per level) and ``scaling.png``.
 
     Parameters
     ----------
-    out_dir, run_dirs, field
-        As of `find`.
-    expected, source, fit_range
-        See `Expectation`.
-    command : str, optional
+    study : str
+        Its name.
+    out_dir : Path
+    run_dirs : sequence of Path
+        Folders of its runs, with their tables made.
+    command : str
         What made the runs, for the record.
 
     Returns
@@ -287,12 +261,12 @@ def write_scaling(
 
     Raises
     ------
+    InputError
+        The study asks for no scaling.
     TableError, SeriesError
         If the runs do not make a scaling.
     """
-    within = (fit_range[0], fit_range[1]) if fit_range else None
-    asked = Expectation(exponent=expected, source=source, within=within)
-    scaling = find(run_dirs, field, asked, [command] if command else [])
+    scaling = find(run_dirs, scaling_of(find_project(Path.cwd()).cases(study)[0]), [command])
     with drawing():
         picture = png(draw_scalings([scaling]))
     scaling.write(out_dir / "scaling.json")
@@ -371,8 +345,9 @@ def _law(axes: Axes, scaling: ScalingFile, factor: float) -> None:
     level = np.geomspace(law.levels[0], law.levels[-1], _CURVE_POINTS)
     drag = EstimateColumns.of([law.at(float(x)) for x in level])
     x = factor * level
-    low, high = drag.ci95_low, drag.ci95_high
-    axes.fill_between(x, low, high, color=BLUE, alpha=0.15, lw=0, label="95 % confidence band")
+    axes.fill_between(
+        x, drag.ci95_low, drag.ci95_high, color=BLUE, alpha=0.15, lw=0, label="95 % confidence band"
+    )
     axes.plot(x, drag.value, color=BLUE, lw=1.8, label="fitted power law")
     if scaling.expected.exponent is not None:
         slope = (x / (factor * law.centre)) ** scaling.expected.exponent

@@ -14,17 +14,19 @@ from tiny_run_files import DENSITY_KG_M3, GRAVITY_M_S2, RADIUS_M, WORKPIECE_RADI
 
 from dragchain.cli import main
 from dragchain.errors import SeriesError, TableError
-from dragchain.scaling.document import Expectation, ScaledRun, ScalingFile
+from dragchain.scaling.document import ScaledRun, ScalingFile
 from dragchain.scaling.fit import (
     draw_scalings,
     find,
     fit_power_law,
+    floor_particles,
+    gap_particles,
     read_scaled_runs,
     read_scalings,
     table,
-    write_scaling,
 )
 from dragchain.statistics.correlated import estimate_mean
+from dragdeck.study.model import Scaling
 
 DEPTH = "motion.immersion_depth_m"
 LEVELS = (0.01, 0.02, 0.04)
@@ -67,22 +69,24 @@ def quadratic(write_run: Writer) -> list[Path]:
 
 
 def test_a_quadratic_drag_confirms_two_and_contradicts_one(quadratic: list[Path]) -> None:
-    found = find(quadratic, DEPTH, Expectation(exponent=2.0, source="somebody 1999"))
+    found = find(quadratic, Scaling(field=DEPTH, expected_exponent=2.0, source="somebody 1999"))
     assert found.verdict == "confirmed"
     assert found.fit.exponent.value == pytest.approx(2.0, abs=0.01)
-    assert find(quadratic, DEPTH, Expectation(exponent=1.0)).verdict == "contradicted"
-    assert find(quadratic, DEPTH, Expectation()).verdict == "no expectation"
+    assert find(quadratic, Scaling(field=DEPTH, expected_exponent=1.0)).verdict == "contradicted"
+    assert find(quadratic, Scaling(field=DEPTH)).verdict == "no expectation"
 
 
 def test_the_size_is_compared_with_the_weight_on_the_workpiece(quadratic: list[Path]) -> None:
-    run = read_scaled_runs(quadratic, DEPTH)[0]
+    run, case = read_scaled_runs(quadratic, DEPTH)[0]
     scale = DENSITY_KG_M3 * GRAVITY_M_S2 * 2.0 * WORKPIECE_RADIUS_M
-    assert run.row.eta == pytest.approx(2000.0 * 1.03 / scale)
-    assert find(quadratic, DEPTH, Expectation(exponent=2.0)).eta.contains(2000.0 * 1.045 / scale)
-    assert run.gap_particles == pytest.approx(
+    assert run.eta == pytest.approx(2000.0 * 1.03 / scale)
+    assert find(quadratic, Scaling(field=DEPTH, expected_exponent=2.0)).eta.contains(
+        2000.0 * 1.045 / scale
+    )
+    assert gap_particles(case) == pytest.approx(
         (0.040 - 0.020 - WORKPIECE_RADIUS_M) / (2.0 * RADIUS_M)
     )
-    assert run.floor_particles == pytest.approx((0.050 - 0.01) / (2.0 * RADIUS_M))
+    assert floor_particles(case) == pytest.approx((0.050 - 0.01) / (2.0 * RADIUS_M))
 
 
 def test_an_expectation_for_some_levels_is_judged_there(write_run: Writer) -> None:
@@ -92,8 +96,8 @@ def test_an_expectation_for_some_levels_is_judged_there(write_run: Writer) -> No
         for speed, scatters in zip((0.005, 0.01, 0.02, 0.08), (UP, DOWN, UP, DOWN), strict=True)
         for seed, scatter in enumerate(scatters, 1)
     ]
-    assert find(folders, field, Expectation(exponent=0.0)).verdict == "contradicted"
-    slow = find(folders, field, Expectation(exponent=0.0, within=(0.005, 0.02)))
+    assert find(folders, Scaling(field=field, expected_exponent=0.0)).verdict == "contradicted"
+    slow = find(folders, Scaling(field=field, expected_exponent=0.0, fit_range=(0.005, 0.02)))
     assert slow.verdict == "confirmed"
     assert (slow.fit.runs, len(slow.levels)) == (6, 4)
     assert slow.fit.change_per_decade.value == pytest.approx(0.0, abs=0.02)
@@ -103,10 +107,11 @@ def test_the_command_writes_all_that_a_page_needs(
     quadratic: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"
-    words = ["step", "scaling", "--out", str(out), "--field", DEPTH, "--expected", "2"]
+    words = ["step", "scaling", "drag-depth", "--out", str(out), "--command", "made by"]
     assert main([*words, *map(str, quadratic)]) == 0
     assert "confirmed" in capsys.readouterr().out
     found = ScalingFile.read(out / "scaling.json")
+    assert found.commands == ("made by",) and found.expected.exponent == 2.0
     rows = pd.read_csv(out / "scaling.csv")
     assert rows[DEPTH].tolist() == list(LEVELS) and rows.runs.tolist() == [2, 2, 2]
     assert rows.drag_n.tolist() == pytest.approx(rows.fitted_n.tolist(), rel=0.01)
@@ -133,10 +138,10 @@ def test_a_field_without_a_number_is_refused(write_run: Writer, field: str) -> N
         read_scaled_runs([folder], field)
 
 
-def test_a_drag_along_the_motion_is_refused(write_run: Writer, tmp_path: Path) -> None:
+def test_a_drag_along_the_motion_is_refused(write_run: Writer) -> None:
     folder = write_run(-1.0, **{DEPTH: 0.01})
     with pytest.raises(TableError, match="along the motion"):
-        write_scaling(tmp_path / "out", [folder], DEPTH)
+        read_scaled_runs([folder], DEPTH)
 
 
 def test_the_scalings_of_the_package_are_whole() -> None:
