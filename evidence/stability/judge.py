@@ -64,8 +64,8 @@ class Seen:
         The acceptance checks that did not pass.
     refused : str, optional
         Why no deck could be written.
-    energy_ratio, overlap_ratio : float, optional
-        See `ENERGY_LIMITS` and `OVERLAP_LIMIT`.
+    energy_ratio, overlap_ratio : float
+        See `ENERGY_LIMITS` and `OVERLAP_LIMIT`; NaN if not known.
     errors : mapping of str to Estimate
         Deviations from the fine-step reference, signed; the ends of the interval are equal where
         nothing scatters.
@@ -76,8 +76,8 @@ class Seen:
     steps: int = 0
     failed: Sequence[AcceptanceCheck] = ()
     refused: str | None = None
-    energy_ratio: float | None = None
-    overlap_ratio: float | None = None
+    energy_ratio: float = math.nan
+    overlap_ratio: float = math.nan
     errors: Mapping[str, Estimate] = field(default_factory=dict)
 
     def failed_check(
@@ -89,20 +89,20 @@ class Seen:
 
 
 class Verdict(NamedTuple):
-    """Class of a point and why; the acceptance check that decided it, if one did."""
+    """Class of a point and why."""
 
     kind: str
     why: str
-    check: CheckCode | None = None
 
 
-_Reason = CheckReason | None
+STOPPED = "stopped early"
+"""Begin of the words for a run that exceeded a limit of its scene."""
 
-_CHECKS: tuple[tuple[str, CheckCode, _Reason, str], ...] = (
+_CHECKS: tuple[tuple[str, CheckCode, CheckReason | None, str], ...] = (
     (LOST, "no_engine_error", "lost_particles", "{}"),
-    (LOST, "within_limits", "particles", "stopped early: {}"),
+    (LOST, "within_limits", "particles", f"{STOPPED}: {{}}"),
     (LOST, "particles_kept", None, "{}"),
-    (ENERGY, "within_limits", None, "stopped early: {}"),
+    (ENERGY, "within_limits", None, f"{STOPPED}: {{}}"),
     (ENERGY, "finite_numbers", None, "numbers that are not finite"),
     (ENERGY, "at_rest", None, "the bed does not come to rest: {}"),
 )
@@ -124,20 +124,20 @@ def _verdicts(seen: Seen) -> Iterator[Verdict]:
         yield Verdict(REFUSED, seen.refused.replace("\n", " "))
     error = seen.failed_check("no_engine_error", "other")
     if error is not None and not seen.steps:
-        yield Verdict(REFUSED, error.seen, error.code)
+        yield Verdict(REFUSED, error.seen)
     for kind, code, reason, why in _CHECKS:
         if check := seen.failed_check(code, reason):
-            yield Verdict(kind, why.format(check.seen), code)
-    ratio, limit = seen.energy_ratio, ENERGY_LIMITS[seen.regime]
-    if ratio is not None and ratio > limit:
-        why = f"energy {ratio:.3g} times what it should be at most (limit {limit:g})"
+            yield Verdict(kind, why.format(check.seen))
+    limit = ENERGY_LIMITS[seen.regime]
+    if seen.energy_ratio > limit:
+        why = f"energy {seen.energy_ratio:.3g} times what it should be at most (limit {limit:g})"
         yield Verdict(ENERGY, why)
-    if seen.overlap_ratio is not None and seen.overlap_ratio > OVERLAP_LIMIT:
+    if seen.overlap_ratio > OVERLAP_LIMIT:
         why = f"overlap {seen.overlap_ratio:.3g} of the radius (limit {OVERLAP_LIMIT:g})"
         yield Verdict(OVERLAP, why)
     if seen.failed:
         why = "; ".join(f"{check.name}: {check.seen}" for check in seen.failed)
-        yield Verdict(INACCURATE, why, seen.failed[0].code)
+        yield Verdict(INACCURATE, why)
     for name, deviation in seen.errors.items():
         if _at_least(deviation) > TOLERANCE:
             why = f"error of the {name} {deviation.value:+.3g} (tolerance {TOLERANCE:g})"
@@ -161,46 +161,44 @@ _ERRORS = (
 )
 
 
-def judge_points(runs: Sequence[PointRun]) -> tuple[pd.DataFrame, list[Verdict]]:
-    """Measure and classify all points, condition by condition.
-
-    Returns
-    -------
-    DataFrame, list of Verdict
-        One row per point, and what decided its class.
-    """
+def judge_points(runs: Sequence[PointRun]) -> pd.DataFrame:
+    """Measure and classify all points, condition by condition: one row per point."""
     conditions: dict[str, list[PointRun]] = {}
     for run in runs:
         conditions.setdefault(run.point.condition, []).append(run)
     bases = {run.point.regime: run.point.settings for run in runs if run.point.axis == "base"}
-    judged = [
-        condition
+    return pd.DataFrame(
+        row
         for group in conditions.values()
-        for condition in _condition(group, bases.get(group[0].point.regime, {}))
-    ]
-    return pd.DataFrame([row for row, _ in judged]), [verdict for _, verdict in judged]
+        for row in _condition(group, bases.get(group[0].point.regime, {}))
+    )
 
 
-def _condition(
-    group: Sequence[PointRun], base: Settings
-) -> Iterator[tuple[dict[str, object], Verdict]]:
+def _condition(group: Sequence[PointRun], base: Settings) -> Iterator[dict[str, object]]:
     """The points of one condition; its reference comes first."""
     runs = sorted(group, key=lambda run: not run.point.reference)
-    regime, case = runs[0].point.regime, runs[0].case
-    measured = [_measured(run) for run in runs]
+    regime, case, measure = runs[0].point.regime, runs[0].case, MEASURES[runs[0].point.regime]
+    measured = [measure.row(run, ended) if (ended := run.ended) else None for run in runs]
     fine = measured[0]
     if fine and regime == "settle":
         fine = {**fine, "height_scatter": _height_scatter(runs, measured)}
     step = critical_step(fine["frequency_rad_s"]) if fine else math.inf
     critical_s = step if math.isfinite(step) and case else math.nan
-    rayleigh_s = case.rayleigh_time_s if case else math.nan
-    for run, own in zip(runs, measured, strict=True):
-        point, seen = run.point, _seen(run, own, fine)
-        verdict = classify(seen)
-        step_s = run.case.timestep_s if run.case else math.nan
-        contact_s = run.impact.contact_time_s if run.impact else math.nan
+    for run, row in zip(runs, measured, strict=True):
+        point, record = run.point, run.record
+        seen = Seen(
+            regime=regime,
+            state=record.state if record else "refused",
+            steps=record.last_step if record else 0,
+            failed=record.failed_checks if record else (),
+            refused=run.refused,
+            energy_ratio=measure.energy_ratio(row, fine) if row else math.nan,
+            overlap_ratio=row["overlap_ratio"] if row else math.nan,
+            errors=measure.errors(row, fine) if row and fine else {},
+        )
+        verdict, step_s = classify(seen), run.case.timestep_s if run.case else math.nan
         errors = {f"{name.replace(' ', '_')}_error": error for name, error in seen.errors.items()}
-        row = {
+        yield {
             "regime": regime,
             "condition": point.condition,
             "axis": point.axis,
@@ -211,29 +209,20 @@ def _condition(
             "class": verdict.kind,
             "why": verdict.why,
             "timestep_s": step_s,
-            "rayleigh_time_s": rayleigh_s,
+            "rayleigh_time_s": case.rayleigh_time_s if case else math.nan,
             "critical_step_s": critical_s,
             "fraction_of_critical": step_s / critical_s,
             "damped_fraction": damped_fraction(point.number("restitution")),
-            "steps_per_contact": contact_s / step_s,
+            "steps_per_contact": (run.impact.contact_time_s if run.impact else math.nan) / step_s,
             "steps": seen.steps,
-            "energy_ratio": math.nan if seen.energy_ratio is None else seen.energy_ratio,
-            "overlap_ratio": math.nan if seen.overlap_ratio is None else seen.overlap_ratio,
-            **_columns(_ERRORS, flattened(errors)),
-            **_columns(COLUMNS, own or {}),
-            **{f"setting_{name}": value for name, value in point.settings.items()},
+            "energy_ratio": seen.energy_ratio,
+            "overlap_ratio": seen.overlap_ratio,
+            **dict.fromkeys((*_ERRORS, *COLUMNS), math.nan),
+            **{name: part for name, part in flattened(errors).items() if name in _ERRORS},
+            **{name: part for name, part in (row or {}).items() if name in COLUMNS},
+            **{f"setting_{name}": setting for name, setting in point.settings.items()},
             "folder": point.folder,
         }
-        yield row, verdict
-
-
-def _columns(names: Sequence[str], estimates: Mapping[str, object]) -> dict[str, object]:
-    return {name: estimates.get(name, math.nan) for name in names}
-
-
-def _measured(run: PointRun) -> Row | None:
-    ended = run.ended
-    return MEASURES[run.point.regime].row(run, ended) if ended else None
 
 
 def _height_scatter(runs: Sequence[PointRun], measured: Sequence[Row | None]) -> float:
@@ -244,21 +233,6 @@ def _height_scatter(runs: Sequence[PointRun], measured: Sequence[Row | None]) ->
         if row and run.point.fraction <= _SMALL_STEP
     ]
     return float(np.std(heights, ddof=1) / np.mean(heights)) if len(heights) > 2 else math.inf
-
-
-def _seen(run: PointRun, row: Row | None, fine: Row | None) -> Seen:
-    """What classifies a point."""
-    record, measure = run.record, MEASURES[run.point.regime]
-    return Seen(
-        regime=run.point.regime,
-        state=record.state if record else "refused",
-        steps=record.last_step if record else 0,
-        failed=record.failed_checks if record else (),
-        refused=run.refused,
-        energy_ratio=measure.energy_ratio(row, fine) if row else None,
-        overlap_ratio=row["overlap_ratio"] if row else None,
-        errors=measure.errors(row, fine) if row and fine else {},
-    )
 
 
 # --- the largest safe steps --------------------------------------------------------------------

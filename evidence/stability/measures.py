@@ -87,22 +87,16 @@ class PointRun:
         return self.point.number("friction") > 0.0
 
     @property
-    def measurable(self) -> bool:
-        """Whether the run came to its end.
+    def ended(self) -> Run | None:
+        """The run folder; None of a run that did not come to its end.
 
         One whose contacts gain energy by the step counts, too: its energy says something.
         """
-        if self.record is None:
-            return False
-        failed = {check.code for check in self.record.failed_checks}
-        return self.record.complete or failed == {"stable_timestep"}
-
-    @property
-    def ended(self) -> Run | None:
-        """The run folder; None of a run that did not come to its end."""
-        if self.case is None or not self.measurable:
+        if self.case is None or self.record is None:
             return None
-        return Run(self.folder, self.case)
+        failed = {check.code for check in self.record.failed_checks}
+        whole = self.record.complete or failed == {"stable_timestep"}
+        return Run(self.folder, self.case) if whole else None
 
 
 # --- the critical time step of a loaded contact network ----------------------------------------
@@ -260,14 +254,13 @@ def _bed_errors(row: Row, fine: Row) -> dict[str, Estimate]:
     return {"height": Estimate.around(row["height_m"] / fine["height_m"] - 1.0, half_width)}
 
 
-def _settled_energy(row: Row, fine: Row | None) -> float | None:
-    return None if fine is None else row["peak_energy_j"] / fine["peak_energy_j"]
+def _settled_energy(row: Row, fine: Row | None) -> float:
+    return row["peak_energy_j"] / fine["peak_energy_j"] if fine else math.nan
 
 
-def _resting_energy(row: Row, fine: Row | None) -> float | None:
-    if fine is None:
-        return None
-    return row["rest_energy_ratio"] / max(fine["rest_energy_ratio"], REST_FLOOR)
+def _resting_energy(row: Row, fine: Row | None) -> float:
+    floor = max(fine["rest_energy_ratio"], REST_FLOOR) if fine else math.nan
+    return row["rest_energy_ratio"] / floor
 
 
 # --- impacts, met at different moments within a step -------------------------------------------
@@ -440,10 +433,6 @@ def _drag_errors(row: Row, fine: Row) -> dict[str, Estimate]:
     return {"mean drag": Estimate.around(error, half_width / size)}
 
 
-def _drag_energy(row: Row, _: Row | None) -> float:
-    return row["motion_ratio"]
-
-
 # --- by regime ---------------------------------------------------------------------------------
 
 
@@ -457,17 +446,17 @@ class Measure(NamedTuple):
     errors : callable
         Deviations of a row from that of the fine step, by the quantity's name.
     energy_ratio : callable
-        Ratio of energies of a row and that of the fine step; None where that is needed.
+        Ratio of energies of a row and that of the fine step; NaN where that is needed.
     """
 
     row: Callable[[PointRun, Run], Row]
     errors: Callable[[Row, Row], dict[str, Estimate]]
-    energy_ratio: Callable[[Row, Row | None], float | None]
+    energy_ratio: Callable[[Row, Row | None], float]
 
 
 MEASURES: Mapping[str, Measure] = {
     "impact": Measure(_measure_impacts, _impact_errors, _impact_energy),
     "settle": Measure(_measure_settled, _bed_errors, _settled_energy),
     "column": Measure(_measure_resting, _bed_errors, _resting_energy),
-    "drag": Measure(_measure_drag, _drag_errors, _drag_energy),
+    "drag": Measure(_measure_drag, _drag_errors, lambda row, _: row["motion_ratio"]),
 }

@@ -23,6 +23,7 @@ from evidence.stability.judge import (
     REFUSED,
     RULE,
     STABLE,
+    STOPPED,
     conditions,
     judge_points,
     summarise_map,
@@ -54,7 +55,7 @@ def map_stability(out_dir: Path, points: Path, cores: int) -> None:
 
 def write_stability(out_dir: Path, runs: Sequence[PointRun]) -> None:
     """Write tables, figures and page of a map whose points were run."""
-    points, verdicts = judge_points(runs)
+    points = judge_points(runs)
     found_conditions = conditions(points)
     summary = summarise_map(points, found_conditions, runs)
     tested = points[~points["reference"]]
@@ -85,7 +86,7 @@ def write_stability(out_dir: Path, runs: Sequence[PointRun]) -> None:
         errors=pd.DataFrame(dict(summary.restitution_error)).to_dict("records"),
         conditions=[_with_reference(row) for row in found_conditions.to_dict("records")],
         refusals=list(dict.fromkeys(points.loc[points["class"] == REFUSED, "why"])),
-        past_limits=sum(verdict.check == "within_limits" for verdict in verdicts),
+        past_limits=int(points["why"].str.startswith(STOPPED).sum()),
         rule=RULE,
     )
 

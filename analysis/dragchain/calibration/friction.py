@@ -7,18 +7,15 @@ measured angles then give their joint probability.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from dragchain.arrays import Floats
 from dragchain.calibration.angle_runs import AngleSet
-from dragchain.calibration.angles import read_angle
 from dragchain.errors import TableError
 from dragchain.statistics.bed_effects import EffectsFit, fit_effects
 from dragchain.statistics.estimate import CONFIDENCE, Estimate
-from dragdeck.files import write_text
 from dragdeck.parts import Part
 from dragdeck.study.calibration import Rig
 
@@ -207,20 +204,3 @@ def find_friction(known: AngleSet, runs: pd.DataFrame) -> FrictionFile:
         scatter_deg={name: model.fit.residual_std for name, model in models.items()},
         found={name: posterior.coefficients(name) for name in posterior.weights},
     )
-
-
-def write_friction(
-    known: AngleSet, folder: Path, out_dir: Path
-) -> tuple[FrictionFile, pd.DataFrame]:
-    """Read the simulated angles in a folder, and write ``angles.json`` and ``angles.csv``.
-
-    Raises
-    ------
-    DragdeckError
-        A run cannot be used, or there are too few.
-    """
-    runs = pd.DataFrame([read_angle(folder / name) for name in known.runs])
-    result = find_friction(known, runs)
-    write_text(out_dir / "angles.csv", runs.to_csv(index=False, lineterminator="\n"))
-    result.write(out_dir / "angles.json")
-    return result, runs

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict, Field
 from pydantic.json_schema import SkipJsonSchema
+from scipy.ndimage import maximum_filter1d
 from scipy.signal import find_peaks, peak_widths
 
 from dragchain.arrays import Floats
@@ -179,11 +180,7 @@ def _baseline(time: Floats, force: Floats, dead: int) -> tuple[float, float, flo
 
 def _widened(mask: NDArray[np.bool_], after: int) -> NDArray[np.bool_]:
     """True also for `after` samples after each true one, and two before it."""
-    counts = np.zeros(len(mask) + 1, dtype=np.int64)
-    where = np.flatnonzero(mask)
-    np.add.at(counts, np.maximum(where - 2, 0), 1)
-    np.add.at(counts, np.minimum(where + after + 1, len(mask)), -1)
-    return np.cumsum(counts[:-1]) > 0
+    return np.asarray(maximum_filter1d(mask, after + 3, origin=(after - 2) // 2, mode="constant"))
 
 
 def _quantum(force: Floats) -> float:

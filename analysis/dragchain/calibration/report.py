@@ -1,6 +1,6 @@
 """The command that calibrates a study: runs, fits, figures and one self-contained page."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,9 +13,10 @@ from matplotlib.figure import Figure
 
 from dragchain.arrays import Floats
 from dragchain.calibration.angle_runs import run_angles
+from dragchain.calibration.angles import read_angle
 from dragchain.calibration.drops import Drop, confirmation, sweep
 from dragchain.calibration.fit import RecordFit, calibrate
-from dragchain.calibration.friction import FrictionFile, Posterior, angle_models, write_friction
+from dragchain.calibration.friction import FrictionFile, Posterior, angle_models, find_friction
 from dragchain.calibration.measured_impacts import measure_impacts
 from dragchain.calibration.results import (
     CalibrationFile,
@@ -23,7 +24,6 @@ from dragchain.calibration.results import (
     confirmed,
     impact_table,
     result,
-    write_calibration,
 )
 from dragchain.calibration.simulated_drops import DropRun, Drops, run_drops
 from dragchain.figures.panels import key, legend_below, new_figure, new_panels
@@ -31,6 +31,7 @@ from dragchain.figures.style import BLUE, COLOURS, GREY, LIGHT, ORANGE
 from dragchain.report.campaign import write_report
 from dragdeck.cases.case import Case
 from dragdeck.decks.templates import environment
+from dragdeck.documents import Document
 from dragdeck.engine.batch import Batch
 from dragdeck.engine.reports import say
 from dragdeck.physics.contact_mechanics import fall_time
@@ -159,10 +160,12 @@ def calibrate_study(study: str, fidelity: str | None, out_dir: Path, cores: int)
     drops, angles, words = None, None, []
     if measured.record is not None:
         drops = calibrate_restitution(case, out_dir, templates)
-        words.append(_put_restitution(write_calibration(drops.fit, out_dir)))
+        words.append(_put_restitution(result(drops.fit)))
     if measured.angles is not None:
         batch = Batch(out_dir / "angles", templates)
-        angles = write_friction(run_angles(case, batch, say, cores), batch.folder, out_dir)
+        known = run_angles(case, batch, say, cores)
+        runs = pd.DataFrame([read_angle(batch.folder / name) for name in known.runs])
+        angles = find_friction(known, runs), runs
         words.append(_put_friction(angles[0]))
     write_calibration_report(out_dir, drops, angles)
     return "\n".join(words)
@@ -215,7 +218,7 @@ def _put_friction(result: FrictionFile) -> str:
 def write_calibration_report(
     folder: Path, drops: FittedRecord | None, angles: tuple[FrictionFile, pd.DataFrame] | None
 ) -> None:
-    """Draw the figures and write ``report.html`` of a calibration.
+    """Write the documents, tables, figures and page of a calibration.
 
     Parameters
     ----------
@@ -225,34 +228,42 @@ def write_calibration_report(
     angles : (FrictionFile, DataFrame), optional
         What measured angles say, and the simulated ones.
     """
+    documents, tables = dict[str, Document](), dict[str, pd.DataFrame]()
+    if drops:
+        documents["result"] = result(drops.fit)
+        tables |= {"impacts": impact_table(drops.fit), "bias": bias_table(drops.fit.drops)}
+    if angles:
+        documents["angles"], tables["angles"] = angles
 
-    def draw() -> Mapping[str, Figure]:
-        figures = dict[str, Figure]()
+    def draw() -> Iterator[tuple[str, Figure]]:
         if drops:
-            figures["impacts"] = draw_impacts(drops.record, drops.fit, drops.confirm)
+            yield "impacts", draw_impacts(drops.record, drops.fit, drops.confirm)
         if angles:
-            figures["angles"] = draw_angles(*angles)
-        return figures
+            yield "angles", draw_angles(*angles)
 
-    template = "calibration/calibration.html.j2"
-    friction = angles[0] if angles else None
     write_report(
-        folder, template, draw=draw, friction=friction, drops=_of_drops(drops) if drops else None
+        folder,
+        "calibration/calibration.html.j2",
+        draw=lambda: dict(draw()),
+        tables=tables,
+        documents=documents,
+        friction=documents.get("angles"),
+        result=documents.get("result"),
+        drops=_of_drops(drops, tables) if drops else None,
     )
 
 
-def _of_drops(drops: FittedRecord) -> Mapping[str, object]:
-    """What the page shows of a drop test."""
-    fit, observed = drops.fit, drops.fit.observed
+def _of_drops(drops: FittedRecord, tables: Mapping[str, pd.DataFrame]) -> Mapping[str, object]:
+    """What the page shows of a drop test, beside its result."""
+    observed = drops.fit.observed
     names = [f"time of impact {k + 2}" for k in range(len(observed.times_s))]
     names += [f"peak {k + 2} / peak 1" for k in range(len(observed.log_peaks))]
+    bias = tables["bias"].pivot(
+        index="restitution_deck", columns="purpose", values="restitution_effective"
+    )
     return {
-        "result": result(fit),
-        "impacts": impact_table(fit).to_dict("records"),
-        "residuals": list(zip(names, fit.fit.residuals, strict=True)),
-        "bias": bias_table(fit.drops)
-        .pivot(index="restitution_deck", columns="purpose", values="restitution_effective")
-        .reset_index()
-        .to_dict("records"),
+        "impacts": tables["impacts"].to_dict("records"),
+        "residuals": list(zip(names, drops.fit.fit.residuals, strict=True)),
+        "bias": bias.reset_index().to_dict("records"),
         "confirm": confirmed(drops.confirm),
     }

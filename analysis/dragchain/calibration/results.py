@@ -1,7 +1,6 @@
-"""The files of a calibration: record, result and tables."""
+"""What a calibration of the restitution says: its document and its tables."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -13,7 +12,6 @@ from dragchain.calibration.simulated_drops import Drops
 from dragchain.errors import TableError
 from dragchain.statistics.estimate import Estimate
 from dragdeck.documents import Document
-from dragdeck.files import write_text
 
 
 class CalibrationFile(Document):
@@ -55,29 +53,18 @@ class CalibrationFile(Document):
     record: Measured
 
 
-def write_calibration(fit: RecordFit, out: Path) -> CalibrationFile:
-    """Write ``result.json``, ``impacts.csv`` and ``bias.csv`` of a fit."""
-    content = result(fit)
-    for name, table in (("bias", bias_table(fit.drops)), ("impacts", impact_table(fit))):
-        text = table.to_csv(index=False, float_format="%.9g", lineterminator="\n")
-        write_text(out / f"{name}.csv", text)
-    content.write(out / "result.json")
-    return content
-
-
 def result(fit: RecordFit) -> CalibrationFile:
     """Content of ``result.json``."""
-    full = fit.fit_reference
+    full, drops, deck = fit.fit_reference, fit.drops, fit.fit.restitution
     put_at_full = Estimate(full.restitution, full.ci95_low, full.ci95_high)
-    drops, deck = fit.drops, fit.fit.restitution
-    measured, known = put_at_full.mapped(drops.reference.rebound), drops.known
+    measured = put_at_full.mapped(drops.reference.rebound)
     return CalibrationFile(
-        known=known,
+        known=drops.known,
         put=_rounded(fit.fit),
         measured=measured,
         effective=drops.production.rebound(deck),
         fit=fit.fit,
-        fit_full=fit.fit_reference,
+        fit_full=full,
         peaks_compared=fit.with_peaks,
         width_ratio=fit.width_ratio,
         correction=deck - measured.value,

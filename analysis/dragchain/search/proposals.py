@@ -34,54 +34,6 @@ _REFUSED_LIMIT, _REFUSED_SE = 0.5, 0.05
 
 
 @dataclass(frozen=True)
-class Trials:
-    """What is known of N places in D dimensions: Q responses, the first of which is minimised.
-
-    Attributes
-    ----------
-    places : (N, D) ndarray
-        In fractions of the bounds.
-    values, errors : (N, Q) ndarray
-        Responses with their standard errors; NaN where a place was refused or no run of it counts.
-    low, high : (Q,) ndarray
-        Limits of the responses; infinite where there is none.
-    """
-
-    places: Floats
-    values: Floats
-    errors: Floats
-    low: Floats
-    high: Floats
-
-    @property
-    def refused(self) -> Any:
-        """Whether a place has no value, (N,)."""
-        return np.isnan(self.values).any(axis=1)
-
-    @property
-    def known(self) -> Floats:
-        """The places with values."""
-        return np.asarray(self.places[~self.refused])
-
-    @cached_property
-    def responses(self) -> "Responses":
-        """The model of these trials, which is fitted once."""
-        return Responses(self)
-
-    def believing(self, place: Floats) -> "Trials":
-        """With a place whose run has not ended: its values are those that the model expects."""
-        mean, _ = self.responses.predict(place[None])
-        return self.joined(place, mean, 1e-9)
-
-    def joined(self, place: Floats, value: Any, error: float) -> "Trials":
-        """With a further place; its values are NaN if it was refused."""
-        rows = [np.broadcast_to(part, (1, len(self.low))) for part in (value, error)]
-        every = (self.places, place), (self.values, rows[0]), (self.errors, rows[1])
-        places, values, errors = (np.vstack(pair) for pair in every)
-        return Trials(places, values, errors, self.low, self.high)
-
-
-@dataclass(frozen=True)
 class Response:
     """The Gaussian process of (N,) values with standard errors at (N, D) places."""
 
@@ -117,21 +69,59 @@ class Response:
 
 
 @dataclass(frozen=True)
-class Responses:
-    """The Gaussian processes of all responses."""
+class Trials:
+    """What is known of N places in D dimensions: Q responses, the first of which is minimised.
 
-    trials: Trials
+    The Gaussian processes of the responses are fitted once, when they are asked for.
+
+    Attributes
+    ----------
+    places : (N, D) ndarray
+        In fractions of the bounds.
+    values, errors : (N, Q) ndarray
+        Responses with their standard errors; NaN where a place was refused or no run of it counts.
+    low, high : (Q,) ndarray
+        Limits of the responses; infinite where there is none.
+    """
+
+    places: Floats
+    values: Floats
+    errors: Floats
+    low: Floats
+    high: Floats
+
+    @property
+    def refused(self) -> Any:
+        """Whether a place has no value, (N,)."""
+        return np.isnan(self.values).any(axis=1)
+
+    @property
+    def known(self) -> Floats:
+        """The places with values."""
+        return np.asarray(self.places[~self.refused])
+
+    def believing(self, place: Floats) -> "Trials":
+        """With a place whose run has not ended: its values are those that the model expects."""
+        mean, _ = self.predict(place[None])
+        return self.joined(place, mean, 1e-9)
+
+    def joined(self, place: Floats, value: Any, error: float) -> "Trials":
+        """With a further place; its values are NaN if it was refused."""
+        rows = [np.broadcast_to(part, (1, len(self.low))) for part in (value, error)]
+        every = (self.places, place), (self.values, rows[0]), (self.errors, rows[1])
+        places, values, errors = (np.vstack(pair) for pair in every)
+        return Trials(places, values, errors, self.low, self.high)
 
     @cached_property
     def _each(self) -> list[Response]:
-        known, of = ~self.trials.refused, self.trials
-        columns = zip(of.values[known].T, of.errors[known].T, strict=True)
-        return [Response(of.known, value, error) for value, error in columns]
+        known = ~self.refused
+        columns = zip(self.values[known].T, self.errors[known].T, strict=True)
+        return [Response(self.known, value, error) for value, error in columns]
 
     @cached_property
-    def _refused(self) -> Response:
-        gone = self.trials.refused
-        return Response(self.trials.places, gone * 1.0, np.full(len(gone), _REFUSED_SE))
+    def _refusal(self) -> Response:
+        gone = self.refused
+        return Response(self.places, gone * 1.0, np.full(len(gone), _REFUSED_SE))
 
     def predict(self, places: Floats) -> tuple[Floats, Floats]:
         """Expected responses at (M, D) places and their standard errors, (M, Q) each."""
@@ -142,17 +132,17 @@ class Responses:
     def allowed(self, places: Floats) -> Floats:
         """Logarithm of the probability that (M, D) places meet all limits, each apart, (M,)."""
         mean, error = self.predict(places)
-        ends = self.trials.high - mean, mean - self.trials.low
+        ends = self.high - mean, mean - self.low
         each = np.sum([log_ndtr(end / np.maximum(error, 1e-12)) for end in ends], axis=(0, 2))
-        if self.trials.refused.any():
-            gone, unsure = self._refused.predict(places)
+        if self.refused.any():
+            gone, unsure = self._refusal.predict(places)
             each = each + log_ndtr((_REFUSED_LIMIT - gone) / np.maximum(unsure, 1e-12))
         return np.asarray(each)
 
     def meets(self, places: Floats) -> Any:
         """Whether all limits are expected to be met at (M, D) places, (M,)."""
         mean, _ = self.predict(places)
-        return ((mean >= self.trials.low) & (mean <= self.trials.high)).all(axis=1)
+        return ((mean >= self.low) & (mean <= self.high)).all(axis=1)
 
 
 def spread_places(count: int, dimensions: int, seed: int) -> Floats:
@@ -174,17 +164,17 @@ def propose(trials: Trials, seed: int) -> Floats:
     dimensions, random = trials.places.shape[1], np.random.default_rng(seed)
     if len(trials.known) < 2:
         return np.asarray(random.random(dimensions))
-    model, places = trials.responses, candidates(dimensions)
-    good = trials.known[model.meets(trials.known)]
+    places = candidates(dimensions)
+    good = trials.known[trials.meets(trials.known)]
     if not len(good):  # go where the limits are most probably met
-        return np.asarray(places[model.allowed(places).argmax()])
-    expected = model.predict(good)[0][:, 0]
+        return np.asarray(places[trials.allowed(places).argmax()])
+    expected = trials.predict(good)[0][:, 0]
     reach = random.choice(_REACH, (_NEAR, 1)) * random.normal(size=(_NEAR, dimensions))
     places = np.vstack([places, np.clip(good[expected.argmin()] + reach, 0.0, 1.0)])
-    mean, error = (columns[:, 0] for columns in model.predict(places))
+    mean, error = (columns[:, 0] for columns in trials.predict(places))
     by = (expected.min() - mean) / error
     gain = error * (by * norm.cdf(by) + norm.pdf(by))
-    return np.asarray(places[(np.log(np.maximum(gain, 1e-300)) + model.allowed(places)).argmax()])
+    return np.asarray(places[(np.log(np.maximum(gain, 1e-300)) + trials.allowed(places)).argmax()])
 
 
 def best_place(trials: Trials, accepted: Callable[[Floats], bool]) -> Floats | None:
@@ -192,10 +182,9 @@ def best_place(trials: Trials, accepted: Callable[[Floats], bool]) -> Floats | N
 
     Where that is nowhere, of the largest probability that they do; None if none is accepted.
     """
-    model = trials.responses
     places = np.vstack([trials.known, candidates(trials.places.shape[1])])
-    meets = model.meets(places)
-    mean = model.predict(places)[0][:, 0]
-    rank = np.where(meets, mean, np.inf) if meets.any() else -model.allowed(places)
+    meets = trials.meets(places)
+    mean = trials.predict(places)[0][:, 0]
+    rank = np.where(meets, mean, np.inf) if meets.any() else -trials.allowed(places)
     best = (k for k in np.argsort(rank, kind="stable")[:200] if np.isfinite(rank[k]))
     return next((places[k] for k in best if accepted(places[k])), None)

@@ -2,10 +2,9 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from textwrap import fill
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -78,12 +77,8 @@ def advance(
 # --- the page ------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class SearchRow:
-    """A point on the page.
-
-    `objective` and `limits` are as measured.
-    """
+class SearchRow(NamedTuple):
+    """A point on the page; `objective` and `limits` are as measured."""
 
     number: int
     point: SearchPoint
@@ -99,9 +94,9 @@ def rows_of(findings: SearchFindings) -> list[SearchRow]:
     for k, point in enumerate(findings.points):
         measures = range(0 if point.refused else findings.means.shape[1])
         values = [findings.estimate(k, measure) for measure in measures]
-        objective, limits = (values[0] if values else None), tuple(values[1:])
-        verdicts = findings.verdict(k) if values else []
-        rows.append(SearchRow(k + 1, point, objective, limits, verdicts, k in findings.as_good))
+        objective, verdicts = (values[0], findings.verdict(k)) if values else (None, ())
+        good = k in findings.as_good
+        rows.append(SearchRow(k + 1, point, objective, tuple(values[1:]), verdicts, good))
     return rows
 
 
@@ -126,7 +121,7 @@ def draw_search(findings: SearchFindings, rows: list[SearchRow]) -> dict[str, Fi
     axes.set(xlabel="setting in the order of the search", ylabel=objective)
     axes.locator_params(axis="x", integer=True)
     figures = {"path": legend_below(path)}
-    fields, model = list(findings.studied.search.vary.items()), findings.trials.responses
+    fields = list(findings.studied.search.vary.items())
     if findings.studied.search.objective.goal != "target":
         at = _centre(findings)
         figures["response"], panels = new_panels(
@@ -135,7 +130,7 @@ def draw_search(findings: SearchFindings, rows: list[SearchRow]) -> dict[str, Fi
         for k, (axes, (field, (low, high))) in enumerate(zip(panels, fields, strict=True)):
             along = np.tile(at, (101, 1))
             along[:, k] = np.linspace(0, 1, 101)
-            mean, error = (columns[:, 0] for columns in model.predict(along))
+            mean, error = (columns[:, 0] for columns in findings.trials.predict(along))
             x = np.linspace(low, high, 101)
             sign = -1.0 if findings.studied.search.objective.goal == "maximise" else 1.0
             pairs = zip(sign * mean, error, strict=True)
@@ -176,8 +171,8 @@ def write_search(out_dir: Path, findings: SearchFindings) -> None:
             "full": full,
             "soft": same[0],
             "bounds": at_bounds(findings, full.point),
-            "meets": bool(findings.trials.responses.meets(place[None])[0]),
-            "probability": math.exp(findings.trials.responses.allowed(place[None])[0]),
+            "meets": bool(findings.trials.meets(place[None])[0]),
+            "probability": math.exp(findings.trials.allowed(place[None])[0]),
         }
     measured = [row for row in rows if row.objective and not row.point.confirms]
     lowest = min(measured, key=lambda row: loss(search.objective, row.objective.value))  # type: ignore[union-attr]

@@ -59,7 +59,7 @@ def test_where_no_limit_holds_the_most_probable_place_is_taken() -> None:
     known = trials(12)
     out = Trials(known.places, known.values, known.errors, known.low, np.array([np.inf, -9.0]))
     best, tried = best_place(out, lambda place: True), propose(out, 1)
-    assert best is not None and not out.responses.meets(best[None])[0]
+    assert best is not None and not out.meets(best[None])[0]
     assert best.sum() < 0.3 and tried.sum() < 0.3
 
 

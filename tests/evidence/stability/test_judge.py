@@ -68,13 +68,13 @@ def test_classes(point: Seen, kind: str) -> None:
 def test_an_error_before_the_first_step_is_a_refusal_with_its_text() -> None:
     text = "ERROR: 0.05 < coefficientRestitution <= 1 required"
     point = failed(check("no_engine_error", text, "other"), check("particles_kept", "0"), steps=0)
-    assert classify(point) == (REFUSED, text, "no_engine_error")
+    assert classify(point) == (REFUSED, text)
 
 
 def test_the_worse_of_two_classes_counts() -> None:
     point = seen(energy_ratio=2.0, overlap_ratio=1.0, errors={"restitution": Estimate(1, 1, 1)})
     assert classify(point)[0] == ENERGY
-    kind, why, _ = classify(seen(overlap_ratio=0.2, errors={"restitution": Estimate(1, 1, 1)}))
+    kind, why = classify(seen(overlap_ratio=0.2, errors={"restitution": Estimate(1, 1, 1)}))
     assert kind == OVERLAP and "0.2" in why
 
 
