@@ -190,8 +190,8 @@ def validation_of(
         runs=len(runs),
         packings=len(packings),
         arc_m=arc_m,
-        run_std=compared["drag_mean"].run_std,
-        bed_fraction=compared["drag_mean"].bed_fraction,
+        run_std=compared["drag_mean"].fit.residual_std,
+        bed_fraction=compared["drag_mean"].fit.bed_fraction,
         means=tuple(
             MeanOfPackings(name=of.name, label=of.label, unit=of.unit, mean=mean)
             for of, mean in means.items()

@@ -11,8 +11,14 @@ rule fit_coefficients:
         record=WORK.drop_record,
         templates=WORK.page_templates("calibration/calibration.html.j2"),
     output:
-        WORK.if_measured("record", "result.json", "impacts.csv", "bias.csv", "figures/impacts.png"),
-        WORK.if_measured("angles", "angles.json", "angles.csv", "figures/angles.png"),
+        WORK.if_measured(
+            "record",
+            *("result.json", "impacts.csv", "impacts.parquet", "bias.csv", "bias.parquet"),
+            "figures/impacts.png",
+        ),
+        WORK.if_measured(
+            "angles", "angles.json", "angles.csv", "angles.parquet", "figures/angles.png"
+        ),
         page=shown(
             WORK.of_study("calibration", "report.html"),
             "calibration",

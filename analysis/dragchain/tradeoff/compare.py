@@ -10,6 +10,7 @@ same runs which of them may be added up.
 import math
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -188,22 +189,6 @@ def values_within(measures: RunQuantities, arc_m: float, stretch: int = 0) -> di
 # --- comparison ----------------------------------------------------------------------------------
 
 
-Levels = Mapping[str, Hashable]
-
-
-@dataclass(frozen=True)
-class EffectsModel:
-    """Effects of settings: how they become columns of a design, and the fit of these."""
-
-    factors: Factors
-    fit: EffectsFit
-
-    def error(self, setting: Levels, reference: Levels, signed: bool) -> ErrorEntry:
-        """The difference of one setting to another."""
-        weights = self.factors.row(setting) - self.factors.row(reference)
-        return relative_error(*self.fit.contrast(weights), self.fit.degrees, signed)
-
-
 @dataclass(frozen=True)
 class QuantityComparison:
     """All settings against the reference in one quantity.
@@ -215,33 +200,43 @@ class QuantityComparison:
         Its value at the reference, estimated from all runs.
     se : float
         Of that, relative.
-    run_std : float
-        Relative standard deviation of one run's value over the common path.
-    bed_fraction : float
-        The part of its square that runs from one bed have in common.
-    errors : dict of Setting to ErrorEntry
-    model : EffectsModel
-        What `errors` and `between` draw on.
+    factors : Factors
+        How settings become columns of a design.
+    fit : EffectsFit
+        Of these; `residual_std` is the relative standard deviation of one run's value over the
+        common path, `bed_fraction` the part of its square that runs from one bed have in common.
+    settings : sequence of Setting
+        Those that were run, that of the reference among them.
+    standard : Setting
+        The reference.
     """
 
     quantity: Quantity
     reference: float
     se: float
-    run_std: float
-    bed_fraction: float
-    errors: Mapping[Setting, ErrorEntry]
-    model: EffectsModel = field(repr=False)
+    factors: Factors = field(repr=False)
+    fit: EffectsFit = field(repr=False)
+    settings: Sequence[Setting] = field(repr=False)
+    standard: Setting = field(repr=False)
+
+    @cached_property
+    def errors(self) -> Mapping[Setting, ErrorEntry]:
+        """The error of each setting."""
+        return {setting: self._error(setting, self.standard) for setting in self.settings}
 
     @property
     def reference_halfwidth(self) -> float:
         """Relative half-width of the reference's interval."""
-        return self.model.fit.quantile * self.se
+        return self.fit.quantile * self.se
 
     def between(self, setting: Setting, base: Setting) -> ErrorEntry | None:
         """Difference of one setting to another; None if the runs cannot tell it."""
-        if not all(self.model.factors.tells(one.factors()) for one in (setting, base)):
-            return None
-        return self.model.error(setting.factors(), base.factors(), self.quantity.signed)
+        known = all(self.factors.tells(one.factors()) for one in (setting, base))
+        return self._error(setting, base) if known else None
+
+    def _error(self, setting: Setting, base: Setting) -> ErrorEntry:
+        weights = self.factors.row(setting.factors()) - self.factors.row(base.factors())
+        return relative_error(*self.fit.contrast(weights), self.fit.degrees, self.quantity.signed)
 
 
 def compare_quantity(
@@ -271,37 +266,33 @@ def compare_quantity(
     else:
         scale = float(np.sign(values[0]))
         values = np.log(np.abs(values))
-    levels = reference.factors()
-    model = _model(settings, values, [run.measures.bed for run, _ in rows], levels)
-    level, uncertainty = model.fit.contrast(model.factors.row(levels))
+    factors, fit = _fitted(settings, values, [run.measures.bed for run, _ in rows], reference)
+    level, uncertainty = fit.contrast(factors.row(reference.factors()))
     return QuantityComparison(
         quantity=quantity,
         reference=scale * (level if quantity.signed else math.exp(level)),
         se=uncertainty,
-        run_std=model.fit.residual_std,
-        bed_fraction=model.fit.bed_fraction,
-        errors={
-            setting: model.error(setting.factors(), levels, quantity.signed)
-            for setting in dict.fromkeys(settings)
-        },
-        model=model,
+        factors=factors,
+        fit=fit,
+        settings=list(dict.fromkeys(settings)),
+        standard=reference,
     )
 
 
-def _model(
-    settings: Sequence[Setting], values: Floats, beds: Sequence[str | None], reference: Levels
-) -> EffectsModel:
-    """A model with an effect of every combination.
+def _fitted(
+    settings: Sequence[Setting], values: Floats, beds: Sequence[str | None], reference: Setting
+) -> tuple[Factors, EffectsFit]:
+    """An effect of every combination.
 
-    If the runs do not allow it, one whose effects add up: without repetitions effects are added
-    up on trust, and what does not fit is scatter.
+    If the runs do not allow it, effects that add up: without repetitions they are added up on
+    trust, and what does not fit is scatter.
     """
     levels = [setting.factors() for setting in settings]
-    separate, added = (Factors(levels, reference, additive) for additive in (False, True))
+    separate, added = (Factors(levels, reference.factors(), additive) for additive in (False, True))
     try:
-        return EffectsModel(separate, fit_effects(separate.design(), values, beds))
+        return separate, fit_effects(separate.design(), values, beds)
     except SeriesError:
-        return EffectsModel(added, fit_effects(added.design(), values, beds))
+        return added, fit_effects(added.design(), values, beds)
 
 
 def relative_error(

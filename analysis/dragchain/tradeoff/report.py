@@ -153,10 +153,14 @@ def tradeoff_record(
         scene=_scene_numbers(tradeoff),
         reference=FidelityParameters(**tradeoff.reference.parameters()),
         quantities={
-            name: QuantityEntry.model_validate(
-                vars(own.quantity)
-                | vars(own)
-                | {"arc_m": tradeoff.arc_m, "signed": own.quantity.signed}
+            name: QuantityEntry(
+                label=own.quantity.label,
+                unit=own.quantity.unit,
+                signed=own.quantity.signed,
+                reference=own.reference,
+                se=own.se,
+                run_std=own.fit.residual_std,
+                arc_m=tradeoff.arc_m,
             )
             for name, own in tradeoff.comparisons.items()
         },

@@ -11,7 +11,7 @@ from dragchain.calibration.drops import Drop, confirmation, drop_case, full, pro
 from dragchain.calibration.fit import calibrate
 from dragchain.calibration.measured_impacts import measure_impacts
 from dragchain.calibration.report import FittedRecord, write_calibration_report
-from dragchain.calibration.results import confirmed, write_calibration
+from dragchain.calibration.results import confirmed, result
 from dragchain.calibration.simulated_drops import Drops, run_drops
 from dragdeck.cases.case import Case
 from dragdeck.decks.templates import environment
@@ -142,13 +142,13 @@ def test_a_known_restitution_is_recovered(measured_case: Case, project: Project)
         assert got.fit_reference.height_m == pytest.approx(drop.height_m, abs=2e-5)
 
     (record, got), _ = fits
-    result = write_calibration(got, folder)
-    values = (result.fit.restitution, result.fit_full.restitution)
+    calibration = result(got)
+    values = (calibration.fit.restitution, calibration.fit_full.restitution)
     confirming = run(list(confirmation(case.study, *values))[::2], "confirm")
     checked = confirmed(confirming)
-    assert checked["effective"] == pytest.approx(result.measured.value, abs=4 * checked["std"])
+    assert checked["effective"] == pytest.approx(calibration.measured.value, abs=4 * checked["std"])
     write_calibration_report(folder, FittedRecord(record, got, confirming), None)
     page = (folder / "report.html").read_text(encoding="utf-8")
-    assert f"<b>{result.put:.4g}</b>" in page
+    assert f"<b>{calibration.put:.4g}</b>" in page
     assert page.count("data:image/") == 1
     assert "http" not in page

@@ -12,7 +12,7 @@ from made_study import Load
 from pages import stands_alone
 
 from dragchain.search import report, rounds
-from dragchain.search.proposals import Responses, Trials, best_place, propose, spread_places
+from dragchain.search.proposals import Trials, best_place, propose, spread_places
 from dragchain.search.report import advance, at_bounds
 from dragchain.search.rounds import SearchedStudy, read_findings
 from dragdeck.cli import main
@@ -48,7 +48,7 @@ def test_the_best_place_is_that_of_the_model_within_the_limit() -> None:
     best = best_place(known, lambda place: True)
     assert best is not None
     np.testing.assert_allclose(best, BEST, atol=0.12)
-    mean, error = Responses(known).predict(best[None])
+    mean, error = known.predict(best[None])
     assert abs(mean[0] - truth(best)) == pytest.approx([0, 0], abs=3 * error[0].max())
     assert error[0, 0] < SD[0]  # it knows that neighbours have noise of their own
     other = best_place(known, lambda place: place[1] > 0.3)
@@ -69,7 +69,7 @@ def test_proposals_follow_from_the_trials_and_keep_off_what_was_refused() -> Non
     first = propose(known, 3)
     assert (propose(known, 3) == first).all()
     assert first[0] < 0.75
-    assert Responses(known).allowed(first[None])[0] > math.log(0.2)
+    assert known.allowed(first[None])[0] > math.log(0.2)
 
 
 # --- rounds --------------------------------------------------------------------------------------

@@ -152,7 +152,7 @@ def test_parameters_that_were_never_turned_alone_are_not_told_apart(
     mixed = [one for one in contents() if point_of(one) in (REFERENCE, BOTH)]
     confounded = made(tmp_path / "few", mixed)
     own = confounded.comparisons["drag_mean"]
-    assert not own.model.factors.additive
+    assert not own.factors.additive
     assert own.errors[Setting(*BOTH)].value == pytest.approx(0.1, abs=WITHIN)
     assert by_modulus(confounded) == [Setting(*BOTH)]
 
