@@ -6,25 +6,29 @@ from dragchain.cli import MADE_BY, OUT_DIR, RUN_DIRS
 from dragdeck.cli import FIDELITY, STUDY
 from dragdeck.command_line import Argument, Command, Program
 
-CORES = Argument("--cores", type=int, default=1, metavar="N",
-                 help="runs at the same time; default: 1")  # fmt: skip
+CORES = Argument("--cores", type=int, metavar="N",
+                 help="runs at the same time (default: all cores)")  # fmt: skip
+
+
+def out_in(folder: str) -> Argument:
+    """The folder for the results of a command, and its default."""
+    return Argument("--out", type=Path, default=Path(folder), metavar="DIR", dest="out_dir",
+                    help=f"folder for the results (default: {folder})")  # fmt: skip
+
 
 COMMANDS = (
     Command("verify", "run the verification suite and compare it with reference solutions",
-            "Run the verification suite and compare it with reference solutions.",
-            "verification.report:verify", (
-        STUDY, FIDELITY, OUT_DIR, CORES)),
-    Command("verdict", "print the verdict of the verification suite; fail if a quantity failed",
-            "Print the verdict of the verification suite; fail if a quantity failed.",
-            "verification.report:verdict", (
-        Argument("report_dir", type=Path, metavar="REPORT_DIR",
-                 help="folder of the report on the verification suite"),)),
+            "Run the verification suite and compare it with reference solutions; fail if a "
+            "quantity failed.", "verification.report:verify", (
+        Argument("study", nargs="?", default="uhlmann2015", metavar="STUDY",
+                 help="study whose materials are tested too (default: uhlmann2015)"),
+        FIDELITY, out_in("results/verification/report"), CORES)),
     Command("stability", "run the points of a stability map and judge them",
             "Run the points of a stability map and judge them; write the report.",
             "stability.report:map_stability", (
-        OUT_DIR,
-        Argument("--map", type=Path, required=True, dest="points", metavar="FILE",
-                 help="map.yaml, the points of the stability map; required"),
+        out_in("results/stability"),
+        Argument("--map", type=Path, default=Path("studies/stability/map.yaml"), dest="points",
+                 metavar="FILE", help="points of the map (default: studies/stability/map.yaml)"),
         CORES)),
     Command("costs", "time what each omitted option would cost",
             "Time what each option that input scripts omit would cost. Run it on a machine that "

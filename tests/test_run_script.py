@@ -121,7 +121,7 @@ def test_usage_needs_nothing(clone: Clone, arguments: list[str]) -> None:
     ("arguments", "called"),
     [
         (["all", "--config", "study=two words"], f"{SNAKEMAKE} [all] [--config] [study=two words]"),
-        (["verify"], f"{SNAKEMAKE} [verify] {EVIDENCE}"),
+        (["tradeoff"], f"{SNAKEMAKE} [tradeoff] {EVIDENCE}"),
         (
             ["-n", "results/a/validation/report.html"],
             f"{SNAKEMAKE} [-n] [results/a/validation/report.html] {EVIDENCE}",

@@ -14,6 +14,7 @@ from dragchain.arrays import Floats
 from dragchain.figures.panels import head, key, legend_below, new_panels, row_names
 from dragchain.figures.style import GREEN, GREY, INK, ORANGE, RED
 from dragchain.report.campaign import write_report
+from dragdeck.cases.ranks import cores_here
 from evidence.stability.judge import (
     CLASSES,
     ENERGY,
@@ -34,7 +35,7 @@ from evidence.stability.runs import run_map
 from evidence.stability.scenes import PHASES
 
 
-def map_stability(out_dir: Path, points: Path, cores: int) -> None:
+def map_stability(out_dir: Path, points: Path, cores: int | None) -> None:
     """Run the points of a map and write tables, figures and page.
 
     Parameters
@@ -50,7 +51,7 @@ def map_stability(out_dir: Path, points: Path, cores: int) -> None:
 
     Errors are those of `run_map`.
     """
-    write_stability(out_dir, run_map(points, out_dir, cores))
+    write_stability(out_dir, run_map(points, out_dir, cores or cores_here()))
 
 
 def write_stability(out_dir: Path, runs: Sequence[PointRun]) -> None:

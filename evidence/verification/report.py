@@ -9,7 +9,7 @@ import pandas as pd
 from markupsafe import Markup
 
 from dragchain.report.campaign import write_report
-from dragchain.tables.by_step import read_table
+from dragdeck.cases.ranks import cores_here
 from dragdeck.decks.templates import environment
 from dragdeck.engine.batch import Batch
 from dragdeck.engine.reports import say
@@ -28,10 +28,15 @@ Rows = Sequence[Mapping[Hashable, object]]
 # --- the commands ---------------------------------------------------------------------------
 
 
-def verify(study: str, fidelity: str | None, out_dir: Path, cores: int) -> None:
+def verify(study: str, fidelity: str | None, out_dir: Path, cores: int | None) -> str:
     """Run the suite for the materials of a study and write its report.
 
     Runs of the same inputs are not repeated; one that was interrupted is gone on with.
+
+    Returns
+    -------
+    str
+        How many quantities have each verdict, in words.
 
     Raises
     ------
@@ -40,7 +45,7 @@ def verify(study: str, fidelity: str | None, out_dir: Path, cores: int) -> None:
     EngineError
         No LIGGGHTS, or it was interrupted.
     RejectedRunError
-        A run did not pass its acceptance checks.
+        A run did not pass its acceptance checks, or a quantity failed.
     """
     project = find_project(Path.cwd())
     case = project.cases(study, fidelity)[0]
@@ -49,11 +54,11 @@ def verify(study: str, fidelity: str | None, out_dir: Path, cores: int) -> None:
     suite = {
         name: partial(collide_scene, collision) for name, collision in suite_of(case.study).items()
     }
-    batch.each(suite, say, cores)
-    write_verification(out_dir, [folder / name for name in suite])
+    batch.each(suite, say, cores or cores_here())
+    return verdict(write_verification(out_dir, [folder / name for name in suite]), out_dir)
 
 
-def write_verification(out_dir: Path, run_dirs: Sequence[Path]) -> None:
+def write_verification(out_dir: Path, run_dirs: Sequence[Path]) -> pd.DataFrame:
     """Judge runs of the suite and write its tables and its page.
 
     Writes ``checks.csv`` and ``checks.parquet`` (one row per comparison), ``verification.csv`` and
@@ -66,6 +71,11 @@ def write_verification(out_dir: Path, run_dirs: Sequence[Path]) -> None:
         Made if need be.
     run_dirs : sequence of Path
         Folders of runs of the `collide` scene.
+
+    Returns
+    -------
+    DataFrame
+        The content of ``verification.parquet``.
 
     Raises
     ------
@@ -92,19 +102,17 @@ def write_verification(out_dir: Path, run_dirs: Sequence[Path]) -> None:
         failures=_shown(summary[summary["verdict"] == "fail"]),
         runs=len(run_dirs),
     )
+    return summary
 
 
-def verdict(report_dir: Path) -> str:
+def verdict(summary: pd.DataFrame, report_dir: Path) -> str:
     """How many quantities have each verdict, in words.
 
     Raises
     ------
     RejectedRunError
         At least one failed: names each, with its error.
-    TableError
-        There is no summary.
     """
-    summary = read_table(report_dir / "verification.parquet")
     said = ", ".join(f"{number} {name}" for name, number in counts(summary).items())
     bad = summary[summary["verdict"] == "fail"]
     if bad.empty:

@@ -14,7 +14,7 @@ pytestmark = pytest.mark.slow
 
 PROFILE: dict[str, Any] = yaml.safe_load((ROOT / "profiles/slurm/config.yaml").read_text())
 EVIDENCE = ("--snakefile", "evidence/Snakefile")
-BATCHES = {"fit_coefficients", "judge_verification", "map_stability", "measure_costs"}
+BATCHES = {"fit_coefficients", "measure_costs"}
 """Rules that start the engine for many runs."""
 
 
@@ -48,7 +48,6 @@ def waits(project: Path, *arguments: str) -> set[tuple[str, str]]:
         (("calibrate",), {"fit_coefficients"}),
         (("tradeoff", *EVIDENCE), {"run_points", "measure_costs"}),
         (("validate", *EVIDENCE), {"run_points"}),
-        (("verify", *EVIDENCE), {"judge_verification"}),
     ],
 )
 def test_no_group_waits_for_a_rule_that_waits_for_it(

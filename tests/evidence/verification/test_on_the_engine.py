@@ -11,10 +11,10 @@ from dragdeck.cases.case import Case
 from dragdeck.decks.render import write_run
 from dragdeck.decks.templates import environment
 from dragdeck.engine.run_folder import run
+from dragdeck.errors import RejectedRunError
 from dragdeck.project import Project
-from evidence.__main__ import main
 from evidence.verification.experiment import collide_scene
-from evidence.verification.report import write_verification
+from evidence.verification.report import verdict, write_verification
 from evidence.verification.suite import suite_of
 
 pytestmark = pytest.mark.engine
@@ -43,13 +43,10 @@ def folders(case: Case, project: Project) -> list[Path]:
 
 
 def test_the_engine_meets_the_law_and_a_wrong_law_is_caught(
-    folders: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    folders: list[Path], tmp_path: Path
 ) -> None:
     out = tmp_path / "report"
-    write_verification(out, folders)
-    assert main(["verdict", str(out)]) == 0
-    said = capsys.readouterr().out
-    assert " 0 fail" in said
+    assert " 0 fail" in verdict(write_verification(out, folders), out)
 
     table = pd.read_parquet(out / "checks.parquet")
     limited = table[(table["test"] == "restitution") & (table["against"] == "exact formula")]
@@ -66,9 +63,9 @@ def test_the_engine_meets_the_law_and_a_wrong_law_is_caught(
         for kind in case["types"]:
             kind["youngs_modulus_pa"] *= 1.01
         file.write_text(json.dumps(case))
-    write_verification(out, folders)
-    assert main(["verdict", str(out)]) == 1
-    said = capsys.readouterr().err
+    with pytest.raises(RejectedRunError) as caught:
+        verdict(write_verification(out, folders), out)
+    said = str(caught.value)
     assert "elastic_pair" in said
     assert "oblique_study" in said
     assert "spin_unequal" in said
