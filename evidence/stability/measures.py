@@ -87,16 +87,20 @@ class PointRun:
         return self.point.number("friction") > 0.0
 
     @property
-    def ended(self) -> Run | None:
-        """The run folder; None of a run that did not come to its end.
+    def measurable(self) -> bool:
+        """Whether the run came to its end.
 
         One whose contacts gain energy by the step counts, too: its energy says something.
         """
-        if self.case is None or self.record is None:
-            return None
+        if self.record is None:
+            return False
         failed = {check.code for check in self.record.failed_checks}
-        whole = self.record.complete or failed == {"stable_timestep"}
-        return Run(self.folder, self.case) if whole else None
+        return self.record.complete or failed == {"stable_timestep"}
+
+    @property
+    def ended(self) -> Run | None:
+        """The run folder; None of a run that did not come to its end."""
+        return Run(self.folder, self.case) if self.case and self.measurable else None
 
 
 # --- the critical time step of a loaded contact network ----------------------------------------
