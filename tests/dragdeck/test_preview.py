@@ -18,7 +18,7 @@ from dragdeck.mesh.files import stl_text
 from dragdeck.mesh.shapes import cylinder, prism
 from dragdeck.outlook.process import workpiece_notes
 from dragdeck.preview.layout import COLOURS, CaseLayout, layout
-from dragdeck.preview.swept import swept_volume
+from dragdeck.preview.picture import swept
 from dragdeck.project import Project
 from dragdeck.scenes.workpiece import check_fit, clearances, process_cautions
 
@@ -46,12 +46,6 @@ def pixels(image: np.ndarray, name: str) -> int:
     hue = np.array(to_rgb(COLOURS[name]))
     norms = np.linalg.norm(image, axis=2) * np.linalg.norm(hue)
     return int((image @ hue > 0.995 * norms).sum())
-
-
-def volume_and_bounds(found: CaseLayout) -> tuple[float, np.ndarray]:
-    body = found.workpieces[0]
-    swept = swept_volume(body.mesh, body.drag.poses)
-    return swept.volume, swept.bounds
 
 
 def test_the_picture_shows_the_workpiece(
@@ -133,12 +127,11 @@ def test_the_named_case_is_drawn_and_the_first_by_default(
 ) -> None:
     drawn: list[str] = []
 
-    def draw(scene: CaseLayout, swept: object, title: str) -> bytes:
+    def draw(scene: CaseLayout, title: str) -> bytes:
         drawn.append(title)
         return b""
 
     monkeypatch.setattr("dragdeck.commands.picture", draw)
-    monkeypatch.setattr("dragdeck.commands.swept_volume", lambda *_: None)
     load({"sweep": {"motion.immersion_depth_m": [0.010, 0.016]}})
     assert main(["preview", "small"]) == 0
     assert "case quick_immersion_depth_m-0.01, one of 2 (--case)" in capsys.readouterr().out
@@ -162,33 +155,24 @@ def test_a_mesh_is_turned_to_the_direction_of_motion(made: Made) -> None:
     assert angles == pytest.approx([90, 126])
 
 
-def test_a_swept_ring_has_the_volume_of_pappus() -> None:
-    body, angle = cylinder(0.005, 0.03, 0.0015), np.linspace(0, 2 * np.pi, 100)
-    poses = np.tile(np.eye(4), (100, 1, 1))
-    poses[:, 0, 3], poses[:, 1, 3] = 0.02 * np.cos(angle), 0.02 * np.sin(angle)
-    swept = swept_volume(body, poses)
-    assert swept.is_watertight
-    assert swept.volume == pytest.approx(2 * np.pi * 0.02 * 0.01 * 0.03, rel=0.03)
-    assert swept.bounds[1] == pytest.approx([0.025, 0.025, 0.03], abs=2e-4)
-
-
-def test_a_body_thinner_than_the_grid_is_not_lost() -> None:
-    wire = cylinder(0.0001, 0.05, 0.0001, 0.01)
-    poses = np.tile(np.eye(4), (50, 1, 1))
-    poses[:, 0, 3] = poses[:, 1, 3] = np.linspace(0, 0.3, 50)
-    swept = swept_volume(wire, poses)
-    assert swept.extents == pytest.approx([0.3, 0.3, 0.05], abs=0.02)
-
-
-def test_spin_and_oscillation_enlarge_the_swept_volume(made: Made) -> None:
-    still, bounds = volume_and_bounds(layout(made(BAR)))
-    spun, _ = volume_and_bounds(layout(made({"motion.spin": {"rpm": 300}})))
-    assert spun > 1.02 * still
+def test_a_workpiece_sweeps_where_it_goes(made: Made) -> None:
+    """A bar on a circle of 10 mm, a corner of 4 mm ahead; it is lifted by an oscillation."""
+    still = swept(layout(made({**BAR, "motion.path.revolutions": 1})).workpieces[0])
+    out, inside = (np.hypot(0.010 + side * 0.004 * np.cos(np.pi / 6), 0.002) for side in (1, -1))
+    away = np.hypot(*still.vertices[:, :2].T)
+    assert (away.min(), away.max()) == pytest.approx((inside, out), abs=2e-4)
     oscillation = {"amplitude_m": 0.003, "frequency_hz": 20}
-    case = made({"motion.spin": None, "motion.oscillation": oscillation})
-    lifted, wide = volume_and_bounds(layout(case))
-    assert lifted > 1.05 * still
-    assert wide[:, 2] - bounds[:, 2] == pytest.approx([-0.003, 0.003], abs=3e-4)
+    lifted = swept(layout(made({"motion.oscillation": oscillation})).workpieces[0])
+    assert lifted.bounds[:, 2] - still.bounds[:, 2] == pytest.approx([-0.003, 0.003], abs=3e-4)
+
+
+def test_a_fine_mesh_is_drawn_with_fewer_triangles(made: Made, project: Project) -> None:
+    fine = cylinder(0.004, 0.05, 0.0004)
+    assert len(fine.faces) > 10_000
+    (project.studies / "small/bar.stl").write_text(stl_text(fine))
+    sheet = swept(layout(made(BAR)).workpieces[0])
+    assert len(sheet.faces) < 60_000
+    assert np.ptp(sheet.bounds[:, 2]) == pytest.approx(0.05, abs=5e-4)
 
 
 def test_other_commands_load_no_graphics(case: Case) -> None:

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import jinja2
 from pydantic import ValidationError
@@ -42,9 +41,8 @@ from dragdeck.outlook.process import bed_notes, dimensionless, not_corrected, wo
 from dragdeck.outlook.runs import expected_runs, plan_in_words, written
 from dragdeck.outlook.timestep import stable_step_cautions, stable_step_note, timestep_notes
 from dragdeck.physics.packing import Bed
-from dragdeck.preview.layout import CaseLayout, layout
+from dragdeck.preview.layout import layout
 from dragdeck.preview.picture import picture, small_picture
-from dragdeck.preview.swept import swept_volume
 from dragdeck.project import (
     by_folder,
     by_run,
@@ -66,9 +64,6 @@ from dragdeck.study.contact_law import coefficients, modelled
 from dragdeck.study.recorded import recorded_file
 from dragdeck.study.yaml import located
 from dragdeck.sweep.cases import new_study
-
-if TYPE_CHECKING:
-    from trimesh import Trimesh
 
 
 def _scene_type(name: str) -> SceneType:
@@ -304,21 +299,16 @@ def preview(study: str, fidelity: str | None, case: str | None) -> None:
         raise located(error) from None
     file = project.results(study) / "preview.png"
     title = "\n".join([f"{study}, case {chosen.name}", remeshing(chosen) or ""])
-    write_bytes(file, picture(scene, _swept(scene), title.strip()))
+    write_bytes(file, picture(scene, title.strip()))
     print(f"{study}: case {chosen.name}" + (f", one of {len(every)} (--case)" if every[1:] else ""))
     print(file)
-
-
-def _swept(scene: CaseLayout, share: float = 1.0) -> list["Trimesh"]:
-    return [swept_volume(body.mesh, body.drag.poses, share) for body in scene.workpieces]
 
 
 def draw_set_up(study: str, fidelity: str | None) -> None:
     """Draw the first case of a study for its report."""
     project = find_project(Path.cwd())
     scene = layout(project.cases(study, fidelity)[0])
-    swept = _swept(scene, share=0.05)  # details of a picture of this size
-    write_bytes(project.results(study) / "set_up.png", small_picture(scene, swept))
+    write_bytes(project.results(study) / "set_up.png", small_picture(scene))
 
 
 def _case_named(cases: list[Case], name: str | None) -> Case:

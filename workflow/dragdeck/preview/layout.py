@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from dragdeck.cases.case import Case, of_each_workpiece
 from dragdeck.mesh.surface import surface
 from dragdeck.scenes.filling import expected_bed
-from dragdeck.scenes.motion import Course, course, driven_surface_speed
+from dragdeck.scenes.motion import Course, course
 from dragdeck.scenes.workpiece import reference_height, workpiece_mesh, workpiece_radius
 
 if TYPE_CHECKING:
@@ -25,15 +25,8 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-_POSES_PER_RADIUS = 4
-"""Poses while a surface point moves by the workpiece's radius: a swept cylinder is then at most
-1 % of the radius too narrow between two of them."""
-
-_LOOKS = 400
-"""How often it is looked how far a workpiece turns in a leg."""
-
-_MOST_POSES = 2000
-"""Of a leg: beyond, poses are farther apart."""
+_POSES = 1000
+"""Of a leg."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +38,7 @@ class Stage:
     name : str
         ``plunge``, ``approach`` or ``drag``.
     poses : (N, 4, 4) array
-        From the mesh to the bowl, in m, at equal intervals of time; N is at least 2.
+        From the mesh to the bowl, in m, at equal intervals of time.
     """
 
     name: str
@@ -144,7 +137,7 @@ def _moving(case: Case) -> MovingWorkpiece:
         radius_m=workpiece_radius(case),
         direction_rad=case.study.motion.path.direction_rad,
         spin=int(np.sign(turn)),
-        stages=list(_stages(case, way)),
+        stages=list(_stages(way)),
     )
 
 
@@ -161,18 +154,11 @@ def _section(outlines: Sequence[Floats], height_m: float) -> "Trimesh":
     return surface(points, np.hstack(halves).T)
 
 
-def _stages(case: Case, way: Course) -> Iterator[Stage]:
+def _stages(way: Course) -> Iterator[Stage]:
     """The legs as they are driven."""
-    study, radius = case.study, workpiece_radius(case)
-    fastest = driven_surface_speed(study, radius)
     for leg in way.legs:
-        speed = max(leg.speed_m_s, fastest if leg.name == "drag" else 0.0)
-        _, rotation = way.poses(leg, np.linspace(0.0, leg.steps, _LOOKS))
-        turned = np.abs(np.diff(np.unwrap(rotation.front_rad))).sum()
-        travel = speed * leg.duration_s + turned * radius
-        count = min(_MOST_POSES, 2 + math.ceil(_POSES_PER_RADIUS * travel / radius))
-        places, rotation = way.poses(leg, np.linspace(0.0, leg.steps, count))
-        poses = np.tile(np.eye(4), (count, 1, 1))
+        places, rotation = way.poses(leg, np.linspace(0.0, leg.steps, _POSES))
+        poses = np.tile(np.eye(4), (_POSES, 1, 1))
         poses[:, :3, :3], poses[:, :3, 3] = rotation.matrices, places
         yield Stage(leg.name, poses)
 

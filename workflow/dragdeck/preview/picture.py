@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from dragdeck.preview.layout import COLOURS, CaseLayout, Floats, Projection, views
-from dragdeck.preview.swept import below_and_above, drawn
+from dragdeck.mesh.surface import surface
+from dragdeck.preview.layout import COLOURS, CaseLayout, Floats, MovingWorkpiece, Projection, views
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,13 +32,20 @@ class _Layer(NamedTuple):
     opacity: float
 
 
-def picture(layout: CaseLayout, swept: Sequence["Trimesh"], title: str) -> bytes:
-    """Draw a layout and the volumes that its workpieces sweep, as PNG; the title is plain text."""
+_MOST_TRIANGLES = 8000
+"""Of a surface that is drawn."""
+
+_SWEPT_TRIANGLES, _EVERY = 400, 9
+"""Of a workpiece at each of its poses, and every so many of these, as they are drawn together."""
+
+
+def picture(layout: CaseLayout, title: str) -> bytes:
+    """Draw a layout, as PNG; the title is plain text."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11, 10), dpi=110, layout="constrained")
     figure.suptitle(title, fontsize=12, color=COLOURS["ink"], parse_math=False)
-    layers = list(_layers(layout, swept))
+    layers = list(_layers(layout))
     for axes, view in zip(figure.subplots(2, 2).flat, _views(layout), strict=True):
         _draw(axes, view, layout, layers)
     handles, names = figure.axes[0].get_legend_handles_labels()
@@ -47,17 +54,13 @@ def picture(layout: CaseLayout, swept: Sequence["Trimesh"], title: str) -> bytes
     return _png(figure)
 
 
-def small_picture(layout: CaseLayout, swept: Sequence["Trimesh"]) -> bytes:
+def small_picture(layout: CaseLayout) -> bytes:
     """Draw a layout obliquely from above, without words, as PNG: for the report on its runs."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(3.2, 2.9), dpi=150)
-    _draw(
-        figure.add_axes((0.0, 0.0, 1.0, 1.0)),
-        _views(layout)[-1],
-        layout,
-        list(_layers(layout, swept)),
-    )
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    _draw(axes, _views(layout)[-1], layout, list(_layers(layout)))
     return _png(figure)
 
 
@@ -71,15 +74,45 @@ def _png(figure: "Figure") -> bytes:
     return content.getvalue()
 
 
-def _layers(layout: CaseLayout, swept: Sequence["Trimesh"]) -> Iterator[_Layer]:
+def _layers(layout: CaseLayout) -> Iterator[_Layer]:
     """Surfaces in the order of painting: below the surface of the bed, the surface, and above."""
-    bodies = [_Layer(volume, "swept", 0.7) for volume in swept]
-    bodies += [_Layer(drawn(body.at_start), "workpiece", 1.0) for body in layout.workpieces]
-    parts = [below_and_above(body.mesh, layout.surface_m) for body in bodies]
-    yield _Layer(layout.bowl, "bowl", 0.7)
-    yield from (body._replace(mesh=below) for body, (below, _) in zip(bodies, parts, strict=True))
-    yield _Layer(layout.bed, "bed", 0.6)
-    yield from (body._replace(mesh=above) for body, (_, above) in zip(bodies, parts, strict=True))
+    bodies = [_Layer(swept(body), "swept", 0.7) for body in layout.workpieces]
+    bodies += [_Layer(_coarse(body.at_start), "workpiece", 1.0) for body in layout.workpieces]
+    below, above = (
+        [body._replace(mesh=_cut(body.mesh, normal, layout.surface_m)) for body in bodies]
+        for normal in ("z", "-z")
+    )
+    yield from (_Layer(layout.bowl, "bowl", 0.7), *below, _Layer(layout.bed, "bed", 0.6), *above)
+
+
+def swept(body: MovingWorkpiece) -> "Trimesh":
+    """A workpiece at all poses of its drag: painted as one sheet, the volume that it sweeps."""
+    mesh, poses = _coarse(body.mesh, _SWEPT_TRIANGLES), body.drag.poses[::_EVERY]
+    points = mesh.vertices @ poses[:, :3, :3].transpose(0, 2, 1) + poses[:, None, :3, 3]
+    faces = mesh.faces + len(mesh.vertices) * np.arange(len(poses))[:, None, None]
+    return surface(points.reshape(-1, 3), faces.reshape(-1, 3))
+
+
+def _coarse(mesh: "Trimesh", triangles: int = _MOST_TRIANGLES) -> "Trimesh":
+    """A mesh with fewer triangles, if it has more than can be drawn well."""
+    if len(mesh.faces) <= triangles:
+        return mesh
+    return _as_mesh(_as_data(mesh).decimate(1 - triangles / len(mesh.faces)))
+
+
+def _cut(mesh: "Trimesh", normal: str, height_m: float) -> "Trimesh":
+    """The part of a surface below a height, or above it, open where it was cut."""
+    return _as_mesh(_as_data(mesh).clip(normal, origin=(0.0, 0.0, height_m)).triangulate())
+
+
+def _as_data(mesh: "Trimesh") -> Any:
+    import pyvista
+
+    return pyvista.PolyData.from_regular_faces(mesh.vertices, mesh.faces)
+
+
+def _as_mesh(data: Any) -> "Trimesh":
+    return surface(data.points, data.regular_faces)
 
 
 def _draw(axes: "Axes", view: Projection, layout: CaseLayout, layers: Sequence[_Layer]) -> None:
