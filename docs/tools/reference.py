@@ -274,7 +274,7 @@ def _usual(path: str, limits: str) -> tuple[str, str]:
         below = "below " if high == bounds.get("below") else ""
         accepted.append(f"{above}{low:.10g} to {below}{high:.10g}")
         usual.append(f"{max(low, limit.warned_below):.10g} to {min(high, limit.warned_above):.10g}")
-    if usual == [re.sub("above |below ", "", one) for one in accepted]:
+    if usual == [re.sub("above |below ", "", text) for text in accepted]:
         usual = []
     text = "; ".join([*filter(None, [rest.strip()]), *accepted])
     return text.replace("or; ", "or "), "; ".join(usual)

@@ -142,8 +142,8 @@ def load_points(file: Path, regime: str) -> list[Point]:
             condition = _digest({"regime": regime, **settings})
             shared = {"regime": regime, "axis": axis, "condition": condition, "settings": settings}
             for fraction, reference in design.steps():
-                own = {"fraction": fraction, "reference": reference}
-                point = Point.model_validate({**shared, **own})
+                step = {"fraction": fraction, "reference": reference}
+                point = Point.model_validate({**shared, **step})
                 known.setdefault(point.name, point)
     except ValidationError as error:
         raise explained(error, file) from None

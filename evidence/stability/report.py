@@ -160,7 +160,8 @@ def draw_regime(points: pd.DataFrame, conditions: pd.DataFrame, title: str) -> F
 
 def _class_keys(axes: Axes, points: pd.DataFrame) -> None:
     """Name the colours of the classes that occur."""
-    for kind in (one for one in CLASSES if (points["class"] == one).any()):
+    present = set(points["class"])
+    for kind in filter(present.__contains__, CLASSES):
         name = f"{_LETTERS[kind]} {kind}".strip()
         key(axes, name, color=COLOURS[kind], marker="s", ms=8)
 

@@ -145,25 +145,25 @@ def write_validation(out_dir: Path, run_dirs: Sequence[Path], command: str) -> N
     files = [folder / MEASURED_FILE for folder in run_dirs]
     runs, reference, arc_m = read_plan_runs(files, run_dirs[0])
     case = load_case(run_dirs[0])
-    found = validation_of(runs, reference, arc_m, case, command)
+    result = validation_of(runs, reference, arc_m, case, command)
     packings = packing_table(runs, reference)
     write_report(
         out_dir,
         "validation/validation.html.j2",
         draw=lambda: {
             "comparison": draw_drags(
-                list(_bars(found, packings)), {of.label: of.mean_n for of in found.comparison}
+                list(_bars(result, packings)), {of.label: of.mean_n for of in result.comparison}
             )
         },
         tables={
             "packings": packings,
-            "means": _table(found.means),
-            "comparison": _table(found.comparison),
-            "effects": _table(found.effects),
+            "means": _table(result.means),
+            "comparison": _table(result.comparison),
+            "effects": _table(result.effects),
         },
-        documents={"validation": found},
+        documents={"validation": result},
         package="evidence",
-        found=found,
+        found=result,
         packings=packings.to_dict("records"),
         assumptions=case.assumptions,
     )
@@ -275,13 +275,13 @@ Bar = tuple[str, Estimate, str]
 """Name, value and colour of a row of `draw_drags`."""
 
 
-def _bars(found: Validation, packings: pd.DataFrame) -> Iterator[Bar]:
-    drag = next(of.mean for of in found.means if of.name == "drag_mean")
+def _bars(result: Validation, packings: pd.DataFrame) -> Iterator[Bar]:
+    drag = next(of.mean for of in result.means if of.name == "drag_mean")
     yield "all packings", drag, COLOURS["drag"]
     for packing in packings.to_dict("records"):
         ends = (packing[f"drag_mean{end}"] for end in ("", "_ci95_low", "_ci95_high"))
         yield f"packing {packing['seed']}", Estimate(*ends), BLUE
-    for effect in found.effects:
+    for effect in result.effects:
         if effect.quantity == "drag_mean":
             yield effect_bar(drag.value, effect)
 

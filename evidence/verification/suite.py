@@ -194,8 +194,8 @@ class Impacts(Test):
         bodies: list[PlacedSphere] = []
         contacts: list[ContactFacts] = []
         for value, impact, pair in zip(values, impacts, pairs, strict=True):
-            first, own = len(bodies) + 1, distinct.index(pair) + 1
-            bodies += impact.bodies(len(contacts), own, own if same else len(types), dt)
+            first, row = len(bodies) + 1, distinct.index(pair) + 1
+            bodies += impact.bodies(len(contacts), row, row if same else len(types), dt)
             met = first + 1 if self.partner == "particle" else "plane"
             contacts.append(ContactFacts(first, met, value))
         words = lab.series(series.material, struck)

@@ -249,12 +249,12 @@ def _between_scenes(
     The variance between scenes is by the method of moments (DerSimonian and Laird 1986, Controlled
     Clinical Trials 7, 177), and never taken as less than that of the mean.
     """
-    of, own = np.asarray(values), np.asarray(variances)
-    weight = 1.0 / own
+    of, variance = np.asarray(values), np.asarray(variances)
+    weight = 1.0 / variance
     mean = float(np.average(of, weights=weight))
     excess = float(weight @ (of - mean) ** 2) - (len(of) - 1)
     between = max(excess / float(weight.sum() - weight @ weight / weight.sum()), 0.0)
-    weight = 1.0 / (own + between)
+    weight = 1.0 / (variance + between)
     error = 1.0 / float(weight.sum())
     return float(np.average(of, weights=weight)), math.sqrt(error), math.sqrt(between + error)
 

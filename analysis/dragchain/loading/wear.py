@@ -246,7 +246,7 @@ def first_touches(run_dir: Path, part: Sampled, case: CaseOfRun) -> pd.DataFrame
     pressure = np.cbrt(
         6 * events["peak_normal_force_n"].clip(lower=0) * modulus**2 / (np.pi**3 * radius**2)
     )
-    found = events.assign(
+    touched = events.assign(
         **first[POINT].reset_index(drop=True),
         radius_m=radius,
         touch_normal_m_s=normal,
@@ -254,7 +254,7 @@ def first_touches(run_dir: Path, part: Sampled, case: CaseOfRun) -> pd.DataFrame
         impact_angle_rad=impact_angle(normal, tangential),
         peak_pressure_pa=pressure,
     )
-    return found[found["frame"] > 0].reset_index(drop=True)
+    return touched[touched["frame"] > 0].reset_index(drop=True)
 
 
 def impact_action(law: Law, events: pd.DataFrame, case: CaseOfRun) -> Floats:

@@ -26,13 +26,13 @@ def _root(leader, particle):
 
 
 @njit(nogil=True, cache=True)
-def _join(leader, one, other):
+def _join(leader, root, below):
     """Hang the smaller of two trees below the root of the larger: the root, and the one below."""
-    if leader[one] > leader[other]:
-        one, other = other, one
-    leader[one] += leader[other]
-    leader[other] = one
-    return one, other
+    if leader[root] > leader[below]:
+        root, below = below, root
+    leader[root] += leader[below]
+    leader[below] = root
+    return root, below
 
 
 @njit(nogil=True, cache=True)
@@ -204,7 +204,7 @@ def shortest_path(net, force, start, target, least, search, space):
     mark[start], depth[start], queue[0], total[start] = search, 0, start, 0.0
     low, high, level = 0, 1, 0
     while mark[target] != search and low < high:
-        found = high
+        end = high
         for place in range(low, high):
             node = queue[place]
             for k in range(starts[node], starts[node + 1]):
@@ -213,11 +213,11 @@ def shortest_path(net, force, start, target, least, search, space):
                 if strength < least or not (new or depth[other] > level):
                     continue
                 if new:
-                    mark[other], depth[other], queue[found] = search, level + 1, other
-                    found += 1
+                    mark[other], depth[other], queue[end] = search, level + 1, other
+                    end += 1
                 if new or total[node] + strength > total[other]:
                     total[other], come[other], by[other] = total[node] + strength, node, edge[k]
-        low, high, level = high, found, level + 1
+        low, high, level = high, end, level + 1
     size = depth[target] if mark[target] == search else 0
     particles, edges = np.empty(size, dtype=np.int64), np.empty(size, dtype=np.int64)
     node = target

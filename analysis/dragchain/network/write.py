@@ -49,13 +49,13 @@ def chain_table(frame: NetworkFrame) -> pd.DataFrame:
     return pd.DataFrame({name: _joined(name, peters[name], paths[name]) for name in peters})
 
 
-def _joined(name: str, one: Any, other: Any) -> Any:
+def _joined(name: str, peters: Any, paths: Any) -> Any:
     """A column of the chains of both definitions."""
     if name == "particle_ids":
-        return pd.Series([*one, *other], dtype=object)
+        return pd.Series([*peters, *paths], dtype=object)
     if name in ("definition", "end_kind"):
-        return pd.array([*one, *other], dtype="str")
-    return np.concatenate([one, other])
+        return pd.array([*peters, *paths], dtype="str")
+    return np.concatenate([peters, paths])
 
 
 def _peters(frame: NetworkFrame) -> dict[str, Any]:

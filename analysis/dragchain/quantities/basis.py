@@ -128,14 +128,14 @@ def judge(
 
 def changed_settings(fidelity: FidelityOfRun) -> dict[str, str]:
     """The settings that are not those of the process, and what they were measured to give."""
-    found = {}
+    changes = {}
     if fidelity.youngs_modulus_scale != 1.0:
         setting = f"Young's modulus {_TIMES} {fidelity.youngs_modulus_scale:g}"
-        found[setting] = "more and smaller contact forces than the physical one"
+        changes[setting] = "more and smaller contact forces than the physical one"
     if fidelity.speed_factor != 1.0:
         setting = f"speed {_TIMES} {fidelity.speed_factor:g}"
-        found[setting] = "fewer and larger contact forces than the speed of the process"
-    return found
+        changes[setting] = "fewer and larger contact forces than the speed of the process"
+    return changes
 
 
 def effects(fidelity: FidelityOfRun) -> list[str]:

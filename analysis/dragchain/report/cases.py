@@ -65,24 +65,24 @@ def set_up(
         ("Path and depth", "; ".join(_path(case))),
         ("Speed", "; ".join(_speed(case))),
         ("Media", "; ".join(_media(case))),
-        *((f"Class {one.name}", "; ".join(_class(one, case, findings))) for one in case.classes),
+        *((f"Class {kind.name}", "; ".join(_class(kind, case, findings))) for kind in case.classes),
         ("Bowl", "; ".join(_bowl(case, filling))),
         ("Settings", "; ".join(_settings(case, packings))),
     ]
 
 
 def _workpiece(case: CaseOfRun) -> Iterator[str]:
-    own, workpiece = needed(case.workpiece, "workpiece"), study_of(case).workpiece
+    simulated, workpiece = needed(case.workpiece, "workpiece"), study_of(case).workpiece
     material, shape = workpiece.material, workpiece.shape
     if isinstance(shape, CylinderShape):  # the reach of an inclined one is larger
-        radius = own.radius_m if own.kind == "cylinder" else shape.radius_m
+        radius = simulated.radius_m if simulated.kind == "cylinder" else shape.radius_m
         yield f"{material} cylinder, diameter {_mm(2 * radius)}"
     else:
-        yield f"{material} part {shape.file}, up to {_mm(own.radius_m)} from its axis"
-    if own.remeshed:
-        yield own.remeshed
-    if own.count > 1:
-        yield f"number {own.number} of {own.count}"
+        yield f"{material} part {shape.file}, up to {_mm(simulated.radius_m)} from its axis"
+    if simulated.remeshed:
+        yield simulated.remeshed
+    if simulated.count > 1:
+        yield f"number {simulated.number} of {simulated.count}"
 
 
 def _path(case: CaseOfRun) -> Iterator[str]:
@@ -92,7 +92,7 @@ def _path(case: CaseOfRun) -> Iterator[str]:
     yield f"immersed {_mm(needed(case.workpiece, 'workpiece').immersion_depth_m)}"
     if tilt := study_of(case).motion.tilt_deg:
         yield f"inclined by {tilt:g}\N{DEGREE SIGN}"
-    yield from (f"with {one.kind}" for one in case.superposed)
+    yield from (f"with {motion.kind}" for motion in case.superposed)
 
 
 def _speed(case: CaseOfRun) -> Iterator[str]:
@@ -125,37 +125,37 @@ def _shape(grains: Grains) -> tuple[str, str]:
     return f"particles ({grains.shape.kind.replace('_', ' ')})", "diameter of equal volume"
 
 
-def _class(one: ClassOfRun, case: CaseOfRun, findings: Sequence[ProcessFindings]) -> Iterator[str]:
+def _class(kind: ClassOfRun, case: CaseOfRun, findings: Sequence[ProcessFindings]) -> Iterator[str]:
     """Asked and obtained amounts of a class, how it moves in the bed and loads the workpiece."""
     amounts: Mapping[str, Mapping[str, float]] = {
-        "number": {each.name: each.count for each in case.classes},
-        "volume": {each.name: each.volume_m3 for each in case.classes},
-        "mass": {each.name: each.density_kg_m3 * each.volume_m3 for each in case.classes},
+        "number": {run.name: run.count for run in case.classes},
+        "volume": {run.name: run.volume_m3 for run in case.classes},
+        "mass": {run.name: run.density_kg_m3 * run.volume_m3 for run in case.classes},
     }
     media = study_of(case).media
-    of, requested = media.fractions_of, media.classes[one.name]
+    of, requested = media.fractions_of, media.classes[kind.name]
     what, diameter = _shape(requested)
-    yield f"{number(one.count)} {one.material} {what}"
-    mean, spread = _mm(2 * one.radius_mean_m), _mm(2 * one.radius_std_m)
+    yield f"{number(kind.count)} {kind.material} {what}"
+    mean, spread = _mm(2 * kind.radius_mean_m), _mm(2 * kind.radius_std_m)
     yield f"{diameter} {mean} \N{PLUS-MINUS SIGN} {spread} (standard deviation)"
-    got = amounts[of][one.name] / sum(amounts[of].values())
+    got = amounts[of][kind.name] / sum(amounts[of].values())
     yield f"{number(100 * got)} % of the {of} (asked: {number(100 * requested.fraction)} %)"
-    found = np.array([each.segregation[one.name] for each in findings if each.segregation])
-    if len(found):
-        start, end = (fixed(value, 3, sign=True) for value in found.mean(axis=0))
-        change = np.diff(found, axis=1)[:, 0]
+    shift = np.array([run.segregation[kind.name] for run in findings if run.segregation])
+    if len(shift):
+        start, end = (fixed(value, 3, sign=True) for value in shift.mean(axis=0))
+        change = np.diff(shift, axis=1)[:, 0]
         scatter = f" (standard deviation of the change {change.std(ddof=1):.3f})"
-        packings = scatter if len(found) > 1 else ""
+        packings = scatter if len(shift) > 1 else ""
         yield f"segregation {start} at the start of the drag, {end} at its end{packings}"
-    if own := [each.by_class[one.name] for each in findings if each.by_class]:
+    if loads := [run.by_class[kind.name] for run in findings if run.by_class]:
         contacts, force, part = (
             values[0] if len(values) == 1 else mean_of([value.value for value in values])
-            for values in zip(*own, strict=True)
+            for values in zip(*loads, strict=True)
         )
-        part = part.within_one if len(own) > 1 else part
+        part = part.within_one if len(loads) > 1 else part
         yield (
             f"{with_interval(contacts)} contacts on the workpiece at a time of "
-            f"{with_interval(force, 'N')} each: {with_interval(part.over(0.01), '%')} of the load"
+            f"{with_interval(force, 'N')} run: {with_interval(part.over(0.01), '%')} of the load"
         )
 
 
@@ -171,11 +171,11 @@ def _bowl(case: CaseOfRun, filling: FillingFindings | None) -> Iterator[str]:
 
 
 def _settings(case: CaseOfRun, packings: int) -> Iterator[str]:
-    own = case.fidelity
+    fidelity = case.fidelity
     yield (
-        f"{own.name}: Young's modulus {TIMES} {number(own.youngs_modulus_scale)}, time step "
-        f"{number(100 * own.timestep_fraction)} % of the Rayleigh time, "
-        f"speed {TIMES} {number(own.speed_factor)}"
+        f"{fidelity.name}: Young's modulus {TIMES} {number(fidelity.youngs_modulus_scale)}, "
+        f"time step {number(100 * fidelity.timestep_fraction)} % of the Rayleigh time, "
+        f"speed {TIMES} {number(fidelity.speed_factor)}"
     )
     yield f"{packings} packings (seeds)" if packings > 1 else "one packing (seed)"
 
@@ -320,24 +320,24 @@ def cases_of(studies: Iterable[StudyRuns]) -> list[ReportedCase]:
 
     A run that is given again, perhaps as a copy elsewhere, is the same packing: it counts once.
     """
-    found: list[list[StudyRuns]] = []
+    groups: list[list[StudyRuns]] = []
     known: set[tuple[str, str]] = set()
     for study in studies:
         case = study.process.case
         if (case.study_name, case.run) in known:
             continue
         known.add((case.study_name, case.run))
-        for group in found:
+        for group in groups:
             if _same_but_seed(group[0], study):
                 group.append(study)
                 break
         else:
-            found.append([study])
-    return [ReportedCase(tuple(group)) for group in found]
+            groups.append([study])
+    return [ReportedCase(tuple(group)) for group in groups]
 
 
-def _same_but_seed(one: StudyRuns, other: StudyRuns) -> bool:
-    a, b = one.process.case, other.process.case
+def _same_but_seed(first: StudyRuns, other: StudyRuns) -> bool:
+    a, b = first.process.case, other.process.case
     numbers = [case.workpiece.number if case.workpiece else 0 for case in (a, b)]
-    changed = changed_inputs(one.process.study.inputs(), other.process.study.inputs())
+    changed = changed_inputs(first.process.study.inputs(), other.process.study.inputs())
     return changed.keys() == {_SEED} and a.fidelity == b.fidelity and numbers[0] == numbers[1]

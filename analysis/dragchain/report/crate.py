@@ -65,14 +65,14 @@ def write_crate(
         If a run is not complete, or a document cannot be used.
     """
     if out_dir.is_dir() and any(out_dir.iterdir()) and not (out_dir / LEFT_OUT).is_file():
-        remedy = "name another folder, or move this one away"
+        remedy = "name another folder, or move this file away"
         raise ExportError(f"{out_dir} contains files that are not a crate\n  remedy: {remedy}")
     report = sorted(file for file in _below_here(report_dir).iterdir() if file.is_file())
     draft = out_dir.with_name(f".{out_dir.name}.{os.getpid()}.part")
     draft.mkdir(parents=True)
     try:
         crate = _Crate(draft, load_case(run_dirs[0]), licence)
-        crate.add([*inputs, *(one for one in report if one.name != "complete")])
+        crate.add([*inputs, *(file for file in report if file.name != "complete")])
         for folder in run_dirs:
             crate.add_run(_below_here(folder))
         crate.close()
@@ -84,11 +84,11 @@ def write_crate(
 
 def _below_here(path: Path) -> Path:
     """The path of a file or folder from the present folder."""
-    found = Path(os.path.relpath(path))
-    if ".." in found.parts:
+    relative = Path(os.path.relpath(path))
+    if ".." in relative.parts:
         remedy = "call this in the project's folder, and put the file there"
         raise ExportError(f"{path} is not below {Path.cwd()}\n  remedy: {remedy}")
-    return found
+    return relative
 
 
 def _in_crate(file: Path) -> Path:
@@ -173,7 +173,9 @@ class _Crate:
     def close(self) -> None:
         """Add the versions and the list of what was left out, and write the metadata."""
         self._software("Python", platform.python_version())
-        packages = sorted({f"{one.name}=={one.version}" for one in distributions()}, key=str.lower)
+        packages = sorted(
+            {f"{dist.name}=={dist.version}" for dist in distributions()}, key=str.lower
+        )
         rows = [f"{file},{file.stat().st_size},{file_checksum(file)}" for file in self._left_out]
         for name, lines in ((PACKAGES, packages), (LEFT_OUT, ["file,bytes,sha256", *rows])):
             write_text(self._folder / name, "".join(f"{line}\n" for line in lines))
@@ -188,9 +190,9 @@ class _Crate:
         """Something that is no file, listed under ``mentions`` of the whole crate."""
         if (known := self._crate.get(identity)) is not None:
             return known
-        found = self._named(identity, about)
-        self._crate.root_dataset.append_to("mentions", found)
-        return found
+        entity = self._named(identity, about)
+        self._crate.root_dataset.append_to("mentions", entity)
+        return entity
 
     def _named(self, identity: str, about: Mapping[str, object]) -> Any:
         """Something that is no file and that another entry names."""

@@ -184,7 +184,7 @@ class SignalComparison:
     @property
     def verdicts(self) -> Counter[Equivalence]:
         """Number of quantities with each verdict."""
-        return Counter(one.verdict for one in self.differences)
+        return Counter(difference.verdict for difference in self.differences)
 
     def counted(self, force_n: Floats) -> Floats:
         """What of a signal is compared, positive in the direction in which peaks are counted."""
@@ -227,17 +227,17 @@ def compare_signal(case: ReportedCase, file: Path | None) -> SignalComparison | 
         heading = partial(directions, case.first.process.study.motion)
         measured = measured_signal(file, signal, heading, transient_s)
         simulated = tuple(_simulated(study.process, signal) for study in case.studies)
-        found = SignalComparison(case, signal, "", measured, simulated, transient_s)
+        comparison = SignalComparison(case, signal, "", measured, simulated, transient_s)
         differences = compared(
-            found.counted(measured.force_n),
-            [found.counted(force) for force in simulated],
+            comparison.counted(measured.force_n),
+            [comparison.counted(force) for force in simulated],
             low_pass_hz=signal.low_pass_hz,
             separation_s=factor * peak_separation_s(first),
             margin=signal.margin,
         )
     except DragdeckError as error:
         return SignalComparison(case, signal, str(error))
-    return replace(found, differences=tuple(differences))
+    return replace(comparison, differences=tuple(differences))
 
 
 def _simulated(run: ReportedRun[ProcessFindings], signal: Signal) -> Floats:
@@ -251,29 +251,29 @@ def _simulated(run: ReportedRun[ProcessFindings], signal: Signal) -> Floats:
 _MARKS = {"equivalent": GREEN, "different": RED, "undecided": GREY}
 
 
-def _drawn(found: SignalComparison) -> Figure:
+def _drawn(comparison: SignalComparison) -> Figure:
     """Both signals over time, their power spectra, and the differences with their intervals."""
-    signal, measured = found.signal, needed(found.measured, "measured signal")
+    signal, measured = comparison.signal, needed(comparison.measured, "measured signal")
     rate = PER_HZ * signal.low_pass_hz
     figure = new_figure(6.4)
     grid = figure.add_gridspec(2, 2, width_ratios=(1, 1.15), height_ratios=(1, 1.2))
     above, left, right = map(figure.add_subplot, (grid[0, :], grid[1, 0], grid[1, 1]))
-    every = {"experiment": measured.force_n, "drag": found.simulated[0]}
+    every = {"experiment": measured.force_n, "drag": comparison.simulated[0]}
     for (name, force), label in zip(every.items(), ("measured", "simulated"), strict=True):
         above.plot(np.arange(len(force)) / rate, force, color=COLOURS[name], lw=0.8, label=label)
-        frequency, power = welch(found.counted(force), rate, nperseg=min(len(force) // 4, 512))
+        frequency, power = welch(comparison.counted(force), rate, nperseg=min(len(force) // 4, 512))
         left.loglog(frequency[1:], power[1:], color=COLOURS[name], label=label)
     end, grey = min(map(len, every.values())) / rate, COLOURS["transient"]
-    above.axvspan(0, found.transient_s, color=grey, alpha=0.6, lw=0, label="transient")
+    above.axvspan(0, comparison.transient_s, color=grey, alpha=0.6, lw=0, label="transient")
     above.set(xlabel="process time (s)", ylabel=f"{signal.component} force (N)", xlim=(0, end))
     left.axvline(signal.low_pass_hz, color=GREY, ls=":", label="bandwidth")
     left.set(xlabel="frequency (Hz)", ylabel="power spectral density (N²/Hz)")
     right.axvspan(-100 * signal.margin, 100 * signal.margin, color=GREEN, alpha=0.12, lw=0)
-    for place, one in enumerate(found.differences):
-        relative = one.relative.over(0.01)
-        row(right, place, relative.value, relative, _MARKS[one.verdict])
+    for place, difference in enumerate(comparison.differences):
+        relative = difference.relative.over(0.01)
+        row(right, place, relative.value, relative, _MARKS[difference.verdict])
     for verdict, colour in _MARKS.items():
         key(right, verdict, color=colour)
-    row_names(right, [one.label for one in found.differences])
+    row_names(right, [difference.label for difference in comparison.differences])
     right.set(xlabel="relative difference (%)", xlim=(-100, 100))
     return legend_below(figure)

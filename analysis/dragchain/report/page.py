@@ -103,7 +103,7 @@ def _alike(estimate: Estimate) -> tuple[list[str], str]:
     shift = power if power < -3 else 0
     decimals = max(0, min(1 - math.floor(math.log10(estimate.half_width)), 3 - power) + shift)
     times = f" {TIMES} 10{str(shift).translate(_RAISED)}" if shift else ""
-    return [fixed(one / 10.0**shift, decimals) for one in numbers], times
+    return [fixed(value / 10.0**shift, decimals) for value in numbers], times
 
 
 def interval(estimate: Mapping[str, float | None], digits: int = 3) -> str:
@@ -165,7 +165,7 @@ def page_environment(
         *(number, measured, fixed, fraction, interval, with_interval, ends),
         *(in_percent, heading_key, sections, cell),
     )
-    environment.filters |= {one.__name__: one for one in shared} | dict(filters or {})
+    environment.filters |= {call.__name__: call for call in shared} | dict(filters or {})
     return environment
 
 

@@ -168,14 +168,14 @@ def projected(case: ReportedCase, target: Target) -> pd.DataFrame:
     of removal, or of Archard, per area and process time, with its standard error. Of first touches
     there are the number and mean normal velocity. With a law, `RemovalOfCase.facets` follows.
     """
-    sums, actions, studies = zip(*(_of_run(one, target) for one in case.studies), strict=True)
+    sums, actions, studies = zip(*(_of_run(study, target) for study in case.studies), strict=True)
     mean, error, _ = patch_means(*np.swapaxes(actions, 0, 1))
-    found, surface = sum(sums) / len(sums), target.surface
-    if "touches" in found:
-        found["touch_normal_m_s"] /= found["touches"].where(found["touches"] > 0)
+    amounts, surface = sum(sums) / len(sums), target.surface
+    if "touches" in amounts:
+        amounts["touch_normal_m_s"] /= amounts["touches"].where(amounts["touches"] > 0)
     columns = {f"centre_{axis}_m": at for axis, at in zip("xyz", surface.centres.T, strict=True)}
     first = {**columns, "area_m2": surface.areas, "smoothing_length_m": target.length_m}
-    table = pd.DataFrame(first).assign(**found, action_w_m2=mean, action_w_m2_se=error)
+    table = pd.DataFrame(first).assign(**amounts, action_w_m2=mean, action_w_m2_se=error)
     removed = removal_of(ReportedCase(studies))
     return table if removed is None else table.assign(**removed.facets)
 
@@ -185,23 +185,23 @@ def _of_run(study: StudyRuns, target: Target) -> tuple[pd.DataFrame, Floats, Stu
     folder, case, areas = study.process.folder, study.process.case, target.surface.areas
     sampled, normals = sample(folder, case), read_surface(folder, case).normals
     amounts = sampled.rows[list(AMOUNTS)].to_numpy(np.float64)
-    found = pd.DataFrame(target.receive(sampled.rows, normals, amounts), columns=list(AMOUNTS))
+    sums = pd.DataFrame(target.receive(sampled.rows, normals, amounts), columns=list(AMOUNTS))
     of_laws, _, events = acting(folder, case, sampled)
     if events is not None:
         hits = events.assign(touches=1.0)[["touches", "touch_normal_m_s"]]
-        found[[*hits]] = target.receive(events, normals, hits.to_numpy(np.float64))
+        sums[[*hits]] = target.receive(events, normals, hits.to_numpy(np.float64))
     action = np.zeros((2, len(areas)))
-    for one in of_laws:
-        waves = np.vstack([np.ones(one.frames), slow_waves(one.frames)])[:, one.rows["frame"]]
-        load = target.receive(one.rows, normals, one.rows["action"].to_numpy()[:, None] * waves.T)
-        error = np.sqrt(one.frames * np.mean(load[:, 1:] ** 2, axis=1))
-        per = areas * one.frames * one.interval_s * case.fidelity.speed_factor
+    for law in of_laws:
+        waves = np.vstack([np.ones(law.frames), slow_waves(law.frames)])[:, law.rows["frame"]]
+        load = target.receive(law.rows, normals, law.rows["action"].to_numpy()[:, None] * waves.T)
+        error = np.sqrt(law.frames * np.mean(load[:, 1:] ** 2, axis=1))
+        per = areas * law.frames * law.interval_s * case.fidelity.speed_factor
         action = np.array([action[0] + load[:, 0] / per, np.hypot(action[1], error / per)])
     if study.wear is None:
-        return found, action, study
+        return sums, action, study
     highest = needed(case.workpiece, "workpiece").immersion_depth_m
     changed = {"area_m2": areas, "patch_w_m2": action[0], "patch_se_w_m2": action[1],
                "patch": np.arange(len(areas)),
                "immersed": target.surface.centres[:, 2] <= highest}  # fmt: skip
     update = {name: tuple(values.tolist()) for name, values in changed.items()}
-    return found, action, replace(study, wear=study.wear.model_copy(update=update))
+    return sums, action, replace(study, wear=study.wear.model_copy(update=update))

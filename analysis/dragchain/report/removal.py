@@ -19,7 +19,7 @@ from scipy.special import stdtrit
 
 from dragchain.arrays import Floats
 from dragchain.errors import TableError
-from dragchain.loading.wear import TOUCH_QUANTITIES, Wear
+from dragchain.loading.wear import TOUCH_QUANTITIES, TouchesOfRun, Wear
 from dragchain.report.cases import ReportedCase
 from dragchain.run.kinematics import axis_speed
 from dragchain.statistics.correlated import SLOW_WAVES
@@ -51,7 +51,7 @@ def joined_half_width(
     squares = [(half / student_quantile(of)) ** 2 for half, of in parts]
     total = np.maximum(sum(squares), 1e-120)
     with np.errstate(divide="ignore"):
-        both = total**2 / sum(one**2 / of for one, (_, of) in zip(squares, parts, strict=True))
+        both = total**2 / sum(term**2 / of for term, (_, of) in zip(squares, parts, strict=True))
     half = stdtrit(both, 0.5 + CONFIDENCE / 2) * total**0.5
     return np.asarray(np.maximum(np.maximum(half, scatter), known))
 
@@ -157,11 +157,11 @@ class RemovalOfCase:
     @cached_property
     def spread(self) -> MapSpread:
         """The spread of the depth over the immersed area, relative to its mean."""
-        own = np.flatnonzero(self.wears[0].immersed)
-        each = ([one.patch_w_m2, one.patch_se_w_m2] for one in self.wears)
-        values, errors = np.swapaxes(np.array(list(each))[..., own], 0, 1)
+        immersed = np.flatnonzero(self.wears[0].immersed)
+        maps = ([wear.patch_w_m2, wear.patch_se_w_m2] for wear in self.wears)
+        values, errors = np.swapaxes(np.array(list(maps))[..., immersed], 0, 1)
         areas, patch = np.array(self.wears[0].area_m2), np.array(self.wears[0].patch)
-        return map_spread(values, errors, areas[own], patch[own])
+        return map_spread(values, errors, areas[immersed], patch[immersed])
 
     @property
     def percentiles_um_h(self) -> tuple[Estimate, Estimate]:
@@ -169,11 +169,11 @@ class RemovalOfCase:
         mean, half = self.depth_um_h.value, self.depth_um_h.combined.relative_half_width
         low, high = (
             Estimate(
-                mean * one.value,
-                mean * max(0.0, one.value - math.hypot(one.value - one.ci95_low, half * one.value)),
-                mean * (one.value + math.hypot(one.ci95_high - one.value, half * one.value)),
+                mean * end.value,
+                mean * max(0.0, end.value - math.hypot(end.value - end.ci95_low, half * end.value)),
+                mean * (end.value + math.hypot(end.ci95_high - end.value, half * end.value)),
             )
-            for one in self.spread.percentiles
+            for end in self.spread.percentiles
         )
         return low, high
 
@@ -183,17 +183,17 @@ class RemovalOfCase:
         target_um = 1e6 * (self.removal.target_depth_m or 0.0)
         if not target_um:
             return {}
-        found = {
+        rates = {
             "mean depth": self.depth_um_h.combined,
             "95 % of the immersed area": self.percentiles_um_h[0],
         }
-        return {name: _time_to(target_um, one) for name, one in found.items()}
+        return {name: _time_to(target_um, rate) for name, rate in rates.items()}
 
 
 def _time_to(depth_um: float, um_h: Estimate) -> Estimate:
     """Minutes to a depth; without limit if the depth per time may be zero."""
     ends = (um_h.value, um_h.ci95_high, um_h.ci95_low)
-    return Estimate(*(60 * depth_um / one if one else math.inf for one in ends))
+    return Estimate(*(60 * depth_um / end if end else math.inf for end in ends))
 
 
 def removal_of(case: ReportedCase) -> RemovalOfCase | None:
@@ -212,7 +212,7 @@ def removal_of(case: ReportedCase) -> RemovalOfCase | None:
     folder, factor = case.first.process.folder, 1.0
     if len(wears) < len(case.studies):
         raise TableError(f"{folder}: no wear.json: make it with: ./run dragchain loading {folder}")
-    action = _over_packings([one.action_w for one in wears])
+    action = _over_packings([wear.action_w for wear in wears])
     if not removal.laws[-1].impact:  # of impacts, windows give nothing
         factor = load.shown.value / load.run.value
         action = load.shown.over(first.fidelity.speed_factor / axis_speed(first))
@@ -224,8 +224,8 @@ def removal_of(case: ReportedCase) -> RemovalOfCase | None:
     degrees = len(wears) - 1 if between else math.inf
     coefficient, rate = predict(removal, action, density, degrees)
     facets = _facets(wears, coefficient.value * factor, rate)
-    own = facets[facets["immersed"]]
-    _, variation = depth_spread(own)
+    immersed = facets[facets["immersed"]]
+    _, variation = depth_spread(immersed)
     removed = facets["depth_m_s"] * facets["area_m2"]
     share = float(removed[facets["immersed"]].sum() / removed.sum())
     edges = wears[0].edges
@@ -240,8 +240,8 @@ def removal_of(case: ReportedCase) -> RemovalOfCase | None:
             speed_factor=first.fidelity.speed_factor,
             corrected=load.corrected and not removal.laws[-1].impact,
         ),
-        impact_share=_over_packings([one.impact_share for one in wears]),
-        depth_um_h=rate.times(UM_PER_H * share / float(own["area_m2"].sum())),
+        impact_share=_over_packings([wear.impact_share for wear in wears]),
+        depth_um_h=rate.times(UM_PER_H * share / float(immersed["area_m2"].sum())),
         mass_mg_h=rate.times(UM_PER_H * density),
         coefficient_m2_n=coefficient,
         variation=variation,
@@ -260,8 +260,8 @@ def depth_spread(facets: pd.DataFrame) -> tuple[float, tuple[float, float]]:
 
 def _facets(wears: Sequence[Wear], scale: float, rate: Parted) -> pd.DataFrame:
     """The map of the depth of removal per time; see `RemovalOfCase` and `edge_rows`."""
-    found = [np.array([one.patch_w_m2, one.patch_se_w_m2]) for one in wears]
-    densities, errors = scale * np.swapaxes(found, 0, 1)
+    maps = [np.array([wear.patch_w_m2, wear.patch_se_w_m2]) for wear in wears]
+    densities, errors = scale * np.swapaxes(maps, 0, 1)
     mean, error, degrees = patch_means(densities, errors)
     half = joined_half_width(
         student_quantile(degrees) * error,
@@ -281,7 +281,7 @@ def _facets(wears: Sequence[Wear], scale: float, rate: Parted) -> pd.DataFrame:
 
 
 def _over_packings(values: Sequence[Estimate]) -> Estimate:
-    return values[0] if len(values) == 1 else mean_of([one.value for one in values])
+    return values[0] if len(values) == 1 else mean_of([value.value for value in values])
 
 
 def edge_rows(
@@ -295,43 +295,49 @@ def edge_rows(
     upper limit: its interval starts at zero. `scale` is the removed volume per action, m2/N, and
     the uncertainty of the coefficient that of `rate`.
     """
-    bands = [one.edges for one in wears if one.edges]
+    bands = [wear.edges for wear in wears if wear.edges]
     if not bands:
         return []
     edges, degrees = bands[0], len(bands) - 1 or math.inf
 
     def removed(columns: str, band: int, per: float) -> Estimate | None:
-        own = _over_packings([getattr(one, columns).at(band) for one in bands])
-        if not per or math.isnan(own.value):
+        action = _over_packings([getattr(edges, columns).at(band) for edges in bands])
+        if not per or math.isnan(action.value):
             return None
-        known = abs(own.value) * rate.coefficient
-        half = joined_half_width(own.half_width, known, degrees, rate.coefficient_degrees)
-        return Estimate.around(own.value, float(half)).over(per / scale)
+        known = abs(action.value) * rate.coefficient
+        half = joined_half_width(action.half_width, known, degrees, rate.coefficient_degrees)
+        return Estimate.around(action.value, float(half)).over(per / scale)
 
     lacks = 1 / math.tan(edges.angle_rad / 2) - (math.pi - edges.angle_rad) / 2
     rows = list[tuple[str, Estimate | None, Estimate | None]]()
     for band, (near, far) in enumerate(pairwise(edges.distance_m[:-1])):
         depth = removed("action_w", band, edges.area_m2[band] / UM_PER_H)
         square = removed("excess_w", band, edges.length_m * lacks / _ROUNDED_S)
-        radius = square.mapped(lambda one: 1e6 * math.sqrt(max(one, 0.0))) if square else None
+        radius = square.mapped(lambda size: 1e6 * math.sqrt(max(size, 0.0))) if square else None
         rows.append((f"{1e3 * near:.2g} to {1e3 * far:.2g}", depth, radius))
     return rows
 
 
+def _touches(case: ReportedCase) -> list[TouchesOfRun]:
+    """The first touches of the packings that have some."""
+    wears = (study.wear for study in case.studies)
+    return [wear.touches for wear in wears if wear and wear.touches]
+
+
 def touches_per_s(case: ReportedCase) -> tuple[int, Estimate]:
     """Number of first touches in all packings, and their mean rate, 1/s."""
-    found = [one.wear.touches for one in case.studies if one.wear and one.wear.touches]
-    rates = [one.per_s for one in found]
-    rate = rates[0] if len(rates) == 1 else mean_of([one.value for one in rates])
-    return sum(one.events for one in found), rate
+    packings = _touches(case)
+    rates = [touches.per_s for touches in packings]
+    rate = rates[0] if len(rates) == 1 else mean_of([rate.value for rate in rates])
+    return sum(touches.events for touches in packings), rate
 
 
 def touch_rows(case: ReportedCase) -> list[tuple[str, Estimate, Estimate]]:
     """Median and 95th percentile over the first touches, means over packings, in report units."""
-    found = [one.wear.touches.quantities for one in case.studies if one.wear and one.wear.touches]
+    packings = [touches.quantities for touches in _touches(case)]
     rows = list[tuple[str, Estimate, Estimate]]()
-    for name, (label, factor) in TOUCH_QUANTITIES.items() if found else ():
-        p50, p95 = (mean_of([factor * getattr(one[name], end) for one in found])
+    for name, (label, factor) in TOUCH_QUANTITIES.items() if packings else ():
+        p50, p95 = (mean_of([factor * getattr(quantiles[name], end) for quantiles in packings])
                     for end in ("p50", "p95"))  # fmt: skip
         rows.append((label, p50, p95))
     return rows

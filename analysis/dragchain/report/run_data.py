@@ -152,7 +152,7 @@ def process_findings(run: RunData) -> ProcessFindings:
     samples = read_counted(run.folder, ("step", "time_s", "drag_n"))
     frame, frames, contacts = whole = _workpiece_contacts(run, samples)
     at, _, loads = _workpiece_contacts(run, samples, SPHERES) if run.case.bodies else whole
-    names = [one.name for one in run.case.classes]
+    names = [kind.name for kind in run.case.classes]
     depth, force = (contacts[name].to_numpy(np.float64) for name in ("depth_m", "normal_force_n"))
     load, azimuth = (loads[name].to_numpy(np.float64) for name in ("normal_force_n", "azimuth_rad"))
     edges, around = azimuth_profile(at, frames, azimuth, load)
@@ -180,8 +180,8 @@ def process_findings(run: RunData) -> ProcessFindings:
         wake=_wake(samples, run.case),
         segregation=_segregation(run) if names else {},
         by_class={
-            name: one._replace(load_fraction=part.load_fraction)
-            for (name, one), part in zip(
+            name: kind._replace(load_fraction=part.load_fraction)
+            for (name, kind), part in zip(
                 of_classes(names, frame, frames, contacts).items(),
                 of_classes(names, at, frames, loads).values(),
                 strict=True,
@@ -208,17 +208,17 @@ def of_classes(
         ``class`` and ``normal_force_n`` of c contacts.
     """
     force = contacts["normal_force_n"].to_numpy(np.float64)[:, None]
-    own = (contacts["class"].to_numpy()[:, None] == np.array(names)) * (force != 0.0).astype(float)
-    load = own * force
+    hits = (contacts["class"].to_numpy()[:, None] == np.array(names)) * (force != 0.0).astype(float)
+    load = hits * force
 
     def statistic(sums: Floats) -> Floats:
         count, force = np.split(sums, 2, axis=-1)
         part = force / force.sum(axis=-1, keepdims=True)
         return np.concatenate([count, force / count, part], axis=-1)
 
-    found = estimates(frame_sums(frame, frames, np.hstack([own, load])), statistic)
-    each = (found[at :: len(names)] for at in range(len(names)))
-    return {name: OfClass(*one) for name, one in zip(names, each, strict=True)}
+    measures = estimates(frame_sums(frame, frames, np.hstack([hits, load])), statistic)
+    parts = (measures[at :: len(names)] for at in range(len(names)))
+    return {name: OfClass(*part_of_class) for name, part_of_class in zip(names, parts, strict=True)}
 
 
 def _segregation(run: RunData) -> dict[str, tuple[float, float]]:

@@ -40,7 +40,7 @@ from dragdeck.records.run import figures_of
 _DEPTH = "depth below the surface (mm)"
 
 
-def forces_panel(axes: Axes, run: RunData, found: ProcessFindings) -> None:
+def forces_panel(axes: Axes, run: RunData, findings: ProcessFindings) -> None:
     """Drag and lateral force over process time with the mean drag, as Uhlmann et al. (2015)."""
     trace, mean = run.drag, run.quantities["drag_mean"]
     time_s = trace.process_time_s
@@ -60,20 +60,20 @@ def forces_panel(axes: Axes, run: RunData, found: ProcessFindings) -> None:
     axes.set(xlabel="process time (s)", ylabel="force on the workpiece (N)", xlim=(0, time_s[-1]))
 
 
-def published_mean(axes: Axes, one: ReferenceDrag) -> None:
+def published_mean(axes: Axes, published: ReferenceDrag) -> None:
     """A published mean, dashed over what was drawn before it, with its standard deviation."""
-    colour, text = COLOURS[one.label], f"{one.label} mean {one.mean_n:.2f} N"
-    if one.std_n is not None:
-        text += f" ± {one.std_n:.2f} N"
-        ends = one.mean_n - one.std_n, one.mean_n + one.std_n
+    colour, text = COLOURS[published.label], f"{published.label} mean {published.mean_n:.2f} N"
+    if published.std_n is not None:
+        text += f" ± {published.std_n:.2f} N"
+        ends = published.mean_n - published.std_n, published.mean_n + published.std_n
         axes.axhspan(*ends, color=colour, alpha=0.12, lw=0, zorder=0.5)
-    text += f" ({one.source})" if one.source else ""
-    axes.axhline(one.mean_n, ls="--", lw=1.8, color=colour, label=text)
+    text += f" ({published.source})" if published.source else ""
+    axes.axhline(published.mean_n, ls="--", lw=1.8, color=colour, label=text)
 
 
-def peaks_panel(axes: Axes, run: RunData, found: ProcessFindings) -> None:
+def peaks_panel(axes: Axes, run: RunData, findings: ProcessFindings) -> None:
     """Magnitude of the drag over process time with its peaks."""
-    trace, peaks, counted = run.drag, found.peaks, run.drag.counted
+    trace, peaks, counted = run.drag, findings.peaks, run.drag.counted
     axes.plot(
         trace.process_time_s[counted], -trace.drag_n[counted], color=COLOURS["drag"], linewidth=0.8
     )
@@ -81,7 +81,7 @@ def peaks_panel(axes: Axes, run: RunData, found: ProcessFindings) -> None:
     axes.set(ylabel="drag force\n(magnitude, N)")
 
 
-def bottlenecks_panel(axes: Axes, run: RunData, found: ProcessFindings) -> None:
+def bottlenecks_panel(axes: Axes, run: RunData, findings: ProcessFindings) -> None:
     """Bottleneck of the dominant workpiece path over process time."""
     frame_s = process_time(run.network["time_s"].to_numpy(np.float64), run.case)
     axes.plot(frame_s, run.bottlenecks_n, ".-", color=COLOURS["dominant_path"])
@@ -89,31 +89,31 @@ def bottlenecks_panel(axes: Axes, run: RunData, found: ProcessFindings) -> None:
     axes.set_ylim(bottom=0)
 
 
-def peak_times(axes: Axes, found: ProcessFindings) -> None:
+def peak_times(axes: Axes, findings: ProcessFindings) -> None:
     """A line at the time of each peak of the drag."""
-    for moment in found.peaks.process_time_s:
+    for moment in findings.peaks.process_time_s:
         axes.axvline(moment, color=COLOURS["peak"], linewidth=0.7, linestyle=":")
 
 
-def force_depth_panel(axes: Axes, found: ProcessFindings) -> None:
+def force_depth_panel(axes: Axes, findings: ProcessFindings) -> None:
     """Mean normal force of a contact in bins of depth."""
-    depth_bars(axes, found.depth.edges_m, found.depth.contact_n)
+    depth_bars(axes, findings.depth.edges_m, findings.depth.contact_n)
     axes.set(xlabel="mean normal force per contact (N)", ylabel=_DEPTH)
 
 
-def load_depth_panel(axes: Axes, found: ProcessFindings) -> None:
+def load_depth_panel(axes: Axes, findings: ProcessFindings) -> None:
     """Sum of the normal forces per depth in bins of depth."""
-    depth_bars(axes, found.depth.edges_m, found.depth.line_load_n_per_m, 1e-3)
+    depth_bars(axes, findings.depth.edges_m, findings.depth.line_load_n_per_m, 1e-3)
     axes.set(xlabel="total normal force per depth (N/mm)", ylabel=_DEPTH)
 
 
 # --- process -------------------------------------------------------------------------------------
 
 
-def forces(run: RunData, found: ProcessFindings) -> Figure:
+def forces(run: RunData, findings: ProcessFindings) -> Figure:
     """Drag and lateral force over process time, as Fig. 4a of Uhlmann et al. (2015)."""
     figure, (axes,) = new_panels(3.6)
-    forces_panel(axes, run, found)
+    forces_panel(axes, run, findings)
     mean, std = (run.quantities[f"drag_{name}"] for name in ("mean", "std"))
     doubt = "" if mean.reliable else ": too short for a reliable interval"
     axes.set_title(f"drag {mean.value:.2f} ± {std.value:.2f} N (± standard deviation){doubt}")
@@ -124,11 +124,11 @@ def _doubt(estimate: Estimate) -> str:
     return "" if estimate.reliable else " (too few)"
 
 
-def force_around_workpiece(run: RunData, found: ProcessFindings) -> Figure:
+def force_around_workpiece(run: RunData, findings: ProcessFindings) -> Figure:
     """Mean normal force by azimuth, ahead up."""
-    edges, sums = found.azimuth.edges_rad, found.ahead_behind
+    edges, sums = findings.azimuth.edges_rad, findings.ahead_behind
     figure = new_figure(4.6, HALF_IN)
-    compass_bars(compass(figure), edges, found.azimuth.force_n)
+    compass_bars(compass(figure), edges, findings.azimuth.force_n)
     head(
         figure,
         "normal force on the workpiece by azimuth from the direction of\n"
@@ -148,36 +148,36 @@ def _ratio(ratio: Estimate | None) -> str:
     return f"ratio {ratio.value:.1f} (95 % CI {ends}){_doubt(ratio)}"
 
 
-def force_depth(run: RunData, found: ProcessFindings) -> Figure:
+def force_depth(run: RunData, findings: ProcessFindings) -> Figure:
     """The normal force of a contact, and of all contacts together, against depth."""
-    slope = found.depth.slope_n_per_m.over(1e3)
+    slope = findings.depth.slope_n_per_m.over(1e3)
     figure, (left, right) = new_panels(3.3, 2, HALF_IN, sharey=True)
-    force_depth_panel(left, found)
+    force_depth_panel(left, findings)
     interval = f"95 % CI {slope.ci95_low:.4f} to {slope.ci95_high:.4f}"
     left.set_title(f"slope {slope.value:.4f} N/mm\n({interval}){_doubt(slope)}")
-    load_depth_panel(right, found)
+    load_depth_panel(right, findings)
     right.set(ylabel="", title="deepest bin includes the contacts\non edge and end face")
     return figure
 
 
-def chains_peaks(run: RunData, found: ProcessFindings) -> Figure:
+def chains_peaks(run: RunData, findings: ProcessFindings) -> Figure:
     """Resistance with its peaks over the bottleneck of the dominant workpiece path."""
-    peaks = found.peaks
+    peaks = findings.peaks
     figure, (upper, lower) = new_panels(3.8, 2, HALF_IN, 1, sharex=True)
-    peaks_panel(upper, run, found)
+    peaks_panel(upper, run, findings)
     upper.set_title(f"{peaks.count} peaks (marked), at least {peaks.separation_s:.2f} s apart")
-    bottlenecks_panel(lower, run, found)
+    bottlenecks_panel(lower, run, findings)
     for axes in (upper, lower):
-        peak_times(axes, found)
+        peak_times(axes, findings)
     return figure
 
 
-def network_xy(run: RunData, found: ProcessFindings) -> Figure:
+def network_xy(run: RunData, findings: ProcessFindings) -> Figure:
     """The contact network from above."""
     return _network(run, "xy", "from above")
 
 
-def network_xz(run: RunData, found: ProcessFindings) -> Figure:
+def network_xz(run: RunData, findings: ProcessFindings) -> Figure:
     """The contact network from the side."""
     return _network(run, "xz", "from the side")
 
@@ -230,7 +230,7 @@ def energy_ratio(energy_j: Floats, particles: Floats, case: CaseOfRun) -> Floats
     return np.asarray(energy_j / particles / (mass * case.gravity_m_s2 * 2.0 * radius))
 
 
-def filling(run: RunData, found: FillingFindings) -> Figure | None:
+def filling(run: RunData, findings: FillingFindings) -> Figure | None:
     """Energy ratio over time, with the level below which the bed is at rest; needs thermo."""
     if not (run.folder / "tables" / "thermo.parquet").is_file():
         return None
@@ -240,7 +240,7 @@ def filling(run: RunData, found: FillingFindings) -> Figure | None:
     ratio = energy_ratio(energy, table["n_particles"].to_numpy(np.float64), run.case)
     figure, (axes,) = new_panels(3.2, width_in=HALF_IN)
     axes.semilogy(table["time_s"], ratio, color=BLUE)
-    rest, bed = found.rest_energy_ratio, found.bed
+    rest, bed = findings.rest_energy_ratio, findings.bed
     if rest is not None:
         axes.axhline(rest, color=RED, linestyle="--", label=f"settling criterion: {rest:g}")
         axes.legend(loc="upper right")
@@ -252,14 +252,14 @@ def filling(run: RunData, found: FillingFindings) -> Figure | None:
     return figure
 
 
-def drop_test(run: RunData, found: DropFindings) -> Figure:
+def drop_test(run: RunData, findings: DropFindings) -> Figure:
     """Force and speed over time of each impact."""
     blocks = list(run.prints("impacts"))
     time_s, speed_m_s, force_n = (
         np.concatenate([np.asarray(block[name], dtype=np.float64) for block in blocks])
         for name in ("time_s", "vz_m_s", "force_n")
     )
-    impacts, ratio = run.table("impacts"), found.restitution
+    impacts, ratio = run.table("impacts"), findings.restitution
     figure, panels = new_panels(3.2, len(impacts), HALF_IN, sharey=True)
     limit = 1.1 * float(np.abs(speed_m_s).max())
     for axes, impact in zip(panels, impacts.to_dict("records"), strict=True):

@@ -47,9 +47,9 @@ def summary_workbook(
         The assumptions of each run, by its name.
     """
     assumed = [
-        {"run": run, "field": one.field, "value": json.dumps(one.value), "reason": one.why}
-        for run, found in assumptions.items()
-        for one in found
+        {"run": run, "field": row.field, "value": json.dumps(row.value), "reason": row.why}
+        for run, rows in assumptions.items()
+        for row in rows
     ]
     assumption_sheet = pd.DataFrame(assumed, columns=["run", "field", "value", "reason"])
     return workbook(

@@ -107,10 +107,10 @@ def missing_run(run_dir: Path, error: DragdeckError) -> MissingRun:
 
 def _reason(run_dir: Path, error: DragdeckError) -> tuple[str, str]:
     for step in _STEPS:
-        if step == "run" and (found := _of_records(run_dir)):
-            return found
-        if found := _of_log(run_dir / "logs" / f"{step}.log"):
-            return found
+        if step == "run" and (reason := _of_records(run_dir)):
+            return reason
+        if reason := _of_log(run_dir / "logs" / f"{step}.log"):
+            return reason
     if not (run_dir / "case.json").is_file():
         return "not run, since a run before it has no result", "see that run"
     return _split(str(error))
@@ -120,8 +120,8 @@ def _of_records(run_dir: Path) -> tuple[str, str] | None:
     """What is recorded of a run that did not come to its end, or failed a check."""
     for name in ("state.json", "run.json"):
         with suppress(DragdeckError):
-            if found := _of_record(RunRecord.read(run_dir / name)):
-                return found
+            if reason := _of_record(RunRecord.read(run_dir / name)):
+                return reason
     return None
 
 
@@ -214,8 +214,8 @@ def write_study_report(
         studies = [section.study for section in sections]
         table = summary(studies)
         cases = cases_of(studies)
-        removed = [(one, *found) for one in cases if (found := _removed(one))]
-        rough = {one.key: course for one, of, _ in removed if (course := roughness_of(one, of))}
+        removed = [(case, *removal) for case in cases if (removal := _removed(case))]
+        rough = {case.key: course for case, of, _ in removed if (course := roughness_of(case, of))}
         signals = _signals(cases, signal)
         picture = file_uri(preview) if preview else None
         page = _render(sections, cases, missing, picture, removed, rough, signals)
@@ -225,8 +225,8 @@ def write_study_report(
         for section, name in zip(sections, _network_pages(sections), strict=True):
             if section.network is not None:
                 write_bytes(out_dir / name, section.network.read_bytes())
-        assumed = {one.study.process.case.run: one.assumptions for one in sections}
-        maps = {f"{one.key}-removal": found.facets for one, found, _ in removed}
+        assumed = {section.study.process.case.run: section.assumptions for section in sections}
+        maps = {f"{case.key}-removal": removal.facets for case, removal, _ in removed}
         for key, course in rough.items():
             maps[f"{key}-removal"] = maps[f"{key}-removal"].join(course.ra)
         write_bundle(
@@ -323,41 +323,45 @@ def _render(
         captions=FIGURES,
         runs=runs,
         checks=[(run, check) for run in runs for check in run.record.checks],
-        compared=[(one, row) for one in cases for row in one.values.against],
-        signals=[(one, data_uri(one.picture()) if one.differences else None) for one in signals],
+        compared=[(case, row) for case in cases for row in case.values.against],
+        signals=[
+            (case, data_uri(case.picture()) if case.differences else None) for case in signals
+        ],
         overview=_overview(cases) if len(cases) > 1 else None,
         shown=_SHOWN,
-        asked=[(one, answer) for one in cases for answer in answers(one)],
+        asked=[(case, answer) for case in cases for answer in answers(case)],
         removed=removed,
-        rough=[(one, of, _ra_map(one, of)) for one in cases if (of := rough.get(one.key))],
+        rough=[(case, of, _ra_map(case, of)) for case in cases if (of := rough.get(case.key))],
         largest_error=LARGEST_ERROR,
-        touched=[(one, rows, *touches_per_s(one)) for one in cases if (rows := touch_rows(one))],
+        touched=[
+            (case, rows, *touches_per_s(case)) for case in cases if (rows := touch_rows(case))
+        ],
     )
 
 
-def _removed(one: ReportedCase) -> tuple[RemovalOfCase, str] | None:
+def _removed(case: ReportedCase) -> tuple[RemovalOfCase, str] | None:
     """The removal of a case and its map as a picture, None if its study has no law."""
-    found = removal_of(one)
-    if found is None:
+    removal = removal_of(case)
+    if removal is None:
         return None
     label = "depth of removal (µm/h), mean over areas of a particle's radius"
-    title = f"{one.name}: depth of removal by {found.removal.law}"
-    depth = found.facets["depth_m_s"].to_numpy(np.float64)
-    return found, _surface_map(one, UM_PER_H * depth, label, title)
+    title = f"{case.name}: depth of removal by {removal.removal.law}"
+    depth = removal.facets["depth_m_s"].to_numpy(np.float64)
+    return removal, _surface_map(case, UM_PER_H * depth, label, title)
 
 
-def _ra_map(one: ReportedCase, found: RoughnessOfCase) -> str:
+def _ra_map(case: ReportedCase, roughness: RoughnessOfCase) -> str:
     """The map of the roughness of a case as a picture."""
-    title = f"{one.name}: roughness after {found.map_minutes:.3g} min"
-    return _surface_map(one, 1e6 * found.ra["ra_m"].to_numpy(np.float64), "Ra (µm)", title)
+    title = f"{case.name}: roughness after {roughness.map_minutes:.3g} min"
+    return _surface_map(case, 1e6 * roughness.ra["ra_m"].to_numpy(np.float64), "Ra (µm)", title)
 
 
-def _surface_map(one: ReportedCase, values: Floats, label: str, title: str) -> str:
+def _surface_map(case: ReportedCase, values: Floats, label: str, title: str) -> str:
     """Values of the facets of a case as a picture."""
     from dragchain.figures.style import drawing, png
     from dragchain.loading.figure import surface_figure
 
-    run = one.first.process
+    run = case.first.process
     with drawing():
         surface = read_surface(run.folder, run.case)
         return data_uri(png(surface_figure(run.case, surface, values, label, title)))
@@ -388,8 +392,8 @@ def _signals(cases: Sequence[ReportedCase], file: Path | None) -> list["SignalCo
 
 def _tables(signals: Sequence["SignalComparison"]) -> dict[str, pd.DataFrame]:
     """The comparison with a measured signal, if there is one."""
-    found = [one.table() for one in signals if one.differences]
-    return {"signal": pd.concat(found, ignore_index=True)} if found else {}
+    tables = [signal.table() for signal in signals if signal.differences]
+    return {"signal": pd.concat(tables, ignore_index=True)} if tables else {}
 
 
 def _overview(cases: Sequence[ReportedCase]) -> str:
@@ -397,11 +401,11 @@ def _overview(cases: Sequence[ReportedCase]) -> str:
     from dragchain.figures.style import drawing, png
     from dragchain.report.run_figures import drag_of_cases
 
-    rows = [row for one in cases for row in one.values.against]
+    rows = [row for case in cases for row in case.values.against]
     with drawing():
         figure = drag_of_cases(
-            [one.name for one in cases],
-            [one.values.drag.shown for one in cases],
+            [case.name for case in cases],
+            [case.values.drag.shown for case in cases],
             list(dict.fromkeys((row.reference.label, row.reference.mean_n) for row in rows)),
         )
         return data_uri(png(figure))

@@ -33,7 +33,7 @@ def summary(studies: Sequence[StudyRuns]) -> pd.DataFrame:
 def _summary_row(study: StudyRuns, headline: str) -> Row:
     """The row of a process run."""
     values = study.values
-    case, found, record = study.process.case, study.process.findings, study.process.record
+    case, findings, record = study.process.case, study.process.findings, study.process.record
     return {
         "study": case.study_name,
         "case": case.case,
@@ -53,10 +53,10 @@ def _summary_row(study: StudyRuns, headline: str) -> Row:
         **_comparisons(values.against),
         **_of_run(values.standings),
         **_asked(study),
-        "peak_max_n": found.peaks.largest_n,
-        **_wake(found),
-        **_network(found),
-        **_chains(found),
+        "peak_max_n": findings.peaks.largest_n,
+        **_wake(findings),
+        **_network(findings),
+        **_chains(findings),
         **_upstream(study),
         **_corrected(values.standings),
     }
@@ -112,7 +112,7 @@ def _corrected(standings: Sequence[Standing]) -> Row:
 def _asked(study: StudyRuns) -> Row:
     """What the settings were chosen for, their forecast cost, and what windows reached."""
     asked = study.process.case.asked
-    found = study.extrapolated.tolerance if study.extrapolated else None
+    reached = study.extrapolated.tolerance if study.extrapolated else None
     row: Row = {}
     if asked is not None:
         row |= {
@@ -121,28 +121,28 @@ def _asked(study: StudyRuns) -> Row:
             "forecast_cost": asked.relative_cost,
             "forecast_largest_cost": asked.largest_cost,
         }
-    if found is not None:
-        row |= {"windows": len(found.runs), "tolerance_reached": found.reached}
+    if reached is not None:
+        row |= {"windows": len(reached.runs), "tolerance_reached": reached.reached}
     return row
 
 
-def _wake(found: ProcessFindings) -> Row:
-    if found.wake is None:
+def _wake(findings: ProcessFindings) -> Row:
+    if findings.wake is None:
         return {}
     return {
-        "drag_fresh_mean_n": found.wake.fresh_n.mean,
-        "drag_in_wake_mean_n": found.wake.wake_n.mean,
-        **_interval("drag_wake_ratio", "", found.wake.ratio),
+        "drag_fresh_mean_n": findings.wake.fresh_n.mean,
+        "drag_in_wake_mean_n": findings.wake.wake_n.mean,
+        **_interval("drag_wake_ratio", "", findings.wake.ratio),
     }
 
 
-def _network(found: ProcessFindings) -> Row:
+def _network(findings: ProcessFindings) -> Row:
     return {
-        "network_frames": found.network_frames,
-        "rattler_fraction": found.rattler_fraction,
-        "ahead_mean_n": found.ahead_behind.ahead_n.value,
-        "behind_mean_n": found.ahead_behind.behind_n.value,
-        **_interval("depth_slope", "N/m", found.depth.slope_n_per_m),
+        "network_frames": findings.network_frames,
+        "rattler_fraction": findings.rattler_fraction,
+        "ahead_mean_n": findings.ahead_behind.ahead_n.value,
+        "behind_mean_n": findings.ahead_behind.behind_n.value,
+        **_interval("depth_slope", "N/m", findings.depth.slope_n_per_m),
     }
 
 
@@ -152,8 +152,8 @@ _OF_CHAINS = (
 )
 
 
-def _chains(found: ProcessFindings) -> Row:
-    return {name: getattr(found.chains, name) for name in _OF_CHAINS}
+def _chains(findings: ProcessFindings) -> Row:
+    return {name: getattr(findings.chains, name) for name in _OF_CHAINS}
 
 
 def _upstream(study: StudyRuns) -> Row:

@@ -41,35 +41,35 @@ class Values:
 
     def of(self, name: str) -> Standing | None:
         """A quantity by its name, None if the run does not give it."""
-        return next((one for one in self.standings if one.quantity.name == name), None)
+        return next((value for value in self.standings if value.quantity.name == name), None)
 
     @property
     def drag(self) -> Standing:
         """The mean drag."""
-        found = self.of("drag_mean")
-        assert found is not None
-        return found
+        standing = self.of("drag_mean")
+        assert standing is not None
+        return standing
 
     @property
     def contacts(self) -> Estimate | None:
         """Contacts on the workpiece at a time, None if they are not known."""
-        found = self.of("workpiece_contacts")
-        return found.value if found else None
+        standing = self.of("workpiece_contacts")
+        return standing.value if standing else None
 
     @property
     def adjusted(self) -> bool:
         """Whether any value differs from the run's, or is missing."""
-        return any(one.value != one.run for one in self.standings)
+        return any(standing.value != standing.run for standing in self.standings)
 
     @property
     def corrected(self) -> bool:
         """Whether any value is from windows at the physical Young's modulus."""
-        return any(one.corrected for one in self.standings)
+        return any(standing.corrected for standing in self.standings)
 
     @property
     def estimated(self) -> bool:
         """Whether other scenes suggest any value at the physical Young's modulus."""
-        return any(one.estimated for one in self.standings)
+        return any(standing.estimated for standing in self.standings)
 
     @cached_property
     def notes(self) -> list[str]:
@@ -80,14 +80,14 @@ class Values:
     def against(self) -> list[Against]:
         """The mean drag beside the published ones."""
         return [
-            Against(one, one.difference(self.drag.shown))
-            for one in reference_drags(study_of(self.case).reference)
+            Against(reference, reference.difference(self.drag.shown))
+            for reference in reference_drags(study_of(self.case).reference)
         ]
 
     def headline(self) -> str:
         """The main numbers in one line of plain text."""
         shown = (self.drag, self.of("workpiece_contacts"))
-        numbers = [_plain(one) for one in shown if one]
+        numbers = [_plain(standing) for standing in shown if standing]
         return "; ".join(filter(None, [*numbers, changed_in_words(self.case.changed_scripts)]))
 
 
@@ -122,23 +122,23 @@ def _correction(value: Estimate, name: str, extrapolated: Extrapolated | None) -
     return Correction(extrapolated.values[name].over(value.value), windows)
 
 
-def values_over_packings(several: Sequence[Values]) -> Values:
+def values_over_packings(packings: Sequence[Values]) -> Values:
     """The means over the packings of one case, each with Student's t interval between them.
 
     That of a value from windows joins those of the single runs, each of which includes the scatter
     from packing to packing.
     """
-    first = several[0]
-    if len(several) == 1:
+    first = packings[0]
+    if len(packings) == 1:
         return first
-    found = []
+    standings = []
     for standing in first.standings:
-        same = [one for each in several if (one := each.of(standing.quantity.name))]
-        run = mean_of([one.run.value for one in same])
-        value = _common([one.value for one in same if one.value], standing.basis)
-        windows = sum(one.windows for one in same)
-        found.append(replace(standing, run=run, value=value, windows=windows))
-    return Values(first.case, tuple(found), len(several))
+        same = [other for values in packings if (other := values.of(standing.quantity.name))]
+        run = mean_of([other.run.value for other in same])
+        value = _common([other.value for other in same if other.value], standing.basis)
+        windows = sum(other.windows for other in same)
+        standings.append(replace(standing, run=run, value=value, windows=windows))
+    return Values(first.case, tuple(standings), len(packings))
 
 
 def _common(values: Sequence[Estimate], basis: Basis) -> Estimate | None:
@@ -146,13 +146,13 @@ def _common(values: Sequence[Estimate], basis: Basis) -> Estimate | None:
         return None
     if basis is Basis.WINDOWS:
         return mean_over_packings(values)
-    return mean_of([one.value for one in values])
+    return mean_of([estimate.value for estimate in values])
 
 
 def mean_over_packings(values: Sequence[Estimate]) -> Estimate:
     """The mean of values whose intervals include the scatter between packings."""
-    mean = math.fsum(one.value for one in values) / len(values)
-    half = math.hypot(*(one.half_width for one in values))
+    mean = math.fsum(estimate.value for estimate in values) / len(values)
+    half = math.hypot(*(estimate.half_width for estimate in values))
     return Estimate.around(mean, half / len(values))
 
 
@@ -174,17 +174,17 @@ def _of_packings(values: Values) -> Iterator[str]:
         )
 
 
-def _plain(one: Standing) -> str:
+def _plain(value: Standing) -> str:
     """Name and value with interval and, where it differs, that of the run."""
-    name, unit, found = one.quantity.label, f" {one.quantity.unit}".rstrip(), one.shown
-    what = one.reason.partition(":")[0]
-    doubt = "" if one.reliable or one.corrected else ", too short for a reliable interval"
-    ends = f"95 % CI {found.ci95_low:#.3g} to {found.ci95_high:#.3g}{unit}{doubt}"
-    text = f"{name} {found.value:#.3g}{unit}" + (f" ({ends})" if found.known else "")
-    if one.corrected:
-        return f"{text} {one.rests_on}, {one.run.value:#.3g}{unit} as simulated"
+    name, unit, shown = value.quantity.label, f" {value.quantity.unit}".rstrip(), value.shown
+    what = value.reason.partition(":")[0]
+    doubt = "" if value.reliable or value.corrected else ", too short for a reliable interval"
+    ends = f"95 % CI {shown.ci95_low:#.3g} to {shown.ci95_high:#.3g}{unit}{doubt}"
+    text = f"{name} {shown.value:#.3g}{unit}" + (f" ({ends})" if shown.known else "")
+    if value.corrected:
+        return f"{text} {value.rests_on}, {value.run.value:#.3g}{unit} as simulated"
     estimated = ""
-    if one.estimated and one.other_scenes:
-        ends = f"{one.estimated.ci95_low:#.3g} to {one.estimated.ci95_high:#.3g}{unit}"
-        estimated = f"at the physical one {ends} by {one.other_scenes.scenes} other scenes"
-    return ", ".join(filter(None, (text, "" if one.value else "this run only", what, estimated)))
+    if value.estimated and value.other_scenes:
+        ends = f"{value.estimated.ci95_low:#.3g} to {value.estimated.ci95_high:#.3g}{unit}"
+        estimated = f"at the physical one {ends} by {value.other_scenes.scenes} other scenes"
+    return ", ".join(filter(None, (text, "" if value.value else "this run only", what, estimated)))

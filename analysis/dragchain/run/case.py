@@ -30,14 +30,14 @@ def study_of(case: CaseOfRun) -> Study:
 
 
 def changed_inputs(
-    own: Mapping[str, JsonValue], other: Mapping[str, JsonValue]
+    inputs: Mapping[str, JsonValue], other: Mapping[str, JsonValue]
 ) -> dict[str, JsonValue]:
     """Inputs of a run that differ from another's, by dotted name, with the run's own values.
 
     A study without an optional value may leave its name out or write null: both are None here.
     """
-    names = sorted({*own, *other})
-    return {name: own.get(name) for name in names if own.get(name) != other.get(name)}
+    names = sorted({*inputs, *other})
+    return {name: inputs.get(name) for name in names if inputs.get(name) != other.get(name)}
 
 
 def friction_with(case: CaseOfRun, body: str) -> FrictionLimit:
@@ -63,25 +63,25 @@ def friction_with(case: CaseOfRun, body: str) -> FrictionLimit:
         return FrictionLimit(
             case.contact_moduli[body].friction, case.attractive.get(body, {}), wall
         )
-    others = (body,) if wall else tuple(one.name for one in case.classes)
-    names = {name for one in case.classes for rows in one.attractive.values() for name in rows}
+    others = (body,) if wall else tuple(kind.name for kind in case.classes)
+    names = {name for kind in case.classes for rows in kind.attractive.values() for name in rows}
 
     def table(value: Callable[[ClassOfRun, str], float]) -> Floats:
-        found = np.array([[value(one, other) for other in others] for one in case.classes])
-        return found[:, 0] if wall else found
+        values = np.array([[value(kind, other) for other in others] for kind in case.classes])
+        return values[:, 0] if wall else values
 
     def of(name: str) -> Floats:
-        return table(lambda one, other: one.attractive.get(other, {}).get(name, 0.0))
+        return table(lambda kind, other: kind.attractive.get(other, {}).get(name, 0.0))
 
-    friction = table(lambda one, other: one.contact_moduli[other].friction)
-    spheres = {one.first_id: one.first_sphere for one in case.bodies}
-    first_ids = tuple(spheres.get(one.first_id, one.first_id) for one in case.classes)
+    friction = table(lambda kind, other: kind.contact_moduli[other].friction)
+    spheres = {kind.first_id: kind.first_sphere for kind in case.bodies}
+    first_ids = tuple(spheres.get(kind.first_id, kind.first_id) for kind in case.classes)
     return FrictionLimit(friction, {name: of(name) for name in names}, wall, first_ids)
 
 
 def attracts(case: CaseOfRun) -> bool:
     """Whether the contact law attracts particles to the workpiece."""
-    parts = [case.attractive, *(one.attractive for one in case.classes)]
+    parts = [case.attractive, *(kind.attractive for kind in case.classes)]
     return any("workpiece" in part for part in parts)
 
 

@@ -127,7 +127,7 @@ def motion_of(case: CaseOfRun) -> DrivenMotion:
     start, factor = drag_phase(case).start_step, case.fidelity.speed_factor
     driven = DrivenMotion.of(needed(case.study, "study").motion, case.timestep_s, factor, start)
     made = [driven.path_entry(), *driven.superposed_entries()], [entry, *case.superposed]
-    if not _alike(*([one.model_dump() for one in entries] for entries in made)):
+    if not _alike(*([motion.model_dump() for motion in entries] for entries in made)):
         raise TableError(
             f"{case.run}: case.json is of another version of dragdeck (motion and superposed do "
             "not follow from the study): render and run it again"
@@ -135,15 +135,15 @@ def motion_of(case: CaseOfRun) -> DrivenMotion:
     return driven
 
 
-def _alike(one: Any, other: Any) -> bool:
+def _alike(a: Any, b: Any) -> bool:
     """Whether plain data are the same, numbers up to rounding."""
-    if isinstance(one, float | int) and isinstance(other, float | int):
-        return math.isclose(one, other, rel_tol=1e-9, abs_tol=1e-12)
-    if isinstance(one, Mapping) and isinstance(other, Mapping):
-        return one.keys() == other.keys() and all(_alike(one[key], other[key]) for key in one)
-    if isinstance(one, list | tuple) and isinstance(other, list | tuple):
-        return len(one) == len(other) and all(map(_alike, one, other))
-    return bool(one == other)
+    if isinstance(a, float | int) and isinstance(b, float | int):
+        return math.isclose(a, b, rel_tol=1e-9, abs_tol=1e-12)
+    if isinstance(a, Mapping) and isinstance(b, Mapping):
+        return a.keys() == b.keys() and all(_alike(a[key], b[key]) for key in a)
+    if isinstance(a, list | tuple) and isinstance(b, list | tuple):
+        return len(a) == len(b) and all(map(_alike, a, b))
+    return bool(a == b)
 
 
 def directions(steps: Ints, ref_xy_m: Floats, case: CaseOfRun) -> Floats:

@@ -41,7 +41,7 @@ def reference_drags(reference: Reference | None) -> list[ReferenceDrag]:
     """
     if reference is None:
         return []
-    found = []
+    drags = []
     for label in ("experiment", "simulation"):
         drag = getattr(reference, label)
         if drag is None:
@@ -52,5 +52,5 @@ def reference_drags(reference: Reference | None) -> list[ReferenceDrag]:
             )
         mean_n, std_n = drag.drag_mean_n, drag.drag_std_n
         source = reference.source
-        found.append(ReferenceDrag(label=label, mean_n=mean_n, std_n=std_n, source=source))
-    return found
+        drags.append(ReferenceDrag(label=label, mean_n=mean_n, std_n=std_n, source=source))
+    return drags

@@ -39,8 +39,8 @@ def output_files(run_dir: Path | str, output: OutputOfRun) -> list[Path]:
     """
     before, after = output.pattern.split("{part}")
     name = re.compile(re.escape(before) + r"([1-9][0-9]*)" + re.escape(after))
-    found = [(name.fullmatch(file.name), file) for file in Path(run_dir).iterdir()]
-    parts = sorted((int(match.group(1)), file) for match, file in found if match)
+    matches = [(name.fullmatch(file.name), file) for file in Path(run_dir).iterdir()]
+    parts = sorted((int(match.group(1)), file) for match, file in matches if match)
     if not parts:
         raise DumpError(
             Path(run_dir) / output.pattern,
@@ -153,8 +153,8 @@ class _Schedule:
             wanted = self.next + period * np.arange(len(steps))
             wrong = steps != wanted
         if wrong.any():
-            found, missing = int(steps[wrong][0]), int(wanted[wrong][0])
-            self._fail(file, f"continues with step {found}", f"step {missing}")
+            step, missing = int(steps[wrong][0]), int(wanted[wrong][0])
+            self._fail(file, f"continues with step {step}", f"step {missing}")
         self.next = piece.last + period
 
     def finish(self) -> None:

@@ -139,7 +139,7 @@ def read_plan_runs(
     if not complete:
         raise TableError("no run of the trade-off is complete, so there is nothing to compare")
     arc = min(complete)
-    runs = [_run(setting, own, arc) for (setting, _), own in longest.items()]
+    runs = [_run(setting, measures, arc) for (setting, _), measures in longest.items()]
     return runs, _setting(standard, standard), arc
 
 
@@ -231,7 +231,7 @@ class QuantityComparison:
 
     def between(self, setting: Setting, base: Setting) -> ErrorEntry | None:
         """Difference of one setting to another; None if the runs cannot tell it."""
-        known = all(self.factors.tells(one.factors()) for one in (setting, base))
+        known = all(self.factors.tells(compared.factors()) for compared in (setting, base))
         return self._error(setting, base) if known else None
 
     def _error(self, setting: Setting, base: Setting) -> ErrorEntry:
@@ -252,13 +252,13 @@ def compare_quantity(
     SeriesError
         If too few runs have the quantity, or none at the reference does.
     """
-    rows = [(run, own) for run in runs for own in run.stretches if quantity.name in own]
+    rows = [(run, stretch) for run in runs for stretch in run.stretches if quantity.name in stretch]
     settings = [run.setting for run, _ in rows]
     if reference not in settings:
         raise SeriesError("no run at the reference settings has this quantity")
-    values = np.array([own[quantity.name] for _, own in rows])
+    values = np.array([stretch[quantity.name] for _, stretch in rows])
     if quantity.signed:
-        drags = [own["drag_mean"] for run, own in rows if run.setting == reference]
+        drags = [stretch["drag_mean"] for run, stretch in rows if run.setting == reference]
         scale = abs(float(np.mean(drags)))
         values = values / scale
     elif (values == 0.0).any() or len(set(np.sign(values))) > 1:

@@ -51,8 +51,8 @@ def draw_pareto(tradeoff: Tradeoff) -> Figure:
     for axes in panels[::3]:
         axes.set_ylabel("absolute error (%)")
     panels[0].set_ylim(bottom=0.8 * FLOOR)
-    own = {one.youngs_modulus_scale for one in settings}
-    _pareto_keys(panels[0], {level: shades[level] for level in shades if level in own}, marks)
+    drawn = {one.youngs_modulus_scale for one in settings}
+    _pareto_keys(panels[0], {level: shades[level] for level in shades if level in drawn}, marks)
     return legend_below(figure)
 
 

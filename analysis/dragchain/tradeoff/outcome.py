@@ -89,8 +89,8 @@ class Tradeoff:
 
     def settings(self) -> list[Setting]:
         """Every setting once, that with the most steps first."""
-        found = dict.fromkeys(run.setting for run in self.runs)
-        return sorted(found, key=lambda setting: -self.median(setting, "steps_per_m"))
+        settings = dict.fromkeys(run.setting for run in self.runs)
+        return sorted(settings, key=lambda setting: -self.median(setting, "steps_per_m"))
 
     def of(self, setting: Setting) -> list[PlanRun]:
         """The runs of a setting."""
@@ -128,14 +128,14 @@ def compare_settings(
     A quantity that cannot be compared, because too few runs have it, is left
     out with the reason.
     """
-    found: dict[str, QuantityComparison] = {}
+    known: dict[str, QuantityComparison] = {}
     skipped: dict[str, str] = {}
     for quantity in MEASURED:
         try:
-            found[quantity.name] = compare_quantity(quantity, runs, reference)
+            known[quantity.name] = compare_quantity(quantity, runs, reference)
         except SeriesError as error:
             skipped[quantity.name] = str(error)
-    return Tradeoff(list(runs), reference, arc_m, found, skipped, step_costs or {}, largest_step)
+    return Tradeoff(list(runs), reference, arc_m, known, skipped, step_costs or {}, largest_step)
 
 
 def breaks(tradeoff: Tradeoff, setting: Setting) -> bool:
@@ -148,14 +148,14 @@ def breaks(tradeoff: Tradeoff, setting: Setting) -> bool:
         return True
     comparison = tradeoff.comparisons.get("drag_mean")
     shorter = [
-        one
-        for one in tradeoff.settings()
-        if one.timestep_fraction < setting.timestep_fraction
-        and replace(one, timestep_fraction=setting.timestep_fraction) == setting
+        other
+        for other in tradeoff.settings()
+        if other.timestep_fraction < setting.timestep_fraction
+        and replace(other, timestep_fraction=setting.timestep_fraction) == setting
     ]
     if comparison is None or not shorter:
         return False
-    best = max(shorter, key=lambda one: len(tradeoff.of(one)))
+    best = max(shorter, key=lambda other: len(tradeoff.of(other)))
     change = comparison.between(setting, best)
     return change is not None and change.significant and abs(change.value) > BROKEN
 
@@ -165,8 +165,8 @@ def by_modulus(tradeoff: Tradeoff) -> list[Setting]:
     reference, nearest = tradeoff.reference.factors(), dict[float, Setting]()
 
     def unlike(setting: Setting) -> tuple[int, int]:
-        own = setting.factors()
-        return sum(own[name] != reference[name] for name in own), -len(tradeoff.of(setting))
+        factors = setting.factors()
+        return sum(factors[name] != reference[name] for name in factors), -len(tradeoff.of(setting))
 
     for setting in sorted(tradeoff.settings(), key=unlike):
         if not setting.other and any(run.complete for run in tradeoff.of(setting)):
@@ -270,12 +270,12 @@ def compare_drops(folders: Sequence[Path]) -> list[ComparedDrop]:
         If a folder holds another scene, or a run is not complete or has no table.
     """
     runs = sorted(map(_read_drop, folders), key=lambda run: run[0])
-    found = []
+    drops = []
     for fraction, inputs, ratios, cost_s in runs:
         _, standard, finest, finest_s = runs[0]
         changed = changed_inputs(inputs, standard).items()
         common = min(len(ratios), len(finest))
-        found.append(
+        drops.append(
             ComparedDrop(
                 timestep_fraction=fraction,
                 other=", ".join(f"{name} {value}" for name, value in changed),
@@ -285,7 +285,7 @@ def compare_drops(folders: Sequence[Path]) -> list[ComparedDrop]:
                 relative_cost=cost_s / finest_s,
             )
         )
-    return found
+    return drops
 
 
 def _read_drop(folder: Path) -> tuple[float, Mapping[str, JsonValue], Floats, float]:

@@ -135,13 +135,13 @@ def tradeoff_record(
     """The content of ``tradeoff.json``: when, with what and on what was measured, and what."""
     measures = [run.measures for run in tradeoff.runs]
     return TradeoffRecord(
-        measured=max(one.started for one in measures)[:10],
+        measured=max(run.started for run in measures)[:10],
         commands=tuple(commands),
         plan=plan,
-        study=_joined(one.study_name for one in measures),
+        study=_joined(run.study_name for run in measures),
         versions={
             **{
-                name: _joined(one.versions[name] for one in measures)
+                name: _joined(run.versions[name] for run in measures)
                 for name in ("dragdeck", "engine")
             },
             "python": platform.python_version(),
@@ -149,20 +149,20 @@ def tradeoff_record(
         },
         machine=Machine.here(),
         runs=len(measures),
-        engine_hours=sum(one.cost.cpu_time_s for one in measures) / 3600.0,
+        engine_hours=sum(run.cost.cpu_time_s for run in measures) / 3600.0,
         scene=_scene_numbers(tradeoff),
         reference=FidelityParameters(**tradeoff.reference.parameters()),
         quantities={
             name: QuantityEntry(
-                label=own.quantity.label,
-                unit=own.quantity.unit,
-                signed=own.quantity.signed,
-                reference=own.reference,
-                se=own.se,
-                run_std=own.fit.residual_std,
+                label=comparison.quantity.label,
+                unit=comparison.quantity.unit,
+                signed=comparison.quantity.signed,
+                reference=comparison.reference,
+                se=comparison.se,
+                run_std=comparison.fit.residual_std,
                 arc_m=tradeoff.arc_m,
             )
-            for name, own in tradeoff.comparisons.items()
+            for name, comparison in tradeoff.comparisons.items()
         },
         settings=tuple(
             _setting_entry(tradeoff, one) for one in tradeoff.settings() if not one.other
@@ -183,7 +183,7 @@ def _joined(names: Iterable[object]) -> str:
 def _scene_numbers(tradeoff: Tradeoff) -> Mapping[str, float]:
     """Dimensionless numbers of the scene, as the runs at the reference have them."""
     numbers = [run.measures.numbers for run in tradeoff.of(tradeoff.reference)]
-    return next((own for own in numbers if own), {})
+    return next((known for known in numbers if known), {})
 
 
 def _setting_entry(tradeoff: Tradeoff, setting: Setting) -> SettingEntry:
@@ -198,9 +198,9 @@ def _setting_entry(tradeoff: Tradeoff, setting: Setting) -> SettingEntry:
         breaks=breaks(tradeoff, setting),
         relative_cost=tradeoff.cost(setting),
         errors={
-            name: own.errors[setting]
-            for name, own in tradeoff.comparisons.items()
-            if setting in own.errors
+            name: comparison.errors[setting]
+            for name, comparison in tradeoff.comparisons.items()
+            if setting in comparison.errors
         },
     )
 
@@ -267,7 +267,7 @@ def write_tradeoff(
         tradeoff=tradeoff,
         record=record,
         main=[tradeoff.comparisons[name] for name in main],
-        choices={name: [choose(tradeoff, name, one) for one in TOLERANCES] for name in main},
+        choices={name: [choose(tradeoff, name, limit) for limit in TOLERANCES] for name in main},
         soft=by_modulus(tradeoff),
         drops=dropped,
         tolerances=TOLERANCES,

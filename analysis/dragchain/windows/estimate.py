@@ -211,13 +211,13 @@ def corrected_map(
     runs : float
         Length of the soft run in lengths of a window.
     """
-    maps = np.array([one for one in windows if len(one) == len(soft)])
-    own = np.asarray(soft, dtype=np.float64)
-    if len(maps) < _FEWEST or not own.any() or not total.known:
+    maps = np.array([window for window in windows if len(window) == len(soft)])
+    whole = np.asarray(soft, dtype=np.float64)
+    if len(maps) < _FEWEST or not whole.any() or not total.known:
         return None
     mean = maps.mean(axis=0)
     dispersion = maps.var(axis=0, ddof=1).sum() / mean.sum()
-    expected = own * total.value / own.sum()
+    expected = whole * total.value / whole.sum()
     from_soft = dispersion * expected / runs
     from_windows = dispersion * expected / len(maps)
     seen = ((mean * total.value / mean.sum() - expected) ** 2).sum()
@@ -229,10 +229,10 @@ def corrected_map(
     scale = total.relative_half_width / NORMAL_QUANTILE
     std = np.hypot(np.sqrt(weight * from_windows), value * scale)
     return LoadMap(
-        soft=tuple(own.tolist()),
+        soft=tuple(whole.tolist()),
         value=tuple(value.tolist()),
         std=tuple(std.tolist()),
-        soft_error=float(_absolute(own - value, std).sum() / value.sum()),
+        soft_error=float(_absolute(whole - value, std).sum() / value.sum()),
         error=float(_absolute(np.zeros_like(std), std).sum() / value.sum()),
     )
 
@@ -241,5 +241,5 @@ def _absolute(mean: Floats, std: Floats) -> Floats:
     """Mean absolute values of normal variables, (M,) each (the folded normal distribution)."""
     away = np.abs(mean)
     scaled = np.divide(away, std, out=np.full_like(std, math.inf), where=std > 0.0)
-    found = std * math.sqrt(2.0 / math.pi) * np.exp(-(scaled**2) / 2.0)
-    return np.asarray(found + away * erf(scaled / math.sqrt(2.0)))
+    spread = std * math.sqrt(2.0 / math.pi) * np.exp(-(scaled**2) / 2.0)
+    return np.asarray(spread + away * erf(scaled / math.sqrt(2.0)))

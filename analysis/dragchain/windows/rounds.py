@@ -240,12 +240,12 @@ def of_windows(quantity: Quantity, windows: Sequence[WindowOfRun]) -> Floats:
     In a window, the drag deviates from a mean of its own. What waves longer than its sample add to
     the variance is how far that mean is from that of all windows.
     """
-    own = np.array([one.values[quantity.name] for one in windows]) ** (1 + quantity.squared)
+    known = np.array([window.values[quantity.name] for window in windows]) ** (1 + quantity.squared)
     if quantity.name != "drag_std":
-        return own
-    means = np.array([one.values["drag_mean"] for one in windows])
+        return known
+    means = np.array([window.values["drag_mean"] for window in windows])
     away = (means - means.mean()) ** 2 * len(means) / (len(means) - 1)
-    return np.asarray(own + away)
+    return np.asarray(known + away)
 
 
 def beside(soft: PathQuantities, name: str, windows: Sequence[WindowOfRun]) -> Floats:
