@@ -75,19 +75,14 @@ def drag_peaks(samples: pd.DataFrame, case: CaseOfRun) -> DragPeaks:
     return find_drag_peaks(time_s, drag_n, min_separation_s=peak_separation_s(case))
 
 
-def find_drag_peaks(
-    time_s: Floats,
-    drag_n: Floats,
-    *,
-    min_separation_s: float,
-    min_prominence_n: float | None = None,
-) -> DragPeaks:
+def find_drag_peaks(time_s: Floats, drag_n: Floats, *, min_separation_s: float) -> DragPeaks:
     """Find the peaks of the resistance ``-drag_n``.
 
-    A peak is a local maximum that stands out by `min_prominence_n` and from
-    which every higher one is at least `min_separation_s` away: of two closer
-    ones the lower is dropped (`scipy.signal.find_peaks`; Virtanen et al. 2020,
-    Nature Methods 17, 261-272). The series is not smoothed.
+    A peak is a local maximum that stands out by the standard deviation of the
+    series (divisor N - 1) and from which every higher one is at least
+    `min_separation_s` away: of two closer ones the lower is dropped
+    (`scipy.signal.find_peaks`; Virtanen et al. 2020, Nature Methods 17,
+    261-272). The series is not smoothed.
 
     Parameters
     ----------
@@ -97,9 +92,6 @@ def find_drag_peaks(
         Force along the motion, N.
     min_separation_s : float
         Least time between peaks, s; see `peak_separation_s`.
-    min_prominence_n : float, optional
-        Least prominence, N; the standard deviation of the series (divisor
-        N - 1) if None.
 
     Returns
     -------
@@ -119,9 +111,8 @@ def find_drag_peaks(
     interval = float(np.median(intervals))
     if not np.allclose(intervals, interval, rtol=1e-3, atol=0.0):
         raise SeriesError("peaks require a constant sampling interval")
-    prominence = float(np.std(drag_n, ddof=1)) if min_prominence_n is None else min_prominence_n
     distance = max(1.0, min_separation_s / interval)
-    index, _ = find_peaks(-drag_n, prominence=prominence, distance=distance)
+    index, _ = find_peaks(-drag_n, prominence=np.std(drag_n, ddof=1), distance=distance)
     return DragPeaks(index.astype(np.int64), time_s[index], drag_n[index])
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import pandas as pd
 from matplotlib.figure import Figure
 
-from dragchain.figures.panels import legend_below, new_panels, row, row_names
+from dragchain.figures.panels import legend_below, new_panels, row_mark, row_names
 from dragchain.figures.style import BLUE, COLOURS, GREY, ORANGE
 from dragchain.quantities.document import MEASURED_FILE
 from dragchain.quantities.registry import MEASURED, REPORTED
@@ -310,7 +310,7 @@ def draw_drags(bars: Sequence[Bar], published: Mapping[str, float]) -> Figure:
     for label, mean_n in published.items():
         axes.axvline(mean_n, color=COLOURS[label], ls="--", label=f"published {label}")
     for place, (_, estimate, colour) in enumerate(bars):
-        row(axes, place, estimate.value, estimate, colour)
+        row_mark(axes, place, estimate, colour)
     row_names(axes, [name for name, *_ in bars])
     axes.set_xlabel("mean drag force (N), 95 % CI")
     return legend_below(figure)

@@ -1,7 +1,7 @@
 """The axes of a figure, and the marks that figures have in common."""
 
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from dragchain.arrays import Floats, Ints
 from dragchain.figures.style import BLUE, COLOURS, GREY, WIDTH_IN
-from dragchain.statistics.estimate import EstimateColumns
+from dragchain.statistics.estimate import Estimate, EstimateColumns
 
 
 def new_figure(height_in: float, width_in: float = WIDTH_IN) -> Figure:
@@ -61,16 +61,6 @@ def head(figure: Figure, text: str) -> None:
 # --- marks ---------------------------------------------------------------------------------------
 
 
-class _Interval(Protocol):
-    """One estimate, or columns of estimates."""
-
-    @property
-    def ci95_low(self) -> Any: ...
-
-    @property
-    def ci95_high(self) -> Any: ...
-
-
 def _with_reach(columns: EstimateColumns, unit: float) -> tuple[Floats, Floats]:
     """Values times a unit, (n,), and how far their intervals reach below and above, (2, n)."""
     value, low, high = (
@@ -90,7 +80,7 @@ def depth_bars(
     axes.set_ylim(edges[-1], edges[0])
 
 
-def band(axes: Axes, x: ArrayLike, interval: _Interval, colour: str) -> None:
+def band(axes: Axes, x: ArrayLike, interval: Estimate | EstimateColumns, colour: str) -> None:
     """Fill the interval about a curve."""
     low, high = interval.ci95_low, interval.ci95_high
     axes.fill_between(x, low, high, color=colour, alpha=0.17, lw=0)
@@ -121,11 +111,11 @@ def compass_bars(axes: Any, edges_rad: Sequence[float], columns: EstimateColumns
     axes.set_xlabel(f"mean normal force (N per {np.degrees(edges[1] - edges[0]):.0f}°)")
 
 
-def row(axes: Axes, place: float, value: float, interval: _Interval, colour: str) -> None:
+def row_mark(axes: Axes, place: float, estimate: Estimate, colour: str) -> None:
     """Draw a value with its interval in a row."""
-    span = [interval.ci95_low, interval.ci95_high]
+    span = [estimate.ci95_low, estimate.ci95_high]
     axes.plot(span, [place, place], color=colour, linewidth=1.8, alpha=0.6)
-    axes.plot(value, place, "o", color=colour)
+    axes.plot(estimate.value, place, "o", color=colour)
 
 
 def row_names(axes: Axes, names: Sequence[str]) -> None:

@@ -33,11 +33,8 @@ BLUE, ORANGE, GREEN, RED = (COLOURS[name] for name in ("blue", "orange", "green"
 
 GREY, INK, LIGHT = COLOURS["grey"], COLOURS["ink"], COLOURS["light"]
 
-SERIES = (BLUE, ORANGE, GREEN, RED, COLOURS["violet"], COLOURS["teal"])
-"""Colours of series that stand side by side."""
-
 MARKERS = "os^vDPX*<p>d"
-"""Their marks."""
+"""Marks of series that stand side by side."""
 
 STYLE: dict[RcKeyType, Any] = {
     "font.size": 9,

@@ -192,9 +192,7 @@ def _paths(rows: pd.DataFrame, event: Ints, interval_s: float) -> dict[str, tupl
     }
 
 
-def event_types(
-    events: pd.DataFrame, case: CaseOfRun, interval_s: float, limits: Thresholds = LIMITS
-) -> NDArray[np.str_]:
+def event_types(events: pd.DataFrame, case: CaseOfRun, interval_s: float) -> NDArray[np.str_]:
     """Name the type of each event, (E,).
 
     In this order: an impact is short, a resting particle moves little, a sliding one
@@ -202,10 +200,10 @@ def event_types(
     the first sample or ends after the last is no impact; if but one sample of it
     is seen, it passes for rolling.
     """
-    longest = max(limits.impact_times * contact_time_s(case), interval_s)
+    longest = max(LIMITS.impact_times * contact_time_s(case), interval_s)
     speed = drag_surface_speed(case)
     sliding, rolling = events["slid_m"] / events["duration_s"], events["rolling_m_s"]
     short = events["complete"] & (events["duration_s"] <= longest * (1 + 1e-9))
-    rests = sliding + rolling < limits.rest * speed
-    slides = sliding >= limits.slide_to_roll * rolling
+    rests = sliding + rolling < LIMITS.rest * speed
+    slides = sliding >= LIMITS.slide_to_roll * rolling
     return np.select([short, rests, slides], [IMPACT, RESTING, SLIDING], ROLLING)

@@ -87,11 +87,11 @@ def edge_distance(
     return np.asarray(tree.query(points_m, distance_upper_bound=most_m)[0])
 
 
-def strewn(surface: Surface, count: int = _SPREAD) -> Floats:
-    """Points spread evenly over a surface, (count, 3): a Halton sequence, always the same."""
+def strewn(surface: Surface) -> Floats:
+    """Points spread evenly over a surface, (c, 3): a Halton sequence, always the same."""
     from scipy.stats.qmc import Halton
 
-    place, far, side = Halton(3, scramble=False).random(count).T
+    place, far, side = Halton(3, scramble=False).random(_SPREAD).T
     until = surface.areas.cumsum()
     facet = np.searchsorted(until, place * until[-1])
     root = np.sqrt(far)

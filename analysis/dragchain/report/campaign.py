@@ -36,7 +36,6 @@ def write_report(
     draw: Callable[[], Mapping[str, Figure]],
     tables: Mapping[str, pd.DataFrame] | None = None,
     documents: Mapping[str, Document] | None = None,
-    pictures: Mapping[str, bytes] | None = None,
     name: str = "report",
     package: str = "dragchain",
     filters: Filters | None = None,
@@ -54,8 +53,6 @@ def write_report(
         Makes the figures, by name.
     tables, documents : mapping, optional
         By name.
-    pictures : mapping of str to bytes, optional
-        Further figures, as PNG.
     name : str
         Of the page.
     package, filters
@@ -64,7 +61,7 @@ def write_report(
         What the page shows beside ``pictures``, the data URI of each figure by its name.
     """
     with drawing():
-        drawn = {key: png(figure) for key, figure in draw().items()} | dict(pictures or {})
+        drawn = {key: png(figure) for key, figure in draw().items()}
     uris = {key: data_uri(picture) for key, picture in drawn.items()}
     page = render_page(template, filters, package, pictures=uris, **content)
     files = {f"figures/{key}.png": picture for key, picture in drawn.items()}

@@ -20,7 +20,7 @@ from scipy.signal import welch
 
 from dragchain.arrays import Floats
 from dragchain.drag import find_drag_peaks, peak_separation_s
-from dragchain.figures.panels import key, legend_below, new_figure, row, row_names
+from dragchain.figures.panels import key, legend_below, new_figure, row_mark, row_names
 from dragchain.figures.style import COLOURS, GREEN, GREY, RED, drawing, png
 from dragchain.report.cases import ReportedCase, ReportedRun
 from dragchain.report.findings import ProcessFindings
@@ -271,7 +271,7 @@ def _drawn(comparison: SignalComparison) -> Figure:
     right.axvspan(-100 * signal.margin, 100 * signal.margin, color=GREEN, alpha=0.12, lw=0)
     for place, difference in enumerate(comparison.differences):
         relative = difference.relative.over(0.01)
-        row(right, place, relative.value, relative, _MARKS[difference.verdict])
+        row_mark(right, place, relative, _MARKS[difference.verdict])
     for verdict, colour in _MARKS.items():
         key(right, verdict, color=colour)
     row_names(right, [difference.label for difference in comparison.differences])

@@ -106,14 +106,6 @@ def _alike(estimate: Estimate) -> tuple[list[str], str]:
     return [fixed(value / 10.0**shift, decimals) for value in numbers], times
 
 
-def interval(estimate: Mapping[str, float | None], digits: int = 3) -> str:
-    """An estimate with its interval."""
-    value, low, high = (
-        measured(estimate[name], digits) for name in ("value", "ci95_low", "ci95_high")
-    )
-    return f"{value} ({low} to {high})"
-
-
 # --- pages ---------------------------------------------------------------------------------------
 
 
@@ -162,7 +154,7 @@ def page_environment(
         lstrip_blocks=True,
     )
     shared = (
-        *(number, measured, fixed, fraction, interval, with_interval, ends),
+        *(number, measured, fixed, fraction, with_interval, ends),
         *(in_percent, heading_key, sections, cell),
     )
     environment.filters |= {call.__name__: call for call in shared} | dict(filters or {})

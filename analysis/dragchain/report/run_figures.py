@@ -22,7 +22,7 @@ from dragchain.figures.panels import (
     legend_below,
     new_figure,
     new_panels,
-    row,
+    row_mark,
     row_names,
 )
 from dragchain.figures.style import BLUE, COLOURS, HALF_IN, RED, drawing, save
@@ -350,7 +350,7 @@ def drag_of_cases(
     """
     figure, (axes,) = new_panels(1.2 + 0.32 * len(names))
     for place, force in enumerate(forces):
-        row(axes, place, force.value, force, BLUE)
+        row_mark(axes, place, force, BLUE)
     for label, value in references:
         axes.axvline(value, color=COLOURS[label], linestyle="--", label=f"{label} {value:.2f} N")
     row_names(axes, names)

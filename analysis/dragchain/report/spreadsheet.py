@@ -12,15 +12,13 @@ from dragchain.tables.columns import descriptions, unit_of
 from dragdeck.records.case import AssumptionOfRun
 
 
-def definitions(table: pd.DataFrame, name: str = "summary") -> pd.DataFrame:
-    """What the columns of a table mean, by `dragchain.tables.columns`.
+def definitions(table: pd.DataFrame) -> pd.DataFrame:
+    """What the columns of the summary mean, by `dragchain.tables.columns`.
 
     Parameters
     ----------
     table : DataFrame
         A table of N columns.
-    name : str
-        The table's name there.
 
     Returns
     -------
@@ -28,7 +26,7 @@ def definitions(table: pd.DataFrame, name: str = "summary") -> pd.DataFrame:
         N rows ``column``, ``unit`` (``1`` for plain numbers) and ``meaning``.
     """
     rows = [
-        (field.name, unit_of(field), descriptions(field.name).get(name, ""))
+        (field.name, unit_of(field), descriptions(field.name).get("summary", ""))
         for field in pa.Schema.from_pandas(table, preserve_index=False)
     ]
     return pd.DataFrame(rows, columns=["column", "unit", "meaning"], dtype=object)

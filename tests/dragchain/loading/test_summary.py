@@ -27,7 +27,7 @@ from loading_files import (
 )
 
 from dragchain.errors import TableError
-from dragchain.loading.contact_events import Thresholds, contact_time_s, event_types, find_events
+from dragchain.loading.contact_events import contact_time_s, find_events
 from dragchain.loading.document import FILE, Loading
 from dragchain.loading.figure import averaged_load
 from dragchain.loading.samples import sample
@@ -278,14 +278,6 @@ def test_the_contact_time_is_that_of_hertz(run: Path) -> None:
     mass = 2500 * 4 / 3 * np.pi * 3e-3**3
     overlap = (15 * mass * SPEED**2 / (16 * np.sqrt(3e-3) * modulus)) ** 0.4
     assert contact_time_s(case) == pytest.approx(2.94 * overlap / SPEED, rel=5e-3)
-
-
-def test_longer_impacts_count_as_impacts_when_asked(run: Path, events: pd.DataFrame) -> None:
-    case = load_case(run)
-    times = 0.1 / contact_time_s(case)
-    limits = Thresholds(impact_times=times * 1.001)
-    kinds = event_types(events.assign(slid_m=events["sliding_m"]), case, DT, limits)
-    assert kinds.tolist() == ["rolling", "sliding", "impact", "impact", "impact"]
 
 
 def test_a_point_off_a_triangle_by_hand() -> None:
