@@ -38,8 +38,8 @@ Hits = Mapping[str, bool | None]
 
 def levels(random: Random, packings: int, patches: int) -> Floats:
     """Relative loads of the patches of each packing, (packings, patches)."""
-    together, each = random.normal(size=(packings, 1)), random.normal(size=(packings, patches))
-    return np.maximum(0.05, 1 + 0.05 * together + 0.1 * each)
+    together, alone = random.normal(size=(packings, 1)), random.normal(size=(packings, patches))
+    return np.maximum(0.05, 1 + 0.05 * together + 0.1 * alone)
 
 
 # --- volume, coefficient and depth ---------------------------------------------------------------
@@ -80,7 +80,7 @@ def volume(random: Random, packings: int, trials: int) -> Hits:
         given = {"calibrate": weighed(random, lost, trials, 0.05, 1.0, unequal=False)}
     between = packings - 1 if packings > 1 else np.inf
     coefficient, rate = predict(Removal.model_validate(given), action, DENSITY, between)
-    errors = np.array([[slow_error(row)[0] for row in each] for each in series])
+    errors = np.array([[slow_error(row)[0] for row in of_packing] for of_packing in series])
     mean, error, degrees = patch_means(series.mean(axis=2), errors)
     halves = student_quantile(degrees) * error, mean * rate.coefficient
     half = joined_half_width(*halves, degrees, rate.coefficient_degrees)

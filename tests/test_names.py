@@ -5,8 +5,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 FOLDERS = ("analysis", "benchmarks", "docs/tools", "evidence", "workflow")
-LIMIT = 100
-"""It only falls: below 100 less, lower it."""
+LIMIT = 20
+"""It only falls."""
 
 
 def test_names_that_say_nothing_become_fewer() -> None:
@@ -15,4 +15,4 @@ def test_names_that_say_nothing_become_fewer() -> None:
     names = [node.id for node in nodes if isinstance(node, ast.Name)]
     names += [node.arg for node in nodes if isinstance(node, ast.arg)]
     count = sum(name in ("one", "found", "own") for name in names)
-    assert LIMIT - 100 < count <= LIMIT
+    assert count <= LIMIT

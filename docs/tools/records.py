@@ -108,8 +108,8 @@ class Join(TypedDict):
 
 def chosen(records: str | Sequence[str], rows: str = "", join: Join | None = None) -> pd.DataFrame:
     """Rows of a record, or of several below each other; ValueError if there is none."""
-    several = [records] if isinstance(records, str) else records
-    table = pd.concat([record_table(name) for name in several], ignore_index=True)
+    names = [records] if isinstance(records, str) else records
+    table = pd.concat([record_table(name) for name in names], ignore_index=True)
     if join is not None:
         other = chosen(join["record"])
         table = table.merge(other, on=join["by"], suffixes=("", "_joined"))

@@ -163,10 +163,10 @@ def _named(names: Sequence[str]) -> str:
     for name in names:
         stem, kind, leaf = re.fullmatch(r"(.*?)(?:\[(.*)\](.*))?", name).groups("")
         kinds.setdefault(stem + (f"[%s]{leaf}" if kind else ""), []).append(kind)
-    several = {
+    lists = {
         stem: ",".join(suffixes) if len(suffixes) < 4 else "any" for stem, suffixes in kinds.items()
     }
-    return ", ".join(f"`{stem.replace('%s', kind)}`" for stem, kind in several.items())
+    return ", ".join(f"`{stem.replace('%s', kind)}`" for stem, kind in lists.items())
 
 
 def _fields(
@@ -258,8 +258,8 @@ def _usual(path: str, limits: str) -> tuple[str, str]:
     name, rest = re.sub(r"\[\w+\]", "", path), _BOUND.sub("", limits)
     bounds = {word: float(value) for word, value in _BOUND.findall(limits)}
     places = ((name, f"{name}.0"), [f"{name}.0.{index}" for index in range(7)])
-    single, several = ([*dict.fromkeys(filter(None, map(plausible_range, of)))] for of in places)
-    first = single[:1] or several
+    single, listed = ([*dict.fromkeys(filter(None, map(plausible_range, of)))] for of in places)
+    first = single[:1] or listed
     if not first or ("`" in rest and not bounds):
         return limits, ""
     accepted, usual = [], []

@@ -225,7 +225,9 @@ def _restitution(run: Recording) -> Iterator[QuantityCheck]:
     exact = _rebounds(run)
     yield exact
     if run.case.limit_force:
-        entered = [(each.value, each.constants.restitution, each.rebound) for each in run.contacts]
+        entered = [
+            (impact.value, impact.constants.restitution, impact.rebound) for impact in run.contacts
+        ]
         yield replace(exact, against=INPUT, rows=entered)
 
 
@@ -366,7 +368,7 @@ def flight_energy(run: Recording) -> tuple[Ints, Floats]:
 def _momentum(run: Recording) -> Iterator[QuantityCheck]:
     changes = [momentum_changes(contact) for contact in run.contacts]
     for at, quantity in enumerate(("linear_momentum_change", "angular_momentum_change")):
-        sizes = [np.linalg.norm(each[at], axis=1) for each in changes]
+        sizes = [np.linalg.norm(change[at], axis=1) for change in changes]
         rows = [(c.value, 0.0, float(s.max())) for c, s in zip(run.contacts, sizes, strict=True)]
         yield QuantityCheck(quantity, EXACT, rows, _CONSERVED, 1.0)
 

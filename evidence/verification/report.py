@@ -85,8 +85,8 @@ def write_verification(out_dir: Path, run_dirs: Sequence[Path]) -> pd.DataFrame:
         An impact is not whole.
     """
     compared = checks_by_test([read_recording(folder) for folder in run_dirs])
-    each = [check_rows(run, check) for rows in compared.values() for run, check in rows]
-    checks = pd.concat([rows for rows in each if len(rows)]).sort_values("number", kind="stable")
+    tables = [check_rows(run, check) for rows in compared.values() for run, check in rows]
+    checks = pd.concat([rows for rows in tables if len(rows)]).sort_values("number", kind="stable")
     checks = checks.reset_index(drop=True)
     summary = worst_rows(checks)
     write_report(

@@ -261,7 +261,7 @@ def _between_scenes(
 
 def _known(quantity: Quantity, scenes: Scenes, windowed: Sequence[Windowed]) -> Known | None:
     measured = [[*_runs_with(quantity, runs)] for runs in scenes]
-    pairs = [of for each in windowed if (of := each.pairs(quantity)) and of.variance]
+    pairs = [of for windows in windowed if (of := windows.pairs(quantity)) and of.variance]
     if len(pairs) >= _FEWEST_SCENES:
         said = _of_windows(quantity, pairs)
     elif (whole := _of_whole_runs(measured)) is None:

@@ -114,12 +114,12 @@ def differences(first: ComparedCase, other: ComparedCase) -> list[CaseDifference
 
 
 def _difference(quantity: Quantity, first: ComparedCase, other: ComparedCase) -> CaseDifference:
-    several = [_standings(case, quantity) for case in (first, other)]
-    corrected = all(standing.corrected for packings in several for standing in packings.values())
+    standings = [_standings(case, quantity) for case in (first, other)]
+    corrected = all(standing.corrected for packings in standings for standing in packings.values())
     before, after = (_mean(case, quantity, corrected) for case in (first, other))
     numbers = [
         {seed: _number(standing, corrected).value for seed, standing in packings.items()}
-        for packings in several
+        for packings in standings
     ]
     paired = len(numbers[0]) > 1 and numbers[0].keys() == numbers[1].keys()
     if paired:
@@ -127,7 +127,7 @@ def _difference(quantity: Quantity, first: ComparedCase, other: ComparedCase) ->
     else:
         half = math.hypot(before.half_width, after.half_width)
         change = Estimate.around(after.value - before.value, half)
-    basis = str(next(iter(several[0].values())).basis) if corrected else "as simulated"
+    basis = str(next(iter(standings[0].values())).basis) if corrected else "as simulated"
     return CaseDifference(other.name, quantity, before, after, change, basis, paired)
 
 

@@ -148,9 +148,10 @@ class RoughnessCourse:
             for of in (depth_m.value, depth_m.ci95_high, depth_m.ci95_low)
         )
         value = math.hypot(cut, steady)
-        own = math.hypot(self.profile.half_width * cut**2, steady * half) / value if value else half
-        below = math.hypot(value - math.hypot(low, steady), own)
-        above = math.hypot(math.hypot(high, steady) - value, own)
+        error = self.profile.half_width * cut**2
+        spread = math.hypot(error, steady * half) / value if value else half
+        below = math.hypot(value - math.hypot(low, steady), spread)
+        above = math.hypot(math.hypot(high, steady) - value, spread)
         return Estimate(value, max(value - below, 0.0), value + above)
 
     def time_to(self, ra_m: float, depth_m_s: Estimate) -> Estimate:

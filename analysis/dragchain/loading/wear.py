@@ -137,8 +137,8 @@ def compute_wear(
             quantities={name: event_quantiles(events[name]) for name in TOUCH_QUANTITIES},
         )
     impact = removal is not None and removal.laws[-1].impact
-    each = [_action(law, surface, group, factor * law.interval_s) for law in of_laws]
-    total, density, error = zip(*each, strict=True)
+    actions = [_action(law, surface, group, factor * law.interval_s) for law in of_laws]
+    total, density, error = zip(*actions, strict=True)
     share = loading.types["impact"].fraction_of["force_slide_n_m"]
     wear = Wear(
         run=case.run,
@@ -275,11 +275,11 @@ def impact_action(law: Law, events: pd.DataFrame, case: CaseOfRun) -> Floats:
 def touch_maps(events: pd.DataFrame, surface: Surface, time_s: float) -> dict[str, Floats]:
     """First touches on each facet, (M,) each: frequency, mean velocity, largest pressure."""
     facets = events.groupby("facet_id")
-    each = {
+    touched = {
         "touches_per_m2_s": facets.size().astype(np.float64),
         "touch_normal_m_s": facets["touch_normal_m_s"].mean(),
         "peak_pressure_pa": facets["peak_pressure_pa"].max(),
     }
     every, per = range(len(surface.corners)), surface.areas * time_s
-    maps = {name: series.reindex(every, fill_value=0.0).to_numpy() for name, series in each.items()}
+    maps = {key: mean.reindex(every, fill_value=0.0).to_numpy() for key, mean in touched.items()}
     return maps | {"touches_per_m2_s": maps["touches_per_m2_s"] / per}

@@ -194,8 +194,8 @@ def write_chains(run_dir: Path) -> None:
             grown.append(cluster_rows(frame, clusters))
             chains = chain_table(frame)
             if names.size:
-                each = (names[case.class_of(np.array(ids))] for ids in chains["particle_ids"])
-                chains["classes"] = [numbers.tolist() for numbers in each]
+                classes = (names[case.class_of(np.array(ids))] for ids in chains["particle_ids"])
+                chains["classes"] = [numbers.tolist() for numbers in classes]
             writer.write(chains)
         if not network:
             raise TableError(

@@ -382,12 +382,12 @@ def _engine_runs(studies: Sequence[StudyRuns]) -> list[ReportedRun[Findings]]:
 
 def _signals(cases: Sequence[ReportedCase], file: Path | None) -> list["SignalComparison"]:
     """The comparisons with a measured signal; no other part of the page needs its filters."""
-    references = [one.first.process.study.reference for one in cases]
-    if not any(one and one.signal for one in references):
+    references = [case.first.process.study.reference for case in cases]
+    if not any(reference and reference.signal for reference in references):
         return []
     from dragchain.report.measured_signal import compare_signal
 
-    return [one for case in cases if (one := compare_signal(case, file))]
+    return [comparison for case in cases if (comparison := compare_signal(case, file))]
 
 
 def _tables(signals: Sequence["SignalComparison"]) -> dict[str, pd.DataFrame]:

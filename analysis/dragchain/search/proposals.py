@@ -113,7 +113,7 @@ class Trials:
         return Trials(places, values, errors, self.low, self.high)
 
     @cached_property
-    def _each(self) -> list[Response]:
+    def _responses(self) -> list[Response]:
         known = ~self.refused
         columns = zip(self.values[known].T, self.errors[known].T, strict=True)
         return [Response(self.known, value, error) for value, error in columns]
@@ -125,19 +125,19 @@ class Trials:
 
     def predict(self, places: Floats) -> tuple[Floats, Floats]:
         """Expected responses at (M, D) places and their standard errors, (M, Q) each."""
-        each = [prediction.predict(places) for prediction in self._each]
-        mean, error = (np.stack(columns, axis=1) for columns in zip(*each, strict=True))
+        predicted = [prediction.predict(places) for prediction in self._responses]
+        mean, error = (np.stack(columns, axis=1) for columns in zip(*predicted, strict=True))
         return mean, error
 
     def allowed(self, places: Floats) -> Floats:
         """Logarithm of the probability that (M, D) places meet all limits, each apart, (M,)."""
         mean, error = self.predict(places)
         ends = self.high - mean, mean - self.low
-        each = np.sum([log_ndtr(end / np.maximum(error, 1e-12)) for end in ends], axis=(0, 2))
+        chances = np.sum([log_ndtr(end / np.maximum(error, 1e-12)) for end in ends], axis=(0, 2))
         if self.refused.any():
             gone, unsure = self._refusal.predict(places)
-            each = each + log_ndtr((_REFUSED_LIMIT - gone) / np.maximum(unsure, 1e-12))
-        return np.asarray(each)
+            chances = chances + log_ndtr((_REFUSED_LIMIT - gone) / np.maximum(unsure, 1e-12))
+        return np.asarray(chances)
 
     def meets(self, places: Floats) -> Any:
         """Whether all limits are expected to be met at (M, D) places, (M,)."""

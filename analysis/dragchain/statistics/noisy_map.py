@@ -70,12 +70,12 @@ def map_spread(values: Floats, errors: Floats, areas: Floats, patch: Ints) -> Ma
     if not means.all():
         unknown = Estimate(*[math.nan] * 3)
         return MapSpread((unknown, unknown), (math.inf, math.inf))
-    each, over_time = values[:, first] / means, errors[:, first] / means
-    packings, value = len(each), each.mean(axis=0)
-    events = float((area * over_time**2).sum() / (area * each).sum()) / packings
+    scaled, over_time = values[:, first] / means, errors[:, first] / means
+    packings, value = len(scaled), scaled.mean(axis=0)
+    events = float((area * over_time**2).sum() / (area * scaled).sum()) / packings
     differences = 0.0
     if packings > 1:
-        variance = each.var(axis=0, ddof=1) / packings
+        variance = scaled.var(axis=0, ddof=1) / packings
         beyond = float((area * variance).sum()) - events * float((area * value).sum())
         square = float((area * (value**2 - variance)).sum())
         differences = max(0.0, beyond / square) if square > 0.0 else 0.0

@@ -262,11 +262,11 @@ def _merged(contacts: Frame, particles: Frame) -> Frame:
     points = contacts.vectors(*POINT)
     head = _heads(contacts.ids("particle_id"), _on(contacts), points, patch)
     kept, slot = np.unique(head, return_inverse=True)
-    several = np.bincount(slot) > 1
+    shared = np.bincount(slot) > 1
     forces, normals = contacts.vectors(*FORCES), contacts.vectors(*_NORMAL)
     mean = sums(slot, overlap[:, None] ** 1.5 * normals, len(kept))
     normal = normals[kept]
-    normal[several] = _unit(mean[several])
+    normal[shared] = _unit(mean[shared])
     attraction = np.bincount(slot, contacts.columns[ATTRACTION], len(kept))
     joined = np.column_stack([sums(slot, forces, len(kept)), normal, attraction])
     return contacts.take(kept).replaced((*FORCES, *_NORMAL, ATTRACTION), joined)

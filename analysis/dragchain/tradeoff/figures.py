@@ -31,18 +31,19 @@ _TITLES = {
 def draw_pareto(tradeoff: Tradeoff) -> Figure:
     """Error against cost of every setting, a panel for each main quantity."""
     names = [name for name in MAIN if name in tradeoff.comparisons]
-    settings = [one for one in tradeoff.settings() if not one.other and one != tradeoff.reference]
-    moduli = sorted({one.youngs_modulus_scale for one in tradeoff.settings()}, reverse=True)
+    every = tradeoff.settings()
+    settings = [setting for setting in every if not setting.other and setting != tradeoff.reference]
+    moduli = sorted({setting.youngs_modulus_scale for setting in every}, reverse=True)
     viridis = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.92, max(len(moduli), 2)))
     shades = dict(zip(moduli, viridis, strict=False))
-    marks = dict(
-        zip(sorted({one.timestep_fraction for one in settings}), cycle(MARKERS), strict=False)
-    )
+    fractions = sorted({setting.timestep_fraction for setting in settings})
+    marks = dict(zip(fractions, cycle(MARKERS), strict=False))
     height = 2.6 * -(-len(names) // 3) + 0.9
     figure, panels = new_panels(height, len(names), WIDE_IN, 3, sharex=True, sharey=True)
     for axes, name in zip(panels, names, strict=True):
         comparison = tradeoff.comparisons[name]
-        errors = {one: comparison.errors[one] for one in settings if one in comparison.errors}
+        measured = [setting for setting in settings if setting in comparison.errors]
+        errors = {setting: comparison.errors[setting] for setting in measured}
         _pareto_panel(axes, tradeoff, errors, shades, marks)
         axes.set_title(_TITLES.get(name, comparison.quantity.label))
     for axes in panels[-3:]:
@@ -51,7 +52,7 @@ def draw_pareto(tradeoff: Tradeoff) -> Figure:
     for axes in panels[::3]:
         axes.set_ylabel("absolute error (%)")
     panels[0].set_ylim(bottom=0.8 * FLOOR)
-    drawn = {one.youngs_modulus_scale for one in settings}
+    drawn = {setting.youngs_modulus_scale for setting in settings}
     _pareto_keys(panels[0], {level: shades[level] for level in shades if level in drawn}, marks)
     return legend_below(figure)
 

@@ -218,8 +218,9 @@ class Choice:
 def choose(tradeoff: Tradeoff, quantity: str, tolerance: float) -> Choice:
     """The cheapest setting at which a quantity is within a tolerance, with confidence."""
     comparison = tradeoff.comparisons[quantity]
-    bounds = {one: comparison.errors[one].bound for one in _candidates(tradeoff, comparison)}
-    able = [one for one, bound in bounds.items() if bound <= tolerance]
+    candidates = _candidates(tradeoff, comparison)
+    bounds = {setting: comparison.errors[setting].bound for setting in candidates}
+    able = [setting for setting, bound in bounds.items() if bound <= tolerance]
     setting = min(able, key=tradeoff.cost, default=None)
     nearest = min(bounds, key=bounds.__getitem__, default=None)
     shown = setting or nearest

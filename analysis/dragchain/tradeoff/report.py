@@ -99,7 +99,10 @@ def run_table(tradeoff: Tradeoff) -> pd.DataFrame:
             "failure": run.measures.why_failed,
             "counted_path_m": run.measures.arc_m or math.nan,
             **run.measures.cost.model_dump(),
-            **{one.name: run.stretches[0].get(one.name, math.nan) for one in MEASURED},
+            **{
+                quantity.name: run.stretches[0].get(quantity.name, math.nan)
+                for quantity in MEASURED
+            },
         }
         for run in tradeoff.runs
     ]
@@ -165,7 +168,9 @@ def tradeoff_record(
             for name, comparison in tradeoff.comparisons.items()
         },
         settings=tuple(
-            _setting_entry(tradeoff, one) for one in tradeoff.settings() if not one.other
+            _setting_entry(tradeoff, setting)
+            for setting in tradeoff.settings()
+            if not setting.other
         ),
         drop_test=tuple(
             DropEntry.model_validate({**vars(drop), "restitution_error": drop.bound})

@@ -267,8 +267,8 @@ def beside(soft: PathQuantities, name: str, windows: Sequence[WindowOfRun]) -> F
 def stretches(soft: PathQuantities, name: str, arc_m: float) -> Floats:
     """Means of a quantity's blocks over stretches of the soft run as long as a window's sample."""
     blocks = soft.of_blocks(name)
-    each = max(1, round(arc_m / soft.block_m))
-    means = blocks.means(max(1, len(blocks.values) // each))
+    joined = max(1, round(arc_m / soft.block_m))
+    means = blocks.means(max(1, len(blocks.values) // joined))
     return means[np.isfinite(means)]
 
 
