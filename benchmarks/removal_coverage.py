@@ -155,7 +155,7 @@ def edges(random: Random, packings: int, rounding: float) -> Hits:
 # --- record --------------------------------------------------------------------------------------
 
 
-def settings() -> Iterator[tuple[dict[str, Any], Callable[[Random], Hits]]]:
+def removal_settings() -> Iterator[tuple[dict[str, Any], Callable[[Random], Hits]]]:
     """What is simulated: the columns that name it, and how."""
 
     def case(
@@ -177,10 +177,10 @@ def settings() -> Iterator[tuple[dict[str, Any], Callable[[Random], Hits]]]:
         yield case(edges, packings, rounding, packings=packings, said=said)
 
 
-def coverage(trials: int, seed: int = 1) -> pd.DataFrame:
+def removal_coverage(trials: int, seed: int = 1) -> pd.DataFrame:
     """How often each quantity's interval contains the truth, in each setting."""
     rows = []
-    for number, (key, simulate) in enumerate(settings()):
+    for number, (key, simulate) in enumerate(removal_settings()):
         random = np.random.default_rng([seed, number])
         hits = pd.DataFrame([simulate(random) for _ in range(trials)])
         for name, hit in hits.items():
@@ -191,4 +191,4 @@ def coverage(trials: int, seed: int = 1) -> pd.DataFrame:
 
 
 if __name__ == "__main__":
-    coverage(int(sys.argv[2])).to_csv(sys.argv[1], index=False, lineterminator="\n")
+    removal_coverage(int(sys.argv[2])).to_csv(sys.argv[1], index=False, lineterminator="\n")

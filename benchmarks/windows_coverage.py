@@ -147,7 +147,7 @@ def _judged(
         number, cost = last.wanted, float(last.wanted)
 
 
-def settings() -> Iterator[tuple[Mapping[str, float], Process]]:
+def windows_settings() -> Iterator[tuple[Mapping[str, float], Process]]:
     """What is simulated, with the columns that name it."""
     cases = [
         *product(
@@ -164,10 +164,10 @@ def settings() -> Iterator[tuple[Mapping[str, float], Process]]:
         yield named, Process(**named)  # type: ignore[arg-type]
 
 
-def coverage(trials: int, seed: int = 1) -> pd.DataFrame:
+def windows_coverage(trials: int, seed: int = 1) -> pd.DataFrame:
     """How often the interval contains the truth in each setting, and the bias of the value."""
     rows = []
-    for number, (named, process) in enumerate(settings()):
+    for number, (named, process) in enumerate(windows_settings()):
         random = np.random.default_rng([seed, number])
         said = [process.said(random) for _ in range(trials)]
         hits = np.array([value.contains(TRUE) for value, _, _ in said])
@@ -183,4 +183,4 @@ def coverage(trials: int, seed: int = 1) -> pd.DataFrame:
 
 
 if __name__ == "__main__":
-    coverage(int(sys.argv[2])).to_csv(sys.argv[1], index=False, lineterminator="\n")
+    windows_coverage(int(sys.argv[2])).to_csv(sys.argv[1], index=False, lineterminator="\n")

@@ -52,14 +52,14 @@ _PARAMETERS = ("youngs_modulus_scale", "timestep_fraction", "speed_factor")
 # --- the design ------------------------------------------------------------------------------
 
 
-class Option(Variation):
+class CostOption(Variation):
     """Points of the design with their name, in which ``{}`` stands for what varies, and words."""
 
     name: str
     what: str
     unit: Literal["per_step", "per_second"] = "per_second"
 
-    def named(self) -> Mapping[str, tuple["Option", Settings]]:
+    def named(self) -> Mapping[str, tuple["CostOption", Settings]]:
         """Each point by its name: itself with its words filled in, and the fields that it sets."""
         named_values = {}
         for _, values in self.points():
@@ -69,9 +69,9 @@ class Option(Variation):
         return named_values
 
 
-def options(design: Path = DESIGN) -> Mapping[str, tuple[Option, Settings]]:
+def options(design: Path = DESIGN) -> Mapping[str, tuple[CostOption, Settings]]:
     """The options of a design by name, the reference first."""
-    known = Design[Option].read(design)
+    known = Design[CostOption].read(design)
     return {
         name: (option, {**known.base, **values})
         for block in (known.reference, *known.points)
@@ -173,7 +173,7 @@ def geometric(ratios: Sequence[float]) -> Estimate:
 
 
 def cost(
-    option: Option,
+    option: CostOption,
     values: Settings,
     rounds: Sequence[tuple[RunRecord, RunRecord]],
     steps_s: tuple[float, float],
@@ -183,7 +183,7 @@ def cost(
 
     Parameters
     ----------
-    option : Option
+    option : CostOption
     values : mapping
         The fields that it sets.
     rounds : sequence of (RunRecord, RunRecord)
@@ -322,7 +322,7 @@ def time_options(
     ).write(out)
 
 
-def _own(chosen: Mapping[str, tuple[Option, Settings]], name: str, first: str) -> Settings:
+def _own(chosen: Mapping[str, tuple[CostOption, Settings]], name: str, first: str) -> Settings:
     """The fields in which an option differs from the standard case."""
     base = chosen[first][1]
     return {field: value for field, value in chosen[name][1].items() if base.get(field) != value}

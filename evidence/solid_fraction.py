@@ -32,7 +32,7 @@ class Beds(Variation):
     shape: str = "sphere"
 
 
-def cases() -> Iterator[tuple[str, Case]]:
+def bed_cases() -> Iterator[tuple[str, Case]]:
     """Shape and case of each packing."""
     data: Any = read_yaml(DESIGN)
     design = Design[Beds].read(DESIGN, "beds")
@@ -64,7 +64,7 @@ def measure_beds(out: Path) -> None:
     project = find_project(Path.cwd())
     batch = Batch(project.results("solid_fraction"), environment(project.templates))
     rows = []
-    for shape, case in cases():
+    for shape, case in bed_cases():
         run = FILLING.run_id(case)
         bed = Packing.read(settled(batch, run, FILLING.build(case, None)))
         rows.append(row(shape, case, bed))

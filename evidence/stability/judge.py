@@ -16,12 +16,12 @@ from evidence.stability.measures import (
     COLUMNS,
     MEASURES,
     REST_FLOOR,
+    PointRow,
     PointRun,
-    Row,
     critical_step,
     damped_fraction,
 )
-from evidence.stability.points import REGIMES, Settings
+from evidence.stability.points import REGIMES, PointSettings
 
 # --- classes of points -------------------------------------------------------------------------
 
@@ -88,7 +88,7 @@ class Seen:
         return next((check for check in matching if reason in (None, check.reason)), None)
 
 
-class Verdict(NamedTuple):
+class PointVerdict(NamedTuple):
     """Class of a point and why."""
 
     kind: str
@@ -110,7 +110,7 @@ _CHECKS: tuple[tuple[str, CheckCode, CheckReason | None, str], ...] = (
 for it, in the order in which they count."""
 
 
-def classify(seen: Seen) -> Verdict:
+def classify(seen: Seen) -> PointVerdict:
     """Class of a point, and why.
 
     A run that ended is no proof of a stable step: its energy counts too.
@@ -118,31 +118,31 @@ def classify(seen: Seen) -> Verdict:
     return next(_verdicts(seen))
 
 
-def _verdicts(seen: Seen) -> Iterator[Verdict]:
+def _verdicts(seen: Seen) -> Iterator[PointVerdict]:
     """All classes that a point falls into, the one that counts first."""
     if seen.refused is not None:
-        yield Verdict(REFUSED, seen.refused.replace("\n", " "))
+        yield PointVerdict(REFUSED, seen.refused.replace("\n", " "))
     error = seen.failed_check("no_engine_error", "other")
     if error is not None and not seen.steps:
-        yield Verdict(REFUSED, error.seen)
+        yield PointVerdict(REFUSED, error.seen)
     for kind, code, reason, why in _CHECKS:
         if check := seen.failed_check(code, reason):
-            yield Verdict(kind, why.format(check.seen))
+            yield PointVerdict(kind, why.format(check.seen))
     limit = ENERGY_LIMITS[seen.regime]
     if seen.energy_ratio > limit:
         why = f"energy {seen.energy_ratio:.3g} times what it should be at most (limit {limit:g})"
-        yield Verdict(ENERGY, why)
+        yield PointVerdict(ENERGY, why)
     if seen.overlap_ratio > OVERLAP_LIMIT:
         why = f"overlap {seen.overlap_ratio:.3g} of the radius (limit {OVERLAP_LIMIT:g})"
-        yield Verdict(OVERLAP, why)
+        yield PointVerdict(OVERLAP, why)
     if seen.failed:
         why = "; ".join(f"{check.name}: {check.seen}" for check in seen.failed)
-        yield Verdict(INACCURATE, why)
+        yield PointVerdict(INACCURATE, why)
     for name, deviation in seen.errors.items():
         if _at_least(deviation) > TOLERANCE:
             why = f"error of the {name} {deviation.value:+.3g} (tolerance {TOLERANCE:g})"
-            yield Verdict(INACCURATE, why)
-    yield Verdict(STABLE, "no criterion of the others met")
+            yield PointVerdict(INACCURATE, why)
+    yield PointVerdict(STABLE, "no criterion of the others met")
 
 
 def _at_least(error: Estimate) -> float:
@@ -174,7 +174,7 @@ def judge_points(runs: Sequence[PointRun]) -> pd.DataFrame:
     )
 
 
-def _condition(group: Sequence[PointRun], base: Settings) -> Iterator[dict[str, object]]:
+def _condition(group: Sequence[PointRun], base: PointSettings) -> Iterator[dict[str, object]]:
     """The points of one condition; its reference comes first."""
     runs = sorted(group, key=lambda run: not run.point.reference)
     regime, case, measure = runs[0].point.regime, runs[0].case, MEASURES[runs[0].point.regime]
@@ -225,7 +225,7 @@ def _condition(group: Sequence[PointRun], base: Settings) -> Iterator[dict[str, 
         }
 
 
-def _height_scatter(runs: Sequence[PointRun], measured: Sequence[Row | None]) -> float:
+def _height_scatter(runs: Sequence[PointRun], measured: Sequence[PointRow | None]) -> float:
     """Relative standard deviation of bed heights that differ by chance, from the small steps."""
     heights = [
         row["height_m"]

@@ -30,10 +30,10 @@ from dragdeck.physics.contact_mechanics import (
 )
 from dragdeck.records.case import CaseOfRun
 from dragdeck.records.run import RunRecord
-from evidence.stability.points import Point
+from evidence.stability.points import MapPoint
 from evidence.stability.scenes import ImpactCase, ImpactOfRun
 
-Row = Mapping[str, float]
+PointRow = Mapping[str, float]
 """What a run showed. Every regime has ``overlap_ratio``, the largest overlap over the radius, and
 ``frequency_rad_s``, the largest eigenfrequency of its contact network; and names of `COLUMNS`."""
 
@@ -59,7 +59,7 @@ COLUMNS = (
 class PointRun:
     """A point with its run, or why no input script could be written for it."""
 
-    point: Point
+    point: MapPoint
     folder: Path
     refused: str | None = None
 
@@ -204,7 +204,7 @@ _LAST_SAMPLES = 50
 """Samples at the end of a resting bed's run whose mean energy counts: a quarter of them."""
 
 
-def _measure_settled(point: PointRun, run: Run) -> Row:
+def _measure_settled(point: PointRun, run: Run) -> PointRow:
     """A bed that settled, and its largest kinetic energy while it did."""
     *_, last = run.frames("particles")
     return {
@@ -214,7 +214,7 @@ def _measure_settled(point: PointRun, run: Run) -> Row:
     }
 
 
-def _measure_resting(point: PointRun, run: Run) -> Row:
+def _measure_resting(point: PointRun, run: Run) -> PointRow:
     """A bed at rest, and its kinetic energy at the end over N m g d.
 
     Its contacts are those before the step under test begins.
@@ -228,7 +228,7 @@ def _measure_resting(point: PointRun, run: Run) -> Row:
     }
 
 
-def _bed(point: PointRun, case: CaseOfRun, frame: Frame) -> Row:
+def _bed(point: PointRun, case: CaseOfRun, frame: Frame) -> PointRow:
     radius = frame.radii
     bodies, normal, overlap = touching(frame.centres, radius, case.bowl)
     partner = np.where(bodies[1] == len(radius), BOWL, PARTICLE)
@@ -252,17 +252,17 @@ def _bed_energy(run: Run) -> Floats:
     )
 
 
-def _bed_errors(row: Row, fine: Row) -> dict[str, Estimate]:
+def _bed_errors(row: PointRow, fine: PointRow) -> dict[str, Estimate]:
     """The relative error of the height; a settled bed's reference knows how heights scatter."""
     half_width = NORMAL_QUANTILE * math.sqrt(2.0) * fine.get("height_scatter", 0.0)
     return {"height": Estimate.around(row["height_m"] / fine["height_m"] - 1.0, half_width)}
 
 
-def _settled_energy(row: Row, fine: Row | None) -> float:
+def _settled_energy(row: PointRow, fine: PointRow | None) -> float:
     return row["peak_energy_j"] / fine["peak_energy_j"] if fine else math.nan
 
 
-def _resting_energy(row: Row, fine: Row | None) -> float:
+def _resting_energy(row: PointRow, fine: PointRow | None) -> float:
     floor = max(fine["rest_energy_ratio"], REST_FLOOR) if fine else math.nan
     return row["rest_energy_ratio"] / floor
 
@@ -270,7 +270,7 @@ def _resting_energy(row: Row, fine: Row | None) -> float:
 # --- impacts, met at different moments within a step -------------------------------------------
 
 
-def _measure_impacts(point: PointRun, run: Run) -> Row:
+def _measure_impacts(point: PointRun, run: Run) -> PointRow:
     """Mean, smallest and largest of the impacts of a run; speeds are over that of the impact."""
     impact = needed(point.impact, "impact")
     plate = impact.size_ratio == 0.0
@@ -329,7 +329,7 @@ def _energy(frame: Frame, density_kg_m3: float) -> Floats:
     return np.asarray(0.5 * mass * (speed + 0.4 * radius**2 * spin))
 
 
-def _impact_errors(row: Row, fine: Row) -> dict[str, Estimate]:
+def _impact_errors(row: PointRow, fine: PointRow) -> dict[str, Estimate]:
     """Of all impacts the worst counts."""
 
     def worst(name: str, scale: float = 1.0) -> Estimate:
@@ -343,7 +343,7 @@ def _impact_errors(row: Row, fine: Row) -> dict[str, Estimate]:
     }
 
 
-def _impact_energy(row: Row, fine: Row | None) -> float:
+def _impact_energy(row: PointRow, fine: PointRow | None) -> float:
     """Energy after over before, over what the reference has where its law itself gains."""
     gained = fine["energy_after_over_before"] if fine else 1.0
     return row["energy_after_over_before"] / max(1.0, gained)
@@ -355,7 +355,7 @@ _NETWORK_FRAMES = 8
 """Frames of a reference whose networks are looked at; the stiffest counts."""
 
 
-def _measure_drag(point: PointRun, run: Run) -> Row:
+def _measure_drag(point: PointRun, run: Run) -> PointRow:
     """Mean force along the motion with the half-width of its interval, and the energy.
 
     The half-width is infinite if it is not to be relied on. ``motion_ratio`` is the median kinetic
@@ -392,7 +392,7 @@ def _usual_motion_j(case: CaseOfRun, speed_m_s: float) -> float:
     return media.count * 0.5 * mass * speed_m_s**2 + _fall_energy(case, 1)
 
 
-def _drag_contacts(point: PointRun, run: Run) -> Row:
+def _drag_contacts(point: PointRun, run: Run) -> PointRow:
     """Largest overlap of the drag, and frequency of the stiffest of some frames."""
     particles = {frame.step: frame for frame in run.frames("particles")}
     pairs = {frame.step: frame for frame in run.frames("contacts")}
@@ -429,7 +429,7 @@ def _engine_contacts(
     return Contacts(bodies, normal[hit], rows.overlap_m[hit], partner)
 
 
-def _drag_errors(row: Row, fine: Row) -> dict[str, Estimate]:
+def _drag_errors(row: PointRow, fine: PointRow) -> dict[str, Estimate]:
     """The relative error of the mean drag, positive where it is stronger."""
     size = abs(fine["drag_mean_n"])
     error = (row["drag_mean_n"] - fine["drag_mean_n"]) / -size
@@ -453,9 +453,9 @@ class Measure(NamedTuple):
         Ratio of energies of a row and that of the fine step; NaN where that is needed.
     """
 
-    row: Callable[[PointRun, Run], Row]
-    errors: Callable[[Row, Row], dict[str, Estimate]]
-    energy_ratio: Callable[[Row, Row | None], float]
+    row: Callable[[PointRun, Run], PointRow]
+    errors: Callable[[PointRow, PointRow], dict[str, Estimate]]
+    energy_ratio: Callable[[PointRow, PointRow | None], float]
 
 
 MEASURES: Mapping[str, Measure] = {

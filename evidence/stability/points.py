@@ -13,7 +13,7 @@ from dragdeck.scenes.scene import Regime
 from dragdeck.study.base import Number
 from dragdeck.study.check import explained
 from dragdeck.sweep.cases import Design, Variation
-from evidence.stability.scenes import Packing
+from evidence.stability.scenes import BedKind
 
 REGIMES: tuple[Regime, ...] = get_args(Regime)
 """What a point models: single impacts; a bed that settles; a bed or a stack at
@@ -37,9 +37,9 @@ _SHOWN: Mapping[str, str] = {
     "workpiece_speed_m_s": "workpiece {:g} m/s",
 }
 
-Settings = Mapping[str, Packing | Number]
+PointSettings = Mapping[str, BedKind | Number]
 
-_SETTINGS: TypeAdapter[Settings] = TypeAdapter(Settings)
+_SETTINGS: TypeAdapter[PointSettings] = TypeAdapter(PointSettings)
 
 
 class _Regime(Design[Variation]):
@@ -57,7 +57,7 @@ class _Regime(Design[Variation]):
             raise ValueError(f"{', '.join(sorted(unknown))} is not among the base point's settings")
         return self
 
-    def conditions(self) -> Iterator[tuple[str, Settings]]:
+    def conditions(self) -> Iterator[tuple[str, PointSettings]]:
         """The settings of each condition, and the axis that they lie on."""
         yield "base", _SETTINGS.validate_python(self.base)
         for block in self.points:
@@ -70,7 +70,7 @@ class _Regime(Design[Variation]):
         return [(fine.values[_STEP], True), *((step, False) for step in self.vary[_STEP])]
 
 
-class Point(Part):
+class MapPoint(Part):
     """One run of the map.
 
     Attributes
@@ -92,7 +92,7 @@ class Point(Part):
     regime: Regime
     axis: str
     condition: str
-    settings: Settings
+    settings: PointSettings
     fraction: float
     reference: bool
 
@@ -110,7 +110,7 @@ class Point(Part):
         """A setting that is a number."""
         return float(self.settings[name])
 
-    def label(self, base: Settings) -> str:
+    def label(self, base: PointSettings) -> str:
         """What sets the condition apart from the base point, in words."""
         shown = [
             words.format(self.settings[name])
@@ -126,7 +126,7 @@ def _digest(content: Mapping[str, str | float]) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:8]
 
 
-def load_points(file: Path, regime: str) -> list[Point]:
+def load_points(file: Path, regime: str) -> list[MapPoint]:
     """The points of a regime, each condition's reference first.
 
     Raises
@@ -134,7 +134,7 @@ def load_points(file: Path, regime: str) -> list[Point]:
     InputError
         The file is no such map, or lacks the regime.
     """
-    design, known = _Regime.read(file, regime), dict[str, Point]()
+    design, known = _Regime.read(file, regime), dict[str, MapPoint]()
     try:
         for axis, settings in design.conditions():
             if axis != "base" and settings == design.base:
@@ -143,7 +143,7 @@ def load_points(file: Path, regime: str) -> list[Point]:
             shared = {"regime": regime, "axis": axis, "condition": condition, "settings": settings}
             for fraction, reference in design.steps():
                 step = {"fraction": fraction, "reference": reference}
-                point = Point.model_validate({**shared, **step})
+                point = MapPoint.model_validate({**shared, **step})
                 known.setdefault(point.name, point)
     except ValidationError as error:
         raise explained(error, file) from None
@@ -153,7 +153,7 @@ def load_points(file: Path, regime: str) -> list[Point]:
 # --- the beds that columns and drags start from ----------------------------------------------
 
 
-def bed_settings(points: Iterable[Point]) -> dict[str, Settings]:
+def bed_settings(points: Iterable[MapPoint]) -> dict[str, PointSettings]:
     """Every bed that a column or a drag among the points starts from, by its run id."""
     return {
         bed_name(point.settings): _bed(point.settings)
@@ -162,12 +162,12 @@ def bed_settings(points: Iterable[Point]) -> dict[str, Settings]:
     }
 
 
-def bed_name(settings: Settings) -> str:
+def bed_name(settings: PointSettings) -> str:
     """Run id of the bed that a point with these settings starts from."""
     return f"bed-{_digest(_bed(settings))}"
 
 
-def _bed(settings: Settings) -> dict[str, float]:
+def _bed(settings: PointSettings) -> dict[str, float]:
     """What a bed depends on; one of elastic particles would never rest, so it is damped."""
     numbers = {
         key: float(settings[key]) for key in ("youngs_modulus_pa", "restitution", "friction")

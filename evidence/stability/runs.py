@@ -23,7 +23,14 @@ from dragdeck.study.model import Motion, Study
 from dragdeck.sweep.cases import load_cases, study_file
 from evidence.beds import settled
 from evidence.stability.measures import PointRun
-from evidence.stability.points import REGIMES, Point, Settings, bed_name, bed_settings, load_points
+from evidence.stability.points import (
+    REGIMES,
+    MapPoint,
+    PointSettings,
+    bed_name,
+    bed_settings,
+    load_points,
+)
 from evidence.stability.scenes import ImpactSettings, LoadedPacking, column_scene, impact_scene
 
 _BED_ENERGY_RATIO = 1e-4
@@ -39,7 +46,7 @@ _TRANSIENT_FRACTION = 0.2
 """Fraction of a drag that its mean force leaves out."""
 
 
-def point_case(base: Case, settings: Settings, fraction: float) -> Case:
+def point_case(base: Case, settings: PointSettings, fraction: float) -> Case:
     """The study's case with a point's values.
 
     The limits of the study model do not hold here: the map goes past them on
@@ -112,7 +119,7 @@ def run_map(map_file: Path, folder: Path, cores: int) -> list[PointRun]:
     return runs
 
 
-def _settled_bed(base: Case, name: str, settings: Settings, batch: Batch) -> Bed:
+def _settled_bed(base: Case, name: str, settings: PointSettings, batch: Batch) -> Bed:
     """A bed, settled with a small step."""
     case = point_case(base, settings, _SAFE_FILLING_FRACTION)
     filling = case.study.filling.model_copy(update={"energy_ratio": _BED_ENERGY_RATIO})
@@ -120,7 +127,7 @@ def _settled_bed(base: Case, name: str, settings: Settings, batch: Batch) -> Bed
     return read_bed(settled(batch, name, filling_scene(replace(case, study=study))))
 
 
-def _scene_of(point: Point, base: Case, beds: Mapping[str, Bed]) -> AnyScene:
+def _scene_of(point: MapPoint, base: Case, beds: Mapping[str, Bed]) -> AnyScene:
     case, source = point_case(base, point.settings, point.fraction), bed_name(point.settings)
     if point.regime == "impact":
         how = ImpactSettings(*map(point.number, ("speed_m_s", "angle_deg", "size_ratio")))

@@ -212,13 +212,13 @@ _DRAG_S = 0.004
 _TEST_STEPS = 4000
 _FRAME_STEPS = 20
 
-Packing = Literal["stack", "bed"]
+BedKind = Literal["stack", "bed"]
 
 
 class LoadedPacking(Part):
     """Particles at rest under gravity times a factor."""
 
-    packing: Packing
+    packing: BedKind
     load_factor: float
 
 

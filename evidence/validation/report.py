@@ -47,7 +47,7 @@ class MeanOfPackings(Part):
     mean: Estimate
 
 
-class Compared(Part):
+class ComparedValue(Part):
     """The drag beside a reference figure of the study.
 
     Attributes
@@ -117,7 +117,7 @@ class Validation(Document):
     run_std: Real
     bed_fraction: Real
     means: tuple[MeanOfPackings, ...]
-    comparison: tuple[Compared, ...]
+    comparison: tuple[ComparedValue, ...]
     effects: tuple[Effect, ...]
 
 
@@ -198,7 +198,7 @@ def validation_of(
             if mean.known
         ),
         comparison=tuple(
-            Compared(
+            ComparedValue(
                 **published.model_dump(include={"label", "mean_n", "std_n"}),
                 difference=published.difference(drag),
                 std_ratio=std.over(published.std_n) if published.std_n else None,

@@ -61,10 +61,10 @@ PUBLISHED = "published curve"
 JUDGED = (EXACT, INTEGRATED)
 """References that are the same law: a difference is a failure."""
 
-Verdict = Literal["pass", "fail", "agrees", "differs"]
+CheckVerdict = Literal["pass", "fail", "agrees", "differs"]
 """``pass`` or ``fail`` against the same law, ``agrees`` or ``differs`` against another one."""
 
-Rows = Sequence[tuple[float, float, float]]
+CheckRows = Sequence[tuple[float, float, float]]
 """Rows of x, reference and engine."""
 
 
@@ -86,7 +86,7 @@ class QuantityCheck:
 
     quantity: str
     against: str
-    rows: Rows
+    rows: CheckRows
     tolerance: float
     scale: float | None = None
     series: str = ""
@@ -142,11 +142,11 @@ def series_name(run: Recording) -> str:
     return f"{name}, {case.steps_per_contact} steps a contact" if steps else name
 
 
-Compared = Sequence[tuple[Recording, QuantityCheck]]
+ComparedRuns = Sequence[tuple[Recording, QuantityCheck]]
 """Comparisons, each with its run."""
 
 
-def checks_by_test(runs: Sequence[Recording]) -> Mapping[str, Compared]:
+def checks_by_test(runs: Sequence[Recording]) -> Mapping[str, ComparedRuns]:
     """All comparisons of all runs by their test, in the order of the tests.
 
     Raises

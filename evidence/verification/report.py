@@ -15,7 +15,13 @@ from dragdeck.engine.batch import Batch
 from dragdeck.engine.reports import say
 from dragdeck.errors import RejectedRunError
 from dragdeck.project import find_project, run_path, study_templates
-from evidence.verification.checks import JUDGED, Compared, Verdict, check_rows, checks_by_test
+from evidence.verification.checks import (
+    JUDGED,
+    CheckVerdict,
+    ComparedRuns,
+    check_rows,
+    checks_by_test,
+)
 from evidence.verification.experiment import collide_scene
 from evidence.verification.recording import read_recording
 from evidence.verification.suite import suite_file, suite_of
@@ -140,10 +146,10 @@ def worst_rows(checks: pd.DataFrame) -> pd.DataFrame:
 def counts(summary: pd.DataFrame) -> dict[str, int]:
     """How many rows have each verdict."""
     verdicts = summary["verdict"].tolist()
-    return {name: verdicts.count(name) for name in get_args(Verdict)}
+    return {name: verdicts.count(name) for name in get_args(CheckVerdict)}
 
 
-def _section(test: str, compared: Compared, summary: pd.DataFrame) -> Mapping[str, object]:
+def _section(test: str, compared: ComparedRuns, summary: pd.DataFrame) -> Mapping[str, object]:
     """A test on the page: comparisons with the law that the engine claims to compute, and others.
 
     Its steps are the time steps in the shortest contact of its runs.
@@ -164,7 +170,7 @@ def _shown(rows: pd.DataFrame) -> Rows:
         Markup('<span class="{}">{}</span>').format(_CLASSES[word], word)
         for word in rows["verdict"]
     ]
-    shown = rows.assign(quantity=rows["quantity"].map(in_words), verdict=verdicts)
+    shown = rows.assign(quantity=rows["quantity"].map(quantity_words), verdict=verdicts)
     return shown.to_dict("records")
 
 
@@ -180,7 +186,7 @@ _UNITS = {
 }
 
 
-def in_words(quantity: str) -> str:
+def quantity_words(quantity: str) -> str:
     """A quantity's name in words, its unit in brackets."""
     for ending, unit in _UNITS.items():
         if quantity.endswith(ending):

@@ -4,7 +4,7 @@ import pandas as pd
 from paths import ROOT
 from scipy.stats import binomtest
 
-from benchmarks.removal_coverage import coverage, settings
+from benchmarks.removal_coverage import removal_coverage, removal_settings
 
 RECORD = pd.read_csv(ROOT / "docs/data/loading/removal_coverage.csv", keep_default_na=False)
 
@@ -20,7 +20,7 @@ def test_each_recorded_coverage_is_that_of_a_95_percent_interval() -> None:
     whose interval is not narrower than by their scatter alone.
     """
     named = RECORD[["packings", "weighed_trials", "setting"]].drop_duplicates()
-    assert named.to_dict("records") == [key for key, _ in settings()]
+    assert named.to_dict("records") == [key for key, _ in removal_settings()]
     known = RECORD[RECORD["available"] >= 0.1]
     rare, frequent = [], []
     for row in known.itertuples():
@@ -45,7 +45,7 @@ def test_only_percentiles_are_ever_not_available() -> None:
 
 def test_a_small_repetition_agrees_with_the_record() -> None:
     """About 80 quantities, 8 times each; what is not available is known to be so."""
-    found = coverage(8, seed=7)
+    found = removal_coverage(8, seed=7)
     assert found["quantity"].tolist() == RECORD["quantity"].tolist()
     assert 0.90 <= found["coverage"].mean() <= 0.985
     always = RECORD["available"] > 0.99

@@ -5,14 +5,14 @@ import pandas as pd
 import pytest
 from paths import ROOT
 
-from benchmarks.windows_coverage import coverage, settings
+from benchmarks.windows_coverage import windows_coverage, windows_settings
 
 RECORD = pd.read_csv(ROOT / "docs/data/windows/coverage.csv")
 
 
 def test_the_record_is_of_these_settings() -> None:
-    names = list(next(settings())[0])
-    assert RECORD[names].to_dict("records") == [dict(named) for named, _ in settings()]
+    names = list(next(windows_settings())[0])
+    assert RECORD[names].to_dict("records") == [dict(named) for named, _ in windows_settings()]
 
 
 def test_intervals_contain_the_truth_and_values_are_not_biased() -> None:
@@ -25,6 +25,6 @@ def test_intervals_contain_the_truth_and_values_are_not_biased() -> None:
 
 
 def test_a_small_repetition_agrees_with_the_record() -> None:
-    few = coverage(4, seed=7)
+    few = windows_coverage(4, seed=7)
     assert 0.90 <= few["coverage"].mean() <= 0.995
     assert few["cost"].mean() == pytest.approx(RECORD["cost"].mean(), rel=0.2)

@@ -14,7 +14,7 @@ from dragdeck.project import Project
 from dragdeck.records.run import RunRecord
 from dragdeck.sweep.cases import load_cases
 from evidence.__main__ import main
-from evidence.costs import Option, cost, geometric, option_cases, options, time_options
+from evidence.costs import CostOption, cost, geometric, option_cases, options, time_options
 
 SECONDS = 0.05
 
@@ -45,7 +45,7 @@ def test_a_cost_counts_steps_or_seconds() -> None:
     pairs = [(record(6.0, 0.5, 200), base), (record(1.5, 0.5, 200), base)]
     own = {"fidelity.timestep_fraction": 0.2}
     step, second = (
-        cost(Option(name="", what="", unit=unit), own, pairs, (0.5e-5, 1e-5), "standard")
+        cost(CostOption(name="", what="", unit=unit), own, pairs, (0.5e-5, 1e-5), "standard")
         for unit in ("per_step", "per_second")
     )
     assert step.ratio == step.per_step == second.per_step == pytest.approx(1.5)
@@ -54,7 +54,8 @@ def test_a_cost_counts_steps_or_seconds() -> None:
     assert step.ci95_low is not None and step.ci95_low < 0.75
     assert second.ci95_low == pytest.approx(2 * step.ci95_low)
     assert (step.parameter, step.level, step.rounds) == ("timestep_fraction", 0.2, 2)
-    alone = cost(Option(name="", what=""), {"bowl.facet_size_m": 1}, pairs[:1], (1, 1), "standard")
+    unnamed = CostOption(name="", what="")
+    alone = cost(unnamed, {"bowl.facet_size_m": 1}, pairs[:1], (1, 1), "standard")
     assert (alone.ci95_low, alone.ci95_high, alone.parameter) == (None, None, None)
 
 

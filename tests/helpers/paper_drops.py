@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from dragchain.calibration.drops import Drop, DropTest, Purpose
+from dragchain.calibration.drops import Drop, DropPurpose, DropTestOfStudy
 from dragchain.calibration.simulated_drops import DropRun, Drops, Waveform
 from dragdeck.scenes.drop_test import DropFidelity
 
@@ -26,7 +26,7 @@ def paper_drop(
     *,
     bias: float = 0.0,
     height: float = HEIGHT,
-    purpose: Purpose = "reference",
+    purpose: DropPurpose = "reference",
     contact_s: float = 25e-6,
     jitter: float = 0.0,
 ) -> DropRun:
@@ -65,7 +65,7 @@ def paper_drops(
             )
             for _ in range(2)
         ]
-    known = DropTest(
+    known = DropTestOfStudy(
         study="paper",
         title="on paper",
         pair="a-b",

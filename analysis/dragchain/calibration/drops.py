@@ -22,11 +22,11 @@ from dragdeck.study.model import Study
 IMPACTS = 3
 """Impacts compared at the most (Uhlmann et al. 2015, section 4)."""
 
-Purpose = Literal["production", "reference", "confirm"]
+DropPurpose = Literal["production", "reference", "confirm"]
 """Of a drop: as the process runs; full modulus, fine step; production at the fitted value."""
 
 
-class DropTest(Part):
+class DropTestOfStudy(Part):
     """The drop test of the study, as in ``result.json``.
 
     Attributes
@@ -58,7 +58,7 @@ class DropTest(Part):
     restitution_now: float
 
     @classmethod
-    def of(cls, case: Case) -> "DropTest":
+    def of(cls, case: Case) -> "DropTestOfStudy":
         """The drop test of a case with a measured one."""
         study, section = case.study, measurements(case.study.calibration, case.file)
         particle, plate = study.media.main_material, study.workpiece.material
@@ -109,7 +109,7 @@ class Drop:
     """
 
     name: str
-    purpose: Purpose
+    purpose: DropPurpose
     restitution: float
     height_m: float
     fidelity: DropFidelity

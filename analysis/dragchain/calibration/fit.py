@@ -16,8 +16,8 @@ from scipy.optimize import least_squares
 from scipy.stats import chi2
 
 from dragchain.arrays import Floats
-from dragchain.calibration.drops import IMPACTS, DropTest
-from dragchain.calibration.measured_impacts import Impact, Measured, pulse
+from dragchain.calibration.drops import IMPACTS, DropTestOfStudy
+from dragchain.calibration.measured_impacts import Impact, MeasuredImpacts, pulse
 from dragchain.calibration.simulated_drops import DropRun, Drops, Emulator, Waveform
 from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate
 from dragdeck.errors import RecordError
@@ -53,14 +53,14 @@ class Sampling:
     width_s: Floats
 
 
-def sample_impacts(shapes: Sequence[Waveform], measured: Measured) -> Sampling:
+def sample_impacts(shapes: Sequence[Waveform], measured: MeasuredImpacts) -> Sampling:
     """Sample a simulated impact for each measured one many times at its rate, with its noise.
 
     Parameters
     ----------
     shapes : sequence of Waveform
         At the full modulus: as long as the real impacts.
-    measured : Measured
+    measured : MeasuredImpacts
         Rate, noise and threshold, and the peaks to which the forces are scaled.
 
     Raises
@@ -74,7 +74,7 @@ def sample_impacts(shapes: Sequence[Waveform], measured: Measured) -> Sampling:
     )
 
 
-def _sampled(shape: Waveform, measured: Measured, peak_n: float) -> list[float]:
+def _sampled(shape: Waveform, measured: MeasuredImpacts, peak_n: float) -> list[float]:
     """The numbers of a `Sampling` of one impact."""
     random = np.random.default_rng(_SAMPLING_SEED)
     step, (start, end) = measured.interval_s, (shape.time_s[0], shape.time_s[-1])
@@ -127,7 +127,7 @@ class Observed:
     peaks_std: Floats
 
 
-def observe(measured: Measured, sampling: Sampling, *, with_peaks: bool) -> Observed:
+def observe(measured: MeasuredImpacts, sampling: Sampling, *, with_peaks: bool) -> Observed:
     """Times and peaks of a record with their uncertainties, and whether to compare the peaks."""
     time = np.array([impact.centroid_s for impact in measured.impacts]) - sampling.time_bias_s
     peak = np.array([impact.peak_n for impact in measured.impacts]) / sampling.peak_ratio
@@ -185,7 +185,7 @@ class Fit(Part):
     residuals: tuple[float, ...]
 
 
-def fit(observed: Observed, emulator: Emulator, contact: Emulator, known: DropTest) -> Fit:
+def fit(observed: Observed, emulator: Emulator, contact: Emulator, known: DropTestOfStudy) -> Fit:
     """The deck value with the least misfit, and its interval, by weighted least squares.
 
     The drop height is a second unknown, known to `height_std_m`: flight times go with its root.
@@ -197,7 +197,7 @@ def fit(observed: Observed, emulator: Emulator, contact: Emulator, known: DropTe
         The sweep.
     contact : Emulator
         That at the full modulus, for the contact part of the times: the real particle is hard.
-    known : DropTest
+    known : DropTestOfStudy
 
     Raises
     ------
@@ -255,7 +255,7 @@ class RecordFit:
 
     Attributes
     ----------
-    measured : Measured
+    measured : MeasuredImpacts
     sampling : Sampling
     observed : Observed
     width_ratio : float
@@ -265,7 +265,7 @@ class RecordFit:
         At production and at the full modulus.
     """
 
-    measured: Measured
+    measured: MeasuredImpacts
     sampling: Sampling
     observed: Observed
     width_ratio: float
@@ -279,7 +279,7 @@ class RecordFit:
         return len(self.observed.log_peaks) > 0
 
 
-def calibrate(measured: Measured, drops: Drops) -> RecordFit:
+def calibrate(measured: MeasuredImpacts, drops: Drops) -> RecordFit:
     """Fit the restitution to a record.
 
     Raises
@@ -309,7 +309,7 @@ def _nearest_shapes(impacts: Sequence[Impact], runs: Sequence[DropRun]) -> tuple
     return runs[int(np.argmin(np.abs(np.array(times) - flight)))].impacts
 
 
-def _as_the_sensor_shows(measured: Measured, sampling: Sampling) -> Sampling:
+def _as_the_sensor_shows(measured: MeasuredImpacts, sampling: Sampling) -> Sampling:
     """What rate and noise do to impacts that a slow sensor widens.
 
     Each is taken to look like the first, whose samples are drawn again. Only

@@ -72,7 +72,7 @@ class Impact(Part):
     samples: int
 
 
-class Measured(Document):
+class MeasuredImpacts(Document):
     """The impacts of a measured record: ``record.json``.
 
     Attributes
@@ -109,7 +109,7 @@ class Measured(Document):
         return self.offset_n + self.drift_n_per_s * (time_s - start_s)
 
 
-def measure_impacts(record: Record, *, fall_time_s: float) -> Measured:
+def measure_impacts(record: Record, *, fall_time_s: float) -> MeasuredImpacts:
     """Find baseline, noise and the first impacts of a record.
 
     Parameters
@@ -144,7 +144,7 @@ def measure_impacts(record: Record, *, fall_time_s: float) -> Measured:
     _check_order(impacts)
     first = slice(max(whole[0][0] - 1, 0), whole[0][1] + 2)
     two: tuple[Note, ...] = ("two_impacts",) if len(impacts) < IMPACTS else ()
-    return Measured(
+    return MeasuredImpacts(
         interval_s=record.interval_s,
         offset_n=offset,
         drift_n_per_s=drift,

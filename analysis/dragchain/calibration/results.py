@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pandas as pd
 
-from dragchain.calibration.drops import DropTest
+from dragchain.calibration.drops import DropTestOfStudy
 from dragchain.calibration.fit import Fit, RecordFit
-from dragchain.calibration.measured_impacts import Measured
+from dragchain.calibration.measured_impacts import MeasuredImpacts
 from dragchain.calibration.simulated_drops import Drops
 from dragchain.errors import TableError
 from dragchain.statistics.estimate import Estimate
@@ -29,13 +29,13 @@ class CalibrationFile(Document):
         Ratio of the widths of the first impact, measured / simulated with the same sampling.
     correction : float
         Fitted input value minus measured restitution.
-    known : DropTest
+    known : DropTestOfStudy
         The study and its drop test.
     put : float
         The value to set in the study as the restitution of the pair.
     peaks_compared : bool
         Whether peak forces were fitted too.
-    record : Measured
+    record : MeasuredImpacts
         Impacts of the measured record.
     """
 
@@ -43,14 +43,14 @@ class CalibrationFile(Document):
 
     fit: Fit
     fit_full: Fit
-    known: DropTest
+    known: DropTestOfStudy
     put: float
     measured: Estimate
     effective: float
     peaks_compared: bool
     width_ratio: float
     correction: float
-    record: Measured
+    record: MeasuredImpacts
 
 
 def result(fit: RecordFit) -> CalibrationFile:

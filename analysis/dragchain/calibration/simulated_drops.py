@@ -12,7 +12,7 @@ import pandas as pd
 from numpy.polynomial.polynomial import polyfit, polyval
 
 from dragchain.arrays import Floats
-from dragchain.calibration.drops import IMPACTS, Drop, DropTest, Purpose, drop_case
+from dragchain.calibration.drops import IMPACTS, Drop, DropPurpose, DropTestOfStudy, drop_case
 from dragchain.errors import TableError
 from dragchain.tables.impacts import speed_at_plate
 from dragchain.tables.run_folder import Run
@@ -82,14 +82,14 @@ class DropRun:
 class Drops:
     """Drops, and the drop test of the study."""
 
-    known: DropTest
+    known: DropTestOfStudy
     runs: tuple[DropRun, ...]
 
-    def select(self, purpose: Purpose) -> list[DropRun]:
+    def select(self, purpose: DropPurpose) -> list[DropRun]:
         """The runs of a purpose."""
         return [run for run in self.runs if run.drop.purpose == purpose]
 
-    def _emulator(self, purpose: Purpose) -> "Emulator":
+    def _emulator(self, purpose: DropPurpose) -> "Emulator":
         known, runs = self.known, self.select(purpose)
         return emulate(runs, known.height_m, known.gravity_m_s2, single=purpose == "reference")
 
@@ -130,7 +130,7 @@ def run_drops(case: Case, drops: Sequence[Drop], batch: Batch, report: Report) -
         if number % 20 == 0 or number == len(drops):
             report(f"{number} of {len(drops)} drops done")
     runs = tuple(_read_drop(batch.folder / drop.name, drop) for drop in drops)
-    return Drops(DropTest.of(case), runs)
+    return Drops(DropTestOfStudy.of(case), runs)
 
 
 def _read_drop(folder: Path, drop: Drop) -> DropRun:

@@ -33,7 +33,7 @@ from dragdeck.records.case import CaseOfRun
 # --- columns as bytes ----------------------------------------------------------------------------
 
 
-Kind = Literal["u8", "u16", "u32", "f24"]
+NumberKind = Literal["u8", "u16", "u32", "f24"]
 """Whole numbers of 1, 2 or 4 bytes, or the first 3 bytes of a single-precision number."""
 
 _BYTES = {"u8": 1, "u16": 2, "u32": 4, "f24": 3}
@@ -61,7 +61,7 @@ class PackedColumns:
     entries: list[dict[str, str | int]] = field(default_factory=list)
     _parts: list[bytes] = field(default_factory=list)
 
-    def add(self, name: str, kind: Kind, values: NDArray[Any]) -> None:
+    def add(self, name: str, kind: NumberKind, values: NDArray[Any]) -> None:
         """Add a column; values are (N,) or are taken row by row."""
         flat = np.ravel(values)
         whole = short_floats(flat) if kind == "f24" else flat

@@ -79,7 +79,7 @@ LONG_WAVE, SHORT_WAVE = 2.0, 0.25
 # --- blocks of the path --------------------------------------------------------------------------
 
 
-Rows = tuple[Ints, Floats]
+PathRows = tuple[Ints, Floats]
 """Steps, (N,), and values, (N, ...), of N rows of a table."""
 
 
@@ -124,7 +124,7 @@ class CountedPath:
         count = np.bincount(block, minlength=self.blocks)
         return Blocks(count / (self.length_m / self.blocks), np.ones(self.blocks))
 
-    def parts(self, rows: Iterable[Rows]) -> Iterator[tuple[int, Floats]]:
+    def parts(self, rows: Iterable[PathRows]) -> Iterator[tuple[int, Floats]]:
         """Values of rising steps block by block: number of the block, and what is in it.
 
         Parameters
@@ -254,7 +254,7 @@ def band_pass(series: Floats, spacing_m: float, shortest_m: float, longest_m: fl
     return np.fft.irfft(amplitude, n=len(series))
 
 
-def _pushing_contacts(run_dir: Path) -> Iterator[Rows]:
+def _pushing_contacts(run_dir: Path) -> Iterator[PathRows]:
     """Normal force and overlap of contacts that push the workpiece, (N, 2).
 
     A silent contact overlaps without a force and does not count.
@@ -320,7 +320,7 @@ def _of_network(run_dir: Path, path: CountedPath) -> dict[str, Blocks]:
     }
 
 
-def _overlaps(file: Path, path: CountedPath) -> Iterator[Rows]:
+def _overlaps(file: Path, path: CountedPath) -> Iterator[PathRows]:
     """Overlaps of particles over the mean diameter, from the path's beginning on."""
     for rows in read_groups(file, ["step", "kind", "overlap_m"]):
         inner = rows[(rows["kind"] == "particle-particle") & (rows["step"] > path.first_step)]

@@ -146,7 +146,7 @@ def _alike(a: Any, b: Any) -> bool:
     return bool(a == b)
 
 
-def directions(steps: Ints, ref_xy_m: Floats, case: CaseOfRun) -> Floats:
+def headings(steps: Ints, ref_xy_m: Floats, case: CaseOfRun) -> Floats:
     """Direction of the workpiece's motion in the horizontal plane.
 
     In the drag that of its path; before it, the direction with which the drag starts.

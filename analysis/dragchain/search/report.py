@@ -1,7 +1,7 @@
 """The next round of a search, and the page on what it has found."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from textwrap import fill
 from typing import Any, NamedTuple
@@ -15,7 +15,7 @@ from dragchain.figures.style import BLUE, GREEN, GREY, MARKERS, ORANGE, RED, WID
 from dragchain.report.campaign import write_report
 from dragchain.report.page import number, with_interval
 from dragchain.search.rounds import (
-    Measured,
+    PointMeasure,
     SearchedStudy,
     SearchFindings,
     label,
@@ -50,9 +50,7 @@ def write_round(study: str) -> None:
     print(advance(SearchedStudy(find_project(Path.cwd()), study)))
 
 
-def advance(
-    studied: SearchedStudy, measure: Callable[[SearchedStudy, SearchPoint], Measured] = read_point
-) -> str:
+def advance(studied: SearchedStudy, measure: PointMeasure = read_point) -> str:
     """One step of a search; see `write_round`. `measure` reads the runs of a setting."""
     file, asked = studied.record, studied.asked()
     record = SearchRecord.read(file) if file.is_file() else SearchRecord(asked=asked)

@@ -187,11 +187,13 @@ class SearchedStudy:
         return {field: self.search.value(field, float(part)) for field, part in parts}
 
 
-Measured = Floats | str | None
+PointValues = Floats | str | None
 """Of a setting: its (P, Q) quantities in each packing; why its runs were rejected; or not yet."""
 
+PointMeasure = Callable[[SearchedStudy, SearchPoint], PointValues]
 
-def read_point(studied: SearchedStudy, point: SearchPoint) -> Measured:
+
+def read_point(studied: SearchedStudy, point: SearchPoint) -> PointValues:
     """What the runs of a setting say."""
     folders = studied.folders(point.values)
     states = [run_status(folder) for folder in folders]
@@ -341,9 +343,7 @@ def loss(objective: Objective, value: Any) -> Any:
 
 
 def read_findings(
-    studied: SearchedStudy,
-    points: Sequence[SearchPoint],
-    measure: Callable[[SearchedStudy, SearchPoint], Measured],
+    studied: SearchedStudy, points: Sequence[SearchPoint], measure: PointMeasure
 ) -> SearchFindings | None:
     """Read all points; those whose runs were rejected say so then. None if a run has not ended."""
     rows, known = list[Floats](), list[SearchPoint]()

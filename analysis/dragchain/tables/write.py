@@ -15,7 +15,7 @@ from dragchain.errors import TableError
 from dragchain.run.case import attracts, friction_with
 from dragchain.run.kinematics import (
     counted_mask,
-    directions,
+    headings,
     needed,
     phase_codes,
     spins,
@@ -54,7 +54,7 @@ from dragdeck.study.drive import wrap_angle
 
 
 @dataclass(frozen=True)
-class Table:
+class RunTable:
     """A file that is made of a run.
 
     Attributes
@@ -123,7 +123,7 @@ def _write_workpiece_force(run: Run, file: Path) -> None:
 def workpiece_force_rows(rows: Columns, case: CaseOfRun) -> Rows:
     """Add phase, path frame, body frame and ``in_statistics`` to raw samples of the force."""
     steps = np.asarray(rows["step"], dtype=np.int64)
-    heading = directions(steps, np.column_stack([rows["ref_x_m"], rows["ref_y_m"]]), case)
+    heading = headings(steps, np.column_stack([rows["ref_x_m"], rows["ref_y_m"]]), case)
     force = np.column_stack([rows[name] for name in FORCES]).astype(np.float64)
     drag, lateral, vertical = workpiece_frame(force, heading).T
     body: Rows = {}
@@ -256,7 +256,7 @@ def workpiece_contact_rows(
         The columns; forces are on the workpiece, velocities those of the particle's
         surface against the workpiece's.
     """
-    heading = directions(steps, references[:, :2], case)
+    heading = headings(steps, references[:, :2], case)
     relative = contacts.surface_m_s - workpiece_velocity(steps, contacts.point_m, references, case)
     apart = np.einsum("ij,ij->i", relative, contacts.normal)
     x, y = (contacts.point_m - references)[:, :2].T
@@ -388,23 +388,23 @@ def _write_packing(run: Run, file: Path) -> None:
     describe_bed(of_bodies, run.case, spheres).write(file)
 
 
-_THERMO = Table("thermo.parquet", ("thermo",), _write_thermo)
-_PARTICLES = Table("particles.parquet", ("particles",), _write_particles)
+_THERMO = RunTable("thermo.parquet", ("thermo",), _write_thermo)
+_PARTICLES = RunTable("particles.parquet", ("particles",), _write_particles)
 
-_TABLES: Mapping[str, tuple[Table, ...]] = {
-    "drop_test": (_THERMO, Table("impacts.parquet", ("impacts",), _write_impacts)),
-    "filling": (_THERMO, _PARTICLES, Table("packing.json", ("particles",), _write_packing)),
+_TABLES: Mapping[str, tuple[RunTable, ...]] = {
+    "drop_test": (_THERMO, RunTable("impacts.parquet", ("impacts",), _write_impacts)),
+    "filling": (_THERMO, _PARTICLES, RunTable("packing.json", ("particles",), _write_packing)),
     "process": (
         _THERMO,
-        Table("workpiece_force.parquet", ("workpiece_force",), _write_workpiece_force),
+        RunTable("workpiece_force.parquet", ("workpiece_force",), _write_workpiece_force),
         _PARTICLES,
-        Table(
+        RunTable(
             "workpiece_contacts.parquet",
             ("workpiece_force", *ON_WORKPIECE),
             _write_workpiece_contacts,
         ),
-        Table("touches.parquet", ("workpiece_force", *TOUCHES), _write_touches),
-        Table("contacts.parquet", ("contacts", "particles", *ON_WORKPIECE), _write_contacts),
+        RunTable("touches.parquet", ("workpiece_force", *TOUCHES), _write_touches),
+        RunTable("contacts.parquet", ("contacts", "particles", *ON_WORKPIECE), _write_contacts),
     ),
 }
 """What is made of a run of each scene, in this order."""

@@ -13,7 +13,7 @@ from dragchain import TableError, load_case
 from dragchain.run.kinematics import (
     bowl_velocity,
     counted_mask,
-    directions,
+    headings,
     motion_of,
     phase_codes,
     spins,
@@ -91,17 +91,17 @@ def test_a_case_without_drag_is_an_error(case: CaseOfRun) -> None:
 )
 def test_on_a_circle_the_workpiece_heads_along_the_tangent(circling, sense, place, heading) -> None:
     turned = moving(circling, CIRCLE | {"direction": "ccw" if sense > 0 else "cw"})
-    assert directions(np.array([30]), np.array([place]), turned) == pytest.approx(heading)
+    assert headings(np.array([30]), np.array([place]), turned) == pytest.approx(heading)
 
 
 def test_before_the_drag_the_heading_is_the_one_it_starts_with(circling: CaseOfRun) -> None:
     places = np.array([[0.0, 0.0], [0.01, 0.0], [0.0, 0.02]])
-    np.testing.assert_allclose(directions(np.array([5, 15, 20]), places, circling), [pi / 2] * 3)
+    np.testing.assert_allclose(headings(np.array([5, 15, 20]), places, circling), [pi / 2] * 3)
 
 
 def test_on_a_line_the_heading_is_the_lines(case: CaseOfRun) -> None:
     case = moving(case, {"kind": "line", "start_m": [0.0, 0.0], "direction_deg": 270})
-    np.testing.assert_allclose(directions(np.array([0, 30]), np.ones((2, 2)), case), [-pi / 2] * 2)
+    np.testing.assert_allclose(headings(np.array([0, 30]), np.ones((2, 2)), case), [-pi / 2] * 2)
 
 
 def test_the_workpiece_frame_of_a_workpiece_that_moves_along_y() -> None:
@@ -127,7 +127,7 @@ def test_a_workpiece_at_rest_has_no_velocity_and_one_direction(case: CaseOfRun) 
     rest = {"kind": "rest", "radius_m": 0.01, "bowl_rpm": rpm, "revolutions": 20 * DT / pi}
     case = moving(case, rest, None)
     steps, place = np.array([20, 30]), np.array([[0.01, 0.0, 0.0]] * 2)
-    np.testing.assert_allclose(directions(steps, place[:, :2], case), [-pi / 2] * 2)
+    np.testing.assert_allclose(headings(steps, place[:, :2], case), [-pi / 2] * 2)
     turn = workpiece_rotation(steps, np.full(2, -pi / 2), case).turn_rad
     np.testing.assert_allclose(turn, [-pi / 2] * 2)
     velocity = workpiece_velocity(steps, place + 0.001, place, case)
@@ -159,13 +159,13 @@ def on_waypoints(case: CaseOfRun) -> CaseOfRun:
 def test_a_stretch_without_a_direction_keeps_the_last_one(on_waypoints: CaseOfRun) -> None:
     """The first one has that of the next; a stage owns its last step."""
     steps = np.array([0, 20, 21, 23, 24, 27, 28, 29, 30, 31, 32, 40])
-    found = directions(steps, np.zeros((12, 2)), on_waypoints)
+    found = headings(steps, np.zeros((12, 2)), on_waypoints)
     np.testing.assert_allclose(found, [-pi / 2] * 10 + [pi] * 2)
 
 
 def test_the_workpiece_does_not_turn_on_waypoints(on_waypoints: CaseOfRun) -> None:
     steps = np.array([0, 21, 40])
-    heading = directions(steps, np.zeros((3, 2)), on_waypoints)
+    heading = headings(steps, np.zeros((3, 2)), on_waypoints)
     turn = workpiece_rotation(steps, heading, on_waypoints).turn_rad
     np.testing.assert_allclose(turn, -pi / 2)
     assert not motion_of(on_waypoints).keeps_direction
