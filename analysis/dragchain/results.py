@@ -15,7 +15,7 @@ from dragchain.errors import TableError, UnknownNameError
 from dragchain.quantities.basis import Basis, notes
 from dragchain.quantities.document import EXTRAPOLATED, Extrapolated
 from dragchain.report.cases import read_if_there
-from dragchain.report.findings import FILE, ProcessFindings
+from dragchain.report.findings import FINDINGS_FILE, ProcessFindings
 from dragchain.report.run_data import RunData, process_findings
 from dragchain.report.values import Values, values_of
 from dragchain.run.case import upstream_folders
@@ -199,7 +199,7 @@ class FinishedRun(RunData):
         """
         if self.case.scene != "process":
             raise TableError(f"{self.folder}: the scene is {self.case.scene}, not process")
-        file = self.folder / FILE
+        file = self.folder / FINDINGS_FILE
         return ProcessFindings.read(file) if file.is_file() else process_findings(self)
 
     def upstream(self, scene: Literal["filling", "drop_test"]) -> "FinishedRun":

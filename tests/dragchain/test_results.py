@@ -11,7 +11,7 @@ from report_files import case_json as upstream_case
 from tiny_run_files import chain_n
 
 from dragchain import DocumentError, RejectedRunError, TableError, UnknownNameError, load
-from dragchain.report.findings import FILE
+from dragchain.report.findings import FINDINGS_FILE
 from dragchain.report.run_data import write_findings
 
 
@@ -193,7 +193,7 @@ def test_filling_and_drop_test_of_a_run(project: Path) -> None:
 
 def test_findings_are_those_of_the_report(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run = load("small").run("deep")
-    assert not (run.folder / FILE).exists()
+    assert not (run.folder / FINDINGS_FILE).exists()
     computed = run.findings
     counted = run.force.loc[run.force["in_statistics"], "drag_n"]
     assert run.values.drag.run.value == pytest.approx(counted.mean())

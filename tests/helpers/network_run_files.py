@@ -11,14 +11,14 @@ from figure_files import DRAG_START, LAST, PERIOD, STEP_S, case_json
 from made_run import output, particles_kept, run_json, save, write_documents
 from networks import RADIUS_M, random_frame
 
-from dragchain.network.frame import KINDS, PARTICLE
+from dragchain.network.frame import BODY_NAMES, PARTICLE
 from dragchain.network.write import write_chains
 
 PEAKS_S = (0.150, 0.305, 0.262)
 """Process times of the highest, second and third peak of the drag force."""
 
 PEAK_N = (6.0, 5.0, 4.0)
-KIND = {body: f"particle-{name}" for body, name in KINDS.items()}
+KIND = {body: f"particle-{name}" for body, name in BODY_NAMES.items()}
 
 
 def write_network_run(folder: Path, kind: str = "cylinder", **changes: Any) -> Path:

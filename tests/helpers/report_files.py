@@ -20,7 +20,7 @@ from dragchain.quantities.document import (
 )
 from dragchain.quantities.registry import REPORTED
 from dragchain.report.findings import (
-    FILE,
+    FINDINGS_FILE,
     AheadBehind,
     AzimuthProfile,
     Chains,
@@ -105,7 +105,7 @@ def make_run(
     folder = results / "small" / case["scene"] / case["run"]
     write_documents(folder, case, record=run_json())
     (folder / "figures").mkdir()
-    findings.write(folder / FILE)
+    findings.write(folder / FINDINGS_FILE)
     if case["scene"] == "process":
         values = dict.fromkeys(FORCES, Estimate.around(drag, 0.1))
         write_measured(folder, **values, drag_std=Estimate.around(0.5, 0.1))

@@ -14,13 +14,13 @@ import pandas as pd
 
 from dragchain.arrays import Floats, Ints
 from dragchain.errors import ExportError, TableError
-from dragchain.network.frame import KINDS, PARTICLE, WORKPIECE, NetworkFrame, frame_of
+from dragchain.network.frame import BODY_NAMES, PARTICLE, WORKPIECE, NetworkFrame, frame_of
 from dragchain.tables.by_step import RisingSteps, read_steps
 from dragchain.tables.columns import CONTACTS, KINEMATICS, ORIENTATION
 from dragchain.tables.run_folder import Run, workpiece_places
 from dragdeck.study.drive import Orientations
 
-_BODY = {name: body for body, name in KINDS.items()}
+_BODY = {name: body for body, name in BODY_NAMES.items()}
 _PARTICLES = ("step", *KINEMATICS)
 MEMBERSHIPS = ("peters_chain", "widest_paths", "dominant")
 _CHAINS = ("step", "definition", "particle_ids", "reaches_bowl", "end_kind", "dominant")

@@ -8,7 +8,7 @@ from dragchain.statistics.estimate import Estimate, EstimateColumns, Real
 from dragdeck.documents import Document
 from dragdeck.parts import Part
 
-FILE = Path("tables") / "loading.json"
+LOADING_FILE = Path("tables") / "loading.json"
 
 
 class Totals(Part):

@@ -19,7 +19,7 @@ from dragchain.figures.rendering import Camera, Image, check_rendering, new_plot
 from dragchain.figures.style import ABOVE_SCALE, GREY, WIDTH_IN, force_map, top_of_scale
 from dragchain.loading.document import Loading, Profile
 from dragchain.loading.samples import Sampled, as_polydata, patches
-from dragchain.loading.summary import DEPTH_BINS
+from dragchain.loading.summary import LOAD_DEPTH_BINS
 from dragchain.run.kinematics import motion_of, needed, spins
 from dragchain.run.workpiece import Surface
 from dragdeck.records.case import CaseOfRun
@@ -189,9 +189,9 @@ def _unrolled_bins(sampled: Sampled, case: CaseOfRun) -> _Bins:
     workpiece = needed(case.workpiece, "workpiece")
     rows = sampled.rows[sampled.rows["workpiece_z_m"] > 1e-3 * workpiece.length_m]
     azimuths, shallowest = circumference(AZIMUTH_BINS), 1e-3 * _depths(case)[0]
-    depths = np.linspace(shallowest, workpiece.immersion_depth_m, DEPTH_BINS + 1)
+    depths = np.linspace(shallowest, workpiece.immersion_depth_m, LOAD_DEPTH_BINS + 1)
     middles, half = 0.5 * (azimuths[:-1] + azimuths[1:]), 0.5 * rows["force_slide_n_m"]
-    sums = np.zeros((DEPTH_BINS, AZIMUTH_BINS))
+    sums = np.zeros((LOAD_DEPTH_BINS, AZIMUTH_BINS))
     for part in parts(rows["azimuth_rad"].to_numpy(np.float64), AZIMUTH_BINS):
         grid = [depths, azimuths]
         sums += np.histogram2d(rows["depth_m"], middles[part], grid, weights=half)[0]

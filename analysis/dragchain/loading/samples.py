@@ -33,7 +33,7 @@ from dragdeck.decks.outputs import TOUCHES, load_outputs
 from dragdeck.records.case import CaseOfRun
 
 WORKPIECE = ("drag_impulse_n_s", "lateral_impulse_n_s", "vertical_impulse_n_s")
-BODY = ("body_x_impulse_n_s", "body_y_impulse_n_s", "body_z_impulse_n_s")
+BODY_IMPULSE = ("body_x_impulse_n_s", "body_y_impulse_n_s", "body_z_impulse_n_s")
 """Impulse on a workpiece that spins, in its own frame."""
 
 TOUCHED = "touches"
@@ -208,7 +208,7 @@ def _with_amounts(
     drag = workpiece_frame(force, heading) * interval_s
     in_body = {}
     if spins(case):
-        in_body = dict(zip(BODY, (rotation.into(force) * interval_s).T, strict=True))
+        in_body = dict(zip(BODY_IMPULSE, (rotation.into(force) * interval_s).T, strict=True))
     added = rows.assign(
         **in_body,
         **dict(zip(POINT, rotation.into(point - reference).T, strict=True)),
@@ -273,7 +273,7 @@ def facet_table(sampled: Sampled, surface: Surface, events: pd.DataFrame) -> pd.
     peak = np.zeros(count)
     np.maximum.at(peak, facet, rows["normal_force_n"])
     samples = np.bincount(facet, rows["contacts"], count).astype(np.int64)
-    names = [name for name in (*AMOUNTS, *WORKPIECE, *BODY) if name in rows]
+    names = [name for name in (*AMOUNTS, *WORKPIECE, *BODY_IMPULSE) if name in rows]
     sums = {name: np.bincount(facet, rows[name], count) for name in names}
     errors = {f"{name}_se": standard_errors(sampled, name, count) for name in _UNCERTAIN}
     area = surface.areas

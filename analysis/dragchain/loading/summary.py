@@ -18,7 +18,7 @@ from dragchain.statistics.correlated import estimates
 from dragchain.statistics.estimate import CONFIDENCE, EstimateColumns
 from dragdeck.records.case import CaseOfRun
 
-DEPTH_BINS = 20
+LOAD_DEPTH_BINS = 20
 
 _KNOWN = (*AMOUNTS, "normal_work_j", "workpiece_work_j")
 """Amounts of which totals are known."""
@@ -148,9 +148,9 @@ def _profile(sampled: Sampled) -> Profile:
     """Force times sliding distance by depth, per metre of path."""
     rows = sampled.rows
     depth = rows["depth_m"].to_numpy()
-    levels = np.linspace(depth.min(), depth.max(), DEPTH_BINS + 1)
-    level = np.clip(np.searchsorted(levels, depth, side="right") - 1, 0, DEPTH_BINS - 1)
-    sums = np.zeros((sampled.frames, DEPTH_BINS))
+    levels = np.linspace(depth.min(), depth.max(), LOAD_DEPTH_BINS + 1)
+    level = np.clip(np.searchsorted(levels, depth, side="right") - 1, 0, LOAD_DEPTH_BINS - 1)
+    sums = np.zeros((sampled.frames, LOAD_DEPTH_BINS))
     np.add.at(sums, (rows["frame"].to_numpy(), level), rows["force_slide_n_m"].to_numpy())
     scale = sampled.path_m / sampled.frames * (levels[1] - levels[0])
     profile = estimates(sums, lambda means: means / scale)

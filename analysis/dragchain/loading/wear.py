@@ -32,7 +32,7 @@ from dragdeck.physics.contact_mechanics import sphere_mass
 from dragdeck.records.case import CaseOfRun
 from dragdeck.study.removal import LAWS, Law, Wearing, impact_angle
 
-FILE = Path("tables") / "wear.json"
+WEAR_FILE = Path("tables") / "wear.json"
 
 TOUCH_QUANTITIES: Mapping[str, tuple[str, float]] = {
     "touch_normal_m_s": ("normal velocity at first touch (mm/s)", 1e3),

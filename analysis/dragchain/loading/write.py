@@ -13,8 +13,7 @@ from dragchain.loading.document import Loading
 from dragchain.loading.figure import workpiece_figure
 from dragchain.loading.samples import DRAWN, Sampled, as_polydata, check_facets, facet_table, sample
 from dragchain.loading.summary import summarise_loading
-from dragchain.loading.wear import FILE as WEAR
-from dragchain.loading.wear import Wear, compute_wear, touch_maps
+from dragchain.loading.wear import WEAR_FILE, Wear, compute_wear, touch_maps
 from dragchain.run.workpiece import Surface, read_surface
 from dragchain.tables.parquet import write_parquet
 from dragdeck.files import write_vtp
@@ -81,7 +80,7 @@ def write_loading(run_dir: Path) -> list[Path]:
     write_parquet(loading.events, events)
     loading.summary.write(summary)
     if loading.wear is not None:
-        loading.wear.write(run_dir / WEAR)
+        loading.wear.write(run_dir / WEAR_FILE)
     if loading.touch_events is not None:
         write_parquet(loading.touch_events, tables / "touch_events.parquet")
     mesh = as_polydata(loading.surface)

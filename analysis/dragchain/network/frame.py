@@ -16,7 +16,7 @@ from dragchain.tables.columns import CENTRE, FORCES, POINT
 PARTICLE, WORKPIECE, FLOOR, SIDE = 1, 0, -1, -2
 """The other body of a contact; the last three are the ``b_id`` of the contacts table."""
 
-KINDS = {PARTICLE: "particle", WORKPIECE: "workpiece", FLOOR: "floor", SIDE: "side"}
+BODY_NAMES = {PARTICLE: "particle", WORKPIECE: "workpiece", FLOOR: "floor", SIDE: "side"}
 
 _CONTACTS = ["step", "a_id", "b_id", *POINT, *FORCES, "normal_force_n"]
 _PARTICLES = ["step", "time_s", "particle_id", *CENTRE, "radius_m"]

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from dragchain.arrays import Floats, Ints
 from dragchain.network import graph_kernels as kernels
-from dragchain.network.frame import FLOOR, KINDS, SIDE, WORKPIECE, NetworkFrame
+from dragchain.network.frame import BODY_NAMES, FLOOR, SIDE, WORKPIECE, NetworkFrame
 
 FORCE_FACTORS = (0.5, 1.0, 1.5, 2.0, 3.0, 5.0, 10.0)
 """Thresholds as multiples of the mean normal force of all the frame's contacts."""
@@ -197,7 +197,7 @@ def frame_statistics(frame: NetworkFrame, clusters: Clusters | None = None) -> d
     mean = _mean(normal)
     of_kind = {
         f"n_particle_{name}_contacts": int((frame.other == kind).sum())
-        for kind, name in KINDS.items()
+        for kind, name in BODY_NAMES.items()
     }
     return {
         "step": frame.step,

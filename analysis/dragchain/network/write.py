@@ -18,7 +18,7 @@ from dragchain.network.chains import (
     peters_rows,
     split_chains,
 )
-from dragchain.network.frame import FLOOR, KINDS, SIDE, NetworkFrame, network_frames
+from dragchain.network.frame import BODY_NAMES, FLOOR, SIDE, NetworkFrame, network_frames
 from dragchain.network.statistics import cluster_rows, frame_clusters, frame_statistics
 from dragchain.tables.parquet import table_writer, write_parquet
 from dragdeck.records.case import load_case
@@ -93,7 +93,7 @@ def _paths(frame: NetworkFrame) -> dict[str, Any]:
         definition="widest_path",
         stress_pa=np.full(len(rows), np.nan),
         reaches=whole,
-        ends=[KINDS[kind] if there else "none" for kind, there in kinds],
+        ends=[BODY_NAMES[kind] if there else "none" for kind, there in kinds],
     )
     for name in _OF_WHOLE_PATHS:
         columns[name][~whole] = np.nan

@@ -21,7 +21,7 @@ from dragchain.drag import drag_peaks, peak_separation_s, read_counted
 from dragchain.errors import TableError
 from dragchain.export.frames import FrameSeries
 from dragchain.figures.style import force_map, top_of_scale
-from dragchain.network.frame import KINDS, PARTICLE, NetworkFrame
+from dragchain.network.frame import BODY_NAMES, PARTICLE, NetworkFrame
 from dragchain.run.kinematics import drag_phase, needed, process_time
 from dragchain.run.workpiece import read_surface
 from dragchain.tables.by_step import read_table
@@ -118,7 +118,7 @@ class Shown:
 
     def touching(self) -> pd.DataFrame:
         """The contacts on workpiece and bowl."""
-        return self.contacts[self.contacts["b"] > BODIES - len(KINDS)]
+        return self.contacts[self.contacts["b"] > BODIES - len(BODY_NAMES)]
 
     def reach_m(self) -> float:
         """How far the particles of the first frame are from the workpiece's axis, at most."""
@@ -249,7 +249,7 @@ def page_scene(run: Run) -> PageScene:
         "frames": _frames(columns, shown, case),
         "scales": _scales(shown, case),
         "paths": _dominant_paths(run, series.steps),
-        "bodies": {BODIES + body: name for body, name in KINDS.items() if body != PARTICLE},
+        "bodies": {BODIES + body: name for body, name in BODY_NAMES.items() if body != PARTICLE},
         "bowl": {
             "radius": 1e3 * bowl.reach_m,
             "height": 1.2 * surface,

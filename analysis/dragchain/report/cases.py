@@ -13,12 +13,16 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from dragchain.loading.document import FILE as LOADING
-from dragchain.loading.document import Loading
-from dragchain.loading.wear import FILE as WEAR
-from dragchain.loading.wear import Wear
+from dragchain.loading.document import LOADING_FILE, Loading
+from dragchain.loading.wear import WEAR_FILE, Wear
 from dragchain.quantities.document import EXTRAPOLATED, MEASURED_FILE, Extrapolated, RunQuantities
-from dragchain.report.findings import FILE, DropFindings, FillingFindings, Findings, ProcessFindings
+from dragchain.report.findings import (
+    FINDINGS_FILE,
+    DropFindings,
+    FillingFindings,
+    Findings,
+    ProcessFindings,
+)
 from dragchain.report.page import TIMES, fixed, number, with_interval
 from dragchain.report.values import Values, values_of, values_over_packings
 from dragchain.run.case import changed_inputs, study_of, upstream_folders, with_changes
@@ -254,9 +258,9 @@ def read_study_runs(run_dir: Path) -> StudyRuns:
         filling,
         drop_test,
         RunQuantities.read(run_dir / MEASURED_FILE),
-        read_if_there(Loading, run_dir / LOADING),
+        read_if_there(Loading, run_dir / LOADING_FILE),
         read_if_there(Extrapolated, run_dir / EXTRAPOLATED),
-        read_if_there(Wear, run_dir / WEAR),
+        read_if_there(Wear, run_dir / WEAR_FILE),
     )
 
 
@@ -268,7 +272,7 @@ def read_if_there(document: type[D], file: Path) -> D | None:
 def read_reported(run_dir: Path, findings: type[F]) -> ReportedRun[F]:
     """Read a run with findings of this type; errors are those of `read_study_runs`."""
     record = read_accepted(run_dir)
-    return ReportedRun(run_dir, load_case(run_dir), findings.read(run_dir / FILE), record)
+    return ReportedRun(run_dir, load_case(run_dir), findings.read(run_dir / FINDINGS_FILE), record)
 
 
 # --- cases ---------------------------------------------------------------------------------------

@@ -10,7 +10,7 @@ from dragchain.tables.impacts import Restitution
 from dragdeck.documents import Document
 from dragdeck.parts import Part, omitted
 
-FILE = Path("tables") / "findings.json"
+FINDINGS_FILE = Path("tables") / "findings.json"
 
 
 class Peaks(Part):

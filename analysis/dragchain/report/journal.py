@@ -12,7 +12,7 @@ from matplotlib.typing import RcKeyType
 
 from dragchain.figures.style import drawing, true_minus
 from dragchain.loading.write import compute_loading, figure_of
-from dragchain.report.findings import FILE, ProcessFindings
+from dragchain.report.findings import FINDINGS_FILE, ProcessFindings
 from dragchain.report.run_data import RunData
 from dragchain.report.run_figures import DRAW_PROCESS
 from dragdeck.files import write_bytes
@@ -57,7 +57,7 @@ def write_journal_figures(run_dir: Path) -> list[Path]:
         If it is no process run, a table is missing, or pictures cannot be rendered here.
     """
     run = RunData.open(run_dir)
-    findings = ProcessFindings.read(run_dir / FILE)
+    findings = ProcessFindings.read(run_dir / FINDINGS_FILE)
     written = []
     with drawing():
         matplotlib.rcParams.update(_PRINT)

@@ -25,7 +25,7 @@ from dragchain.loading.samples import SPHERES
 from dragchain.quantities.document import MEASURED_FILE, RunQuantities
 from dragchain.quantities.measure import estimates_along
 from dragchain.report.findings import (
-    FILE,
+    FINDINGS_FILE,
     AheadBehind,
     AzimuthProfile,
     Chains,
@@ -140,7 +140,7 @@ def write_findings(run: RunData) -> Findings:
     """
     collect = {"process": process_findings, "filling": _filling, "drop_test": _drop}[run.case.scene]
     findings = collect(run)
-    findings.write(run.folder / FILE)
+    findings.write(run.folder / FINDINGS_FILE)
     return findings
 
 

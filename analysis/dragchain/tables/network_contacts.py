@@ -18,7 +18,7 @@ from dragdeck.study.contact_law import FrictionLimit
 KINDS = ("particle-particle", "particle-workpiece", "particle-floor", "particle-side")
 """Kinds of contact; their position is the code in `ContactRows.kind`."""
 
-BODY = {"particle-workpiece": 0, "particle-floor": -1, "particle-side": -2}
+BODY_IDS = {"particle-workpiece": 0, "particle-floor": -1, "particle-side": -2}
 """``b_id`` of the bodies that are not particles."""
 
 
@@ -31,7 +31,7 @@ class ContactRows:
     kind : (N,) ndarray of int8
         Index into `KINDS`.
     a_id, b_id : (N,) ndarray of int64
-        Body a, a particle, and body b, a particle or one of `BODY`.
+        Body a, a particle, and body b, a particle or one of `BODY_IDS`.
     point_m, force_n : (N, 3) ndarray
         Contact point and force on body a.
     normal_force_n, tangential_force_n, overlap_m : (N,) ndarray
@@ -165,12 +165,12 @@ def _wall(particles: _Particles, force_n: Floats, wall: Wall) -> ContactRows:
     distance, normal = wall.contacts(centre)
     overlap, ids = radius - distance, particles.ids[touching]
     point = centre - (radius - 0.5 * overlap)[:, None] * normal
-    others = np.full(len(ids), BODY[kind])
+    others = np.full(len(ids), BODY_IDS[kind])
     return _rows(kind, ids, others, point, force_n[touching], normal, overlap)
 
 
 def _mesh(wall: WallContacts, kind: str) -> ContactRows:
-    others = np.full(len(wall.particle_id), BODY[kind])
+    others = np.full(len(wall.particle_id), BODY_IDS[kind])
     return _rows(
         kind, wall.particle_id, others, wall.point_m, wall.force_n, wall.normal, wall.overlap_m
     )

@@ -28,7 +28,7 @@ from loading_files import (
 
 from dragchain.errors import TableError
 from dragchain.loading.contact_events import contact_time_s, find_events
-from dragchain.loading.document import FILE, Loading
+from dragchain.loading.document import LOADING_FILE, Loading
 from dragchain.loading.figure import averaged_load
 from dragchain.loading.samples import sample
 from dragchain.loading.write import compute_loading, write_loading
@@ -48,7 +48,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def found(run: Path) -> Loading:
-    return Loading.read(run / FILE)
+    return Loading.read(run / LOADING_FILE)
 
 
 @pytest.fixture

@@ -25,7 +25,7 @@ from loading_files import (
 from made_run import output
 
 from dragchain.loading.edges import edge_distance, sharp_edges, strewn
-from dragchain.loading.wear import FILE, Wear
+from dragchain.loading.wear import WEAR_FILE, Wear
 from dragchain.run.workpiece import Surface
 
 RADIUS_M, DENSITY = 3e-3, 2500.0
@@ -50,7 +50,7 @@ def worn(
         particles = pd.DataFrame({"step": 0, "particle_id": range(1, 9), "radius_m": RADIUS_M})
         particles.to_parquet(folder / "tables/particles.parquet")
     write_without_picture(folder)
-    return Wear.read(folder / FILE)
+    return Wear.read(folder / WEAR_FILE)
 
 
 def hit(frame: int, particle: int = HIT, **changes: Any) -> dict[str, Any]:
@@ -116,7 +116,7 @@ def test_without_an_impact_all_is_from_sliding(tmp_path: Path) -> None:
 def test_an_ordinary_run_has_no_wear(tmp_path: Path) -> None:
     write_run(tmp_path, made_contacts())
     write_without_picture(tmp_path)
-    assert not (tmp_path / FILE).exists()
+    assert not (tmp_path / WEAR_FILE).exists()
     assert "touch_normal_m_s" not in pd.read_parquet(tmp_path / "tables/facets.parquet")
 
 

@@ -15,9 +15,8 @@ from scipy.spatial.transform import Rotation
 from dragchain.cli import main
 from dragchain.errors import TableError
 from dragchain.loading.contact_events import AMOUNTS, POINT
-from dragchain.loading.document import FILE as LOADING
-from dragchain.loading.document import Loading
-from dragchain.report.findings import FILE
+from dragchain.loading.document import LOADING_FILE, Loading
+from dragchain.report.findings import FINDINGS_FILE
 from dragchain.report.projection import Target, write_projection
 from dragchain.run.workpiece import Surface
 from dragchain.statistics.estimate import Estimate
@@ -49,8 +48,8 @@ def packing(folder: Path, seed: int, law: bool = True) -> Path:
     (run / "case.json").write_text(json.dumps(case))
     (run / "run.json").write_text(json.dumps(run_json()))
     write_without_picture(run)
-    process_findings().write(run / FILE)
-    load = Loading.read(run / LOADING)
+    process_findings().write(run / FINDINGS_FILE)
+    load = Loading.read(run / LOADING_FILE)
     per_metre = load.totals["force_slide_n_m"] / load.path_m
     write_measured(run, force_slide=Estimate.around(per_metre, 0.1 * per_metre))
     return run

@@ -18,7 +18,7 @@ from dragchain.errors import TableError
 from dragchain.figures import network_picture as scene
 from dragchain.figures.rendering import RenderError, check_rendering
 from dragchain.network.frame import SIDE, NetworkFrame
-from dragchain.report.findings import FILE, FillingFindings, ProcessFindings
+from dragchain.report.findings import FINDINGS_FILE, FillingFindings, ProcessFindings
 from dragchain.report.run_data import RunData, dominant_bottlenecks, of_classes, process_findings
 from dragchain.report.run_figures import energy_ratio, write_figures
 from dragchain.run.reference import reference_drags
@@ -46,7 +46,7 @@ def drawn(process: Path) -> list[Path]:
 
 @pytest.fixture
 def found(process: Path, drawn: list[Path]) -> ProcessFindings:
-    return ProcessFindings.read(process / FILE)
+    return ProcessFindings.read(process / FINDINGS_FILE)
 
 
 def test_findings_of_a_process_are_those_of_its_tables(found: ProcessFindings) -> None:
@@ -257,7 +257,7 @@ def filling(tmp_path: Path) -> Path:
 
 def test_a_filling_without_thermo_has_no_figure(filling: Path) -> None:
     assert write_figures(filling) == []
-    found = FillingFindings.read(filling / FILE)
+    found = FillingFindings.read(filling / FINDINGS_FILE)
     assert found.bed["solid_fraction"] == 0.59
     assert found.rest_energy_ratio == 1e-5
 

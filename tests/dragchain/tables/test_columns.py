@@ -5,7 +5,7 @@ import pyarrow.parquet as pq
 import pytest
 from finished_runs import write_finished_run
 
-from dragchain.loading.samples import BODY as BODY_IMPULSE
+from dragchain.loading.samples import BODY_IMPULSE
 from dragchain.tables import parquet
 from dragchain.tables.columns import (
     ATTRACTION,
