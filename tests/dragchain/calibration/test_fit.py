@@ -10,7 +10,7 @@ from make_record import Sensor, record_of
 from paper_drops import BIAS, FALL_S, HEIGHT, G, paper_drop, paper_drops, rebound
 
 from dragchain.calibration.fit import WIDTH_LIMIT, calibrate, observe, sample_impacts
-from dragchain.calibration.measured_impacts import Measured, measure_impacts
+from dragchain.calibration.measured_impacts import MeasuredImpacts, measure_impacts
 from dragchain.calibration.results import bias_table, result
 from dragchain.calibration.simulated_drops import Drops, emulate, waveform
 from dragchain.errors import TableError
@@ -24,7 +24,7 @@ def sweep() -> Drops:
 
 def record(
     e: float, *, rate: float = 500e3, noise: float = 0.05, seed: int = 1, height: float = HEIGHT
-) -> Measured:
+) -> MeasuredImpacts:
     sensor = Sensor(rate, noise, offset_n=4.0, drift_n_per_s=1.0, resolution_n=0.005)
     made = record_of(paper_drop(e, height=height), sensor, np.random.default_rng(seed))
     return measure_impacts(made, fall_time_s=FALL_S)

@@ -9,7 +9,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from dragchain.calibration.measured_impacts import Measured, measure_impacts
+from dragchain.calibration.measured_impacts import MeasuredImpacts, measure_impacts
 from dragdeck.errors import InputError, RecordError
 from dragdeck.study.force_record import check_samples, read_record, read_samples
 
@@ -47,7 +47,7 @@ def samples(
     return time, half_sines(time, power) + offset_n + drift_n_per_s * time + noise
 
 
-def found(time_s: Floats, force_n: Floats) -> Measured:
+def found(time_s: Floats, force_n: Floats) -> MeasuredImpacts:
     return measure_impacts(check_samples(time_s, force_n), fall_time_s=FALL_S)
 
 
