@@ -12,7 +12,7 @@ differs from that of the record by so many of its standard deviations.
 import math
 import sys
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cache
 from itertools import product
 
@@ -147,21 +147,22 @@ def _judged(
         number, cost = last.wanted, float(last.wanted)
 
 
+GRID: tuple[dict[str, tuple[float, ...]], ...] = (
+    {"scatter": (0.05, 0.1, 0.2), "slope": (0.0, 0.6, 0.85), "tolerance": (0.05, 0.1)},
+    {"drift": (0.15, 0.3), "tolerance": (0.05, 0.1)},
+    {"unlike": (-2.0, 2.0), "tolerance": (0.05, 0.1)},
+    {"packing": (0.03, 0.05), "seeds": (1, 2, 4, 8)},
+    {"scatter": (0.05, 0.1, 0.2), "tolerance": (0.05, 0.1), "varied": (1,)},
+)
+"""What varies together; all else is that of `Process`."""
+
+
 def windows_settings() -> Iterator[tuple[Mapping[str, float], Process]]:
     """What is simulated, with the columns that name it."""
-    cases = [
-        *product(
-            (0.05, 0.1, 0.2), (0.0, 0.6, 0.85), (0.0,), (0.0,), (0.0,), (1,), (0.05, 0.1), (0,)
-        ),
-        *product((0.1,), (0.6,), (0.15, 0.3), (0.0,), (0.0,), (1,), (0.05, 0.1), (0,)),
-        *product((0.1,), (0.6,), (0.0,), (0.0,), (-2.0, 2.0), (1,), (0.05, 0.1), (0,)),
-        *product((0.1,), (0.6,), (0.0,), (0.03, 0.05), (0.0,), (1, 2, 4, 8), (0.1,), (0,)),
-        *product((0.05, 0.1, 0.2), (0.6,), (0.0,), (0.0,), (0.0,), (1,), (0.05, 0.1), (1,)),
-    ]
-    names = ("scatter", "slope", "drift", "packing", "unlike", "seeds", "tolerance", "varied")
-    for case in cases:
-        named = dict(zip(names, case, strict=True))
-        yield named, Process(**named)  # type: ignore[arg-type]
+    for varied in GRID:
+        for values in product(*varied.values()):
+            process = Process(**dict(zip(varied, values, strict=True)))  # type: ignore[arg-type]
+            yield asdict(process), process
 
 
 def windows_coverage(trials: int, seed: int = 1) -> pd.DataFrame:

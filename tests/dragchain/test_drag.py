@@ -17,24 +17,21 @@ def test_peaks_of_the_resistance_are_minima_of_the_drag() -> None:
     assert peaks.drag_n.tolist() == [-4, -5]
 
 
-def test_the_lower_of_two_close_peaks_is_dropped() -> None:
-    drag = np.full(60, -1.0)
-    drag[[10, 13, 50]] = [-4.0, -5.0, -4.5]
-    time = np.arange(60) * 0.1
-    assert find_drag_peaks(time, drag, min_separation_s=0.5).index.tolist() == [13, 50]
-    assert find_drag_peaks(time, drag, min_separation_s=0.2).index.tolist() == [10, 13, 50]
-
-
-def test_a_ripple_below_one_standard_deviation_is_no_peak() -> None:
-    drag = np.full(60, -1.0)
-    drag[[10, 50]] = [-1.2, -5.0]
-    time = np.arange(60) * 0.1
-    assert find_drag_peaks(time, drag, min_separation_s=0.1).index.tolist() == [50]
-
-
-def test_a_constant_series_has_no_peaks() -> None:
-    found = find_drag_peaks(np.arange(20) * 0.1, np.full(20, -2.0), min_separation_s=0.1)
-    assert len(found.index) == 0
+@pytest.mark.parametrize(
+    ("peaks", "separation_s", "index"),
+    [
+        ({10: -4.0, 13: -5.0, 50: -4.5}, 0.5, [13, 50]),  # the lower of two close ones is dropped
+        ({10: -4.0, 13: -5.0, 50: -4.5}, 0.2, [10, 13, 50]),
+        ({10: -1.2, 50: -5.0}, 0.1, [50]),  # a ripple below one standard deviation is none
+        ({}, 0.1, []),
+    ],
+)
+def test_peaks_stand_out_and_apart(
+    peaks: dict[int, float], separation_s: float, index: list[int]
+) -> None:
+    drag = np.array([peaks.get(at, -1.0) for at in range(60)])
+    found = find_drag_peaks(np.arange(60) * 0.1, drag, min_separation_s=separation_s)
+    assert found.index.tolist() == index
 
 
 def test_peaks_need_equal_intervals_and_some_samples() -> None:

@@ -132,9 +132,9 @@ def _shape(grains: Grains) -> tuple[str, str]:
 def _class(kind: ClassOfRun, case: CaseOfRun, findings: Sequence[ProcessFindings]) -> Iterator[str]:
     """Asked and obtained amounts of a class, how it moves in the bed and loads the workpiece."""
     amounts: Mapping[str, Mapping[str, float]] = {
-        "number": {run.name: run.count for run in case.classes},
-        "volume": {run.name: run.volume_m3 for run in case.classes},
-        "mass": {run.name: run.density_kg_m3 * run.volume_m3 for run in case.classes},
+        "number": {part.name: part.count for part in case.classes},
+        "volume": {part.name: part.volume_m3 for part in case.classes},
+        "mass": {part.name: part.density_kg_m3 * part.volume_m3 for part in case.classes},
     }
     media = study_of(case).media
     of, requested = media.fractions_of, media.classes[kind.name]
@@ -159,7 +159,7 @@ def _class(kind: ClassOfRun, case: CaseOfRun, findings: Sequence[ProcessFindings
         part = part.within_one if len(loads) > 1 else part
         yield (
             f"{with_interval(contacts)} contacts on the workpiece at a time of "
-            f"{with_interval(force, 'N')} run: {with_interval(part.over(0.01), '%')} of the load"
+            f"{with_interval(force, 'N')} each: {with_interval(part.over(0.01), '%')} of the load"
         )
 
 

@@ -65,7 +65,7 @@ def write_crate(
         If a run is not complete, or a document cannot be used.
     """
     if out_dir.is_dir() and any(out_dir.iterdir()) and not (out_dir / LEFT_OUT).is_file():
-        remedy = "name another folder, or move this file away"
+        remedy = "name another folder, or move this one away"
         raise ExportError(f"{out_dir} contains files that are not a crate\n  remedy: {remedy}")
     report = sorted(file for file in _below_here(report_dir).iterdir() if file.is_file())
     draft = out_dir.with_name(f".{out_dir.name}.{os.getpid()}.part")

@@ -67,18 +67,14 @@ STAR_IDS = [9, 7, 1, 2, 3, 4]
 
 def test_statistics_of_a_star() -> None:
     found = frame_statistics(a_frame(STAR, STAR_IDS))
-    assert found["n_particles"] == 6
-    assert found["n_contacts"] == 7
-    assert found["n_particle_particle_contacts"] == 4
-    assert found["n_particle_workpiece_contacts"] == 1
-    assert found["n_particle_floor_contacts"] == 1
-    assert found["n_particle_side_contacts"] == 1
-    assert found["coordination_number"] == pytest.approx(11 / 6)
-    assert found["mechanical_coordination_number"] == pytest.approx(5.0)
-    assert found["rattler_fraction"] == pytest.approx(5 / 6)
-    assert found["normal_force_mean_n"] == pytest.approx(3.0)
-    assert found["normal_force_max_n"] == 5.0
-    assert found["above_mean_fraction"] == pytest.approx(3 / 7)
+    expected = {
+        "n_particles": 6, "n_contacts": 7, "n_particle_particle_contacts": 4,
+        "n_particle_workpiece_contacts": 1, "n_particle_floor_contacts": 1,
+        "n_particle_side_contacts": 1, "coordination_number": 11 / 6,
+        "mechanical_coordination_number": 5.0, "rattler_fraction": 5 / 6,
+        "normal_force_mean_n": 3.0, "normal_force_max_n": 5.0, "above_mean_fraction": 3 / 7,
+    }  # fmt: skip
+    assert {name: found[name] for name in expected} == pytest.approx(expected)
 
 
 def test_a_particle_with_four_contacts_carries_load() -> None:
@@ -190,17 +186,12 @@ def test_a_stretch_without_frames_is_refused(run_dir: Path) -> None:
         write_chains(run_dir)
 
 
-def frame_with(rows: list[tuple[int, int, float]], particles: int) -> NetworkFrame:
-    """A frame of (particle, other, normal force) rows."""
-    return a_frame(rows, list(range(1, particles + 1)))
-
-
 # 1-2-3-4 with falling force, 5-6, and 7 alone
 CHAIN = [(1, 2, 6.0), (2, 3, 5.0), (3, 4, 3.0), (5, 6, 4.0), (7, FLOOR, 9.0)]
 
 
 def test_sizes_by_hand() -> None:
-    found = find_clusters(frame_with(CHAIN, 7), np.array([0.0, 3.0, 4.0, 5.0, 6.0]))
+    found = find_clusters(a_frame(CHAIN, [*range(1, 8)]), np.array([0.0, 3.0, 4.0, 5.0, 6.0]))
     assert found.strong_contacts.tolist() == [5, 4, 3, 2, 1]
     assert found.clusters.tolist() == [2, 2, 1, 1, 0]
     assert found.clustered_particles.tolist() == [6, 5, 3, 2, 0]
@@ -212,7 +203,7 @@ def test_sizes_by_hand() -> None:
 
 
 def test_a_frame_without_contacts_has_no_cluster() -> None:
-    frame = frame_with([], 3)
+    frame = a_frame([], [1, 2, 3])
     rows = cluster_rows(frame, frame_clusters(frame))
     assert rows["clusters"].tolist() == [0] * len(FORCE_FACTORS)
     assert not rows["workpiece_to_bowl"].any()

@@ -24,7 +24,7 @@ from report_files import (
 
 from dragchain.errors import TableError
 from dragchain.loading.contact_events import POINT
-from dragchain.loading.document import Loading
+from dragchain.loading.document import LOADING_FILE, Loading
 from dragchain.loading.edges import EdgeBands, edge_bands
 from dragchain.loading.samples import Sampled
 from dragchain.loading.wear import Wear
@@ -199,6 +199,12 @@ def test_even_removal_leaves_an_edge_sharp() -> None:
 # --- report --------------------------------------------------------------------------------------
 
 
+def slide_per_m(run: Path) -> float:
+    """Normal force times sliding distance, for each metre of the run's path, N m/m."""
+    load = Loading.read(run / LOADING_FILE)
+    return load.totals["force_slide_n_m"] / load.path_m
+
+
 def report(
     tmp_path: Path,
     removal: dict[str, Any],
@@ -224,9 +230,7 @@ def report(
         run = make_run(tmp_path / "results", case, process_findings(), PICTURES)
         for file in ("tables/loading.json", *(["tables/wear.json"] if wear else [])):
             (run / file).write_bytes((made / file).read_bytes())
-        load = Loading.read(run / "tables/loading.json")
-        per_metre = load.totals["force_slide_n_m"] / load.path_m
-        write_measured(run, force_slide=Estimate.around(per_metre, 0.1 * per_metre))
+        write_measured(run, force_slide=Estimate.around(slide_per_m(run), 0.1 * slide_per_m(run)))
         if told:
             whole = json.loads((run / file).read_text())
             (run / file).write_text(json.dumps(whole | told))
@@ -240,8 +244,7 @@ def report(
 
 def test_the_report_has_depth_mass_and_minutes(tmp_path: Path) -> None:
     out = report(tmp_path, GIVEN)
-    made = Loading.read(tmp_path / "made-0/tables/loading.json")
-    load = made.totals["force_slide_n_m"] / made.path_m
+    load = slide_per_m(tmp_path / "made-0")
     speed, area = 0.01, 4e-4
     depth_m_s = 2e-11 * load * speed / area
     facets = pd.read_csv(out / "run-0-removal.csv")
@@ -267,8 +270,7 @@ def test_the_roughness_falls_as_the_peaks_are_removed(tmp_path: Path) -> None:
     depth = facets["depth_m_s"] / mean * 1e-6
     assert facets["ra_m"].to_numpy() == pytest.approx((2e-6 - depth) ** 2 / 4e-6, abs=1e-9)
     assert (facets["ra_ci95_low_m"] <= facets["ra_m"]).all()
-    load = Loading.read(tmp_path / "made-0/tables/loading.json")
-    per_s = 2e-11 * load.totals["force_slide_n_m"] / load.path_m * 0.01 / 4e-4
+    per_s = 2e-11 * slide_per_m(tmp_path / "made-0") * 0.01 / 4e-4
     assert mean == pytest.approx(10 * per_s)  # the run is ten times as fast
     assert f"is reached after {1e-6 / per_s / 60:.3g} min (" in page.words
     assert "Ra falls from 1.00 µm to 0.063 µm (" in page.words  # 1.5 um of 2 um are removed
@@ -285,8 +287,7 @@ def test_measured_roughness_gives_the_depth_per_time(tmp_path: Path) -> None:
 def test_the_mean_depth_is_without_what_is_removed_above_the_bed(tmp_path: Path) -> None:
     """Of two equal facets one is in the bed, and two thirds of the action are on it."""
     out = report(tmp_path, GIVEN, told={"immersed": [True, False], "patch_w_m2": [2.0, 1.0]})
-    made = Loading.read(tmp_path / "made-0/tables/loading.json")
-    load = made.totals["force_slide_n_m"] / made.path_m
+    load = slide_per_m(tmp_path / "made-0")
     depth_m_s = 2 / 3 * 2e-11 * load * 0.01 / 2e-4
     assert f"over the immersed surface: {3600e6 * depth_m_s:#.3g} " in page_of(out).words
 

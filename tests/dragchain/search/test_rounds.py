@@ -322,13 +322,21 @@ def bounds(low: float, high: float, field: str = "motion.speed_m_s") -> dict[str
 def test_what_a_search_asks_for_must_be_possible(
     load: Load, project: Project, changes: dict[str, Any], words: str
 ) -> None:
-    block, own = json.loads(json.dumps(SEARCH)), {"sweep": {"seed": [1, 2]}, "fidelity": "draft"}
-    for name, value in changes.items():
-        first, _, last = name.partition(".")
-        (block if first == "search" else own)[last or first] = value
     with pytest.raises(InputError, match=f"(?s){words}"):
-        load({**own, "search": block})
+        load_with(load, changes | {"fidelity": "draft"})
         project.cases("small")
+
+
+def load_with(load: Load, changes: dict[str, Any]) -> None:
+    """A study with the search, changed: keys of it, and of the study's own blocks."""
+    study = json.loads(json.dumps({"sweep": {"seed": [1, 2]}, "search": SEARCH}))
+    for name, value in changes.items():
+        block, _, key = name.partition(".")
+        if key:
+            study[block][key] = value
+        else:
+            study[block] = value
+    load(study)
 
 
 def test_check_warns_of_bounds_that_are_infeasible_and_refuses_a_field_that_is_all_of_it(
@@ -370,18 +378,8 @@ def test_check_warns_of_bounds_that_are_infeasible_and_refuses_a_field_that_is_a
 def test_a_search_that_cannot_be_is_refused(
     load: Load, changes: dict[str, Any], words: str
 ) -> None:
-    block = json.loads(json.dumps(SEARCH))
-    own = {"sweep": {"seed": [1, 2]}}
-    for name, value in changes.items():
-        first, _, last = name.partition(".")
-        if first == "search":
-            block[last] = value
-        elif last:
-            own["sweep"][last] = value
-        else:
-            own[first] = value
     with pytest.raises(InputError, match=f"(?s){words}"):
-        load({**own, "search": block})
+        load_with(load, changes)
 
 
 @pytest.mark.parametrize(

@@ -186,40 +186,34 @@ def test_too_few_frames_have_no_interval() -> None:
         interval_of_mean(np.arange(7.0))
 
 
-def steady(frames: int, azimuths: list[float], forces: list[float]) -> tuple[np.ndarray, ...]:
-    """Return frame, azimuth and force of contacts that every frame repeats."""
-    frame = np.repeat(np.arange(frames), len(azimuths))
-    return frame, np.tile(azimuths, frames), np.tile(forces, frames)
+def steady(
+    azimuths: list[float], forces: list[float]
+) -> tuple[np.ndarray, int, np.ndarray, np.ndarray]:
+    """Frame, number of frames, azimuth and force of contacts that every one of ten repeats."""
+    frame = np.repeat(np.arange(10), len(azimuths))
+    return frame, 10, np.tile(azimuths, 10), np.tile(forces, 10)
 
 
 def test_ahead_and_behind_of_a_steady_workpiece() -> None:
-    frame, azimuth, force = steady(10, [0.0, 1.5, -1.5, 1.6, -3.0], [3.0, 2.0, 1.0, 1.5, 0.5])
-    found = ahead_behind(frame, 10, azimuth, force)
+    found = ahead_behind(*steady([0.0, 1.5, -1.5, 1.6, -3.0], [3.0, 2.0, 1.0, 1.5, 0.5]))
     assert found["ahead_n"].value == pytest.approx(6.0)
     assert found["behind_n"].value == pytest.approx(2.0)
 
 
 def test_frames_without_contacts_count_in_the_means() -> None:
-    frame, azimuth, force = steady(10, [0.0], [3.0])
+    frame, _, azimuth, force = steady([0.0], [3.0])
     assert ahead_behind(2 * frame, 20, azimuth, force)["ahead_n"].value == pytest.approx(1.5)
 
 
-def steady_arguments(
-    azimuths: list[float], forces: list[float]
-) -> tuple[np.ndarray, int, np.ndarray, np.ndarray]:
-    frame, azimuth, force = steady(10, azimuths, forces)
-    return frame, 10, azimuth, force
-
-
 def test_azimuth_bins_hold_all_force_and_close_at_pi() -> None:
-    edges, found = azimuth_profile(*steady_arguments([math.pi, 0.1, -3.1], [4.0, 2.0, 1.0]), bins=4)
+    edges, found = azimuth_profile(*steady([math.pi, 0.1, -3.1], [4.0, 2.0, 1.0]), bins=4)
     assert edges == pytest.approx(np.array([-1, -0.5, 0, 0.5, 1]) * math.pi)
     assert [estimate.value for estimate in found] == pytest.approx([3.0, 0.0, 2.0, 2.0])
 
 
 def test_depth_bins_give_force_per_contact_and_per_depth() -> None:
     edges, contact, line = depth_profile(
-        *steady_arguments([0.0, 0.01, 0.03, 0.04], [1.0, 3.0, 4.0, 10.0]), bins=2
+        *steady([0.0, 0.01, 0.03, 0.04], [1.0, 3.0, 4.0, 10.0]), bins=2
     )
     assert edges == pytest.approx([0.0, 0.02, 0.04])
     assert [estimate.value for estimate in contact] == pytest.approx([2.0, 7.0])
@@ -227,7 +221,7 @@ def test_depth_bins_give_force_per_contact_and_per_depth() -> None:
 
 
 def test_a_depth_bin_without_contacts_is_unknown() -> None:
-    _, contact, line = depth_profile(*steady_arguments([0.0, 0.04], [1.0, 3.0]), bins=4)
+    _, contact, line = depth_profile(*steady([0.0, 0.04], [1.0, 3.0]), bins=4)
     assert not contact[1].known and not contact[1].reliable and math.isnan(contact[1].value)
     assert line[1].value == 0.0
 

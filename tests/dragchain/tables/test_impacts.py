@@ -58,20 +58,11 @@ def test_gravity_between_the_surface_and_a_sample_is_taken_out() -> None:
     """Free flight on both sides of an impact that leaves half of the speed, 3 and 2 steps away."""
     fall, up, dt = 4.0, 2.0, 0.01
     time = np.array([-3 * dt, 0.0, 2 * dt])
-    speed = np.array([-fall + 3 * dt * GRAVITY, 0.0, up - 2 * dt * GRAVITY])
-    gap = [
-        3 * dt * fall - GRAVITY * (3 * dt) ** 2 / 2,
-        0.0,
-        2 * dt * up - GRAVITY * (2 * dt) ** 2 / 2,
-    ]
+    speed = np.array([-fall, 0.0, up]) - GRAVITY * time
+    gap = np.array([-fall, 0.0, up]) * time - GRAVITY * time**2 / 2
     assert speed_at_plate(speed, gap, GRAVITY) == pytest.approx([fall, 0.0, up])
-    seen = {
-        "step": np.arange(3),
-        "time_s": time,
-        "z_m": RADIUS + np.array(gap),
-        "vz_m_s": speed,
-        "force_n": np.array([0.0, 9.0, 0.0]),
-    }
+    seen = rows(np.column_stack([np.arange(3), speed, [0.0, 9.0, 0.0]]))
+    seen |= {"time_s": time, "z_m": RADIUS + gap}
     assert find_impacts(seen, dt)["restitution"] == pytest.approx([up / fall], rel=1e-12)
 
 

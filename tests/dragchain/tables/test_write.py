@@ -23,7 +23,7 @@ from tiny_run_files import (
 from dragchain import DumpError, RejectedRunError, TableError, load_outputs, write_tables
 from dragchain.loading.write import write_loading
 from dragchain.run.run_parts import iter_prints
-from dragchain.tables.columns import FORCES, REFERENCE
+from dragchain.tables.columns import FORCES, REFERENCE, SLIP
 from dragchain.tables.write import WorkpieceSamples
 
 TABLES = ("workpiece_force", "workpiece_contacts", "particles", "contacts", "thermo")
@@ -32,7 +32,11 @@ TABLES = ("workpiece_force", "workpiece_contacts", "particles", "contacts", "the
 @pytest.fixture
 def tables(tiny_run: Path) -> dict[str, pd.DataFrame]:
     write_tables(tiny_run)
-    return {name: pd.read_parquet(tiny_run / "tables" / f"{name}.parquet") for name in TABLES}
+    return {name: read(tiny_run, name) for name in TABLES}
+
+
+def read(run: Path, name: str) -> pd.DataFrame:
+    return pd.read_parquet(run / "tables" / f"{name}.parquet")
 
 
 def closure(run: Path) -> dict:
@@ -74,12 +78,11 @@ def test_the_slip_is_that_of_the_particles_surface_against_the_workpiece(tables)
     """Particle 1 spins about y and falls behind the workpiece by a third of its speed."""
     contacts = tables["workpiece_contacts"]
     before, drag = contacts[contacts["phase"] == "plunge"], contacts[contacts["phase"] == "drag"]
-    slip = ["slip_x_m_s", "slip_y_m_s", "slip_z_m_s"]
     reach = RADIUS_M - np.array([overlap_m(step) for step in drag["step"]])
     exact = np.column_stack([0 * reach, 0 * reach, SPIN_RAD_S * reach])
-    np.testing.assert_allclose(drag[slip], exact, rtol=1e-6, atol=1e-15)
+    np.testing.assert_allclose(drag[list(SLIP)], exact, rtol=1e-6, atol=1e-15)
     np.testing.assert_allclose(drag["normal_velocity_m_s"], SPEED_M_S / 3, rtol=1e-6)
-    assert before[[*slip, "normal_velocity_m_s"]].isna().all(axis=None)
+    assert before[[*SLIP, "normal_velocity_m_s"]].isna().all(axis=None)
 
 
 def test_a_run_without_velocities_has_tables_but_no_slip(tiny_run: Path, edit_json, raw) -> None:
@@ -94,12 +97,8 @@ def test_a_run_without_velocities_has_tables_but_no_slip(tiny_run: Path, edit_js
         tiny_run / "columns.json", lambda c: c["outputs"]["workpiece_particles"].update(columns=old)
     )
     write_tables(tiny_run)
-    contacts = pd.read_parquet(tiny_run / "tables" / "workpiece_contacts.parquet")
-    assert (
-        contacts[["slip_x_m_s", "slip_y_m_s", "slip_z_m_s", "normal_velocity_m_s"]]
-        .isna()
-        .all(axis=None)
-    )
+    contacts = read(tiny_run, "workpiece_contacts")
+    assert contacts[[*SLIP, "normal_velocity_m_s"]].isna().all(axis=None)
     assert (contacts["normal_force_n"] > 0).all()
     with pytest.raises(TableError, match="contains no velocities"):
         write_loading(tiny_run)
@@ -110,9 +109,9 @@ def test_the_azimuth_is_measured_from_the_direction_of_motion(tiny_run: Path, ed
     path = {"kind": "line", "start_m": [0.0, 0.0], "direction_deg": 90}
     edit_json(tiny_run / "case.json", lambda case: case.update(with_motion(case, path, SPEED_M_S)))
     write_tables(tiny_run)
-    contacts = pd.read_parquet(tiny_run / "tables" / "workpiece_contacts.parquet")
+    contacts = read(tiny_run, "workpiece_contacts")
     np.testing.assert_allclose(contacts["azimuth_rad"], -pi / 2)
-    force = pd.read_parquet(tiny_run / "tables" / "workpiece_force.parquet")
+    force = read(tiny_run, "workpiece_force")
     np.testing.assert_allclose(force["lateral_n"], -force["force_x_n"])
 
 
@@ -201,7 +200,7 @@ def test_a_frame_evaluated_anew_after_a_resume_counts_only_if_it_repeats(
 ) -> None:
     resume(tiny_run, raw, 60, factor)
     write_tables(tiny_run)
-    contacts = pd.read_parquet(tiny_run / "tables" / "workpiece_contacts.parquet")
+    contacts = read(tiny_run, "workpiece_contacts")
     counted = contacts.loc[contacts["in_statistics"], "step"].tolist()
     assert counted == [step for step in range(40, LAST + 1, 10) if step != 60 or counts]
     found = closure(tiny_run)

@@ -2,6 +2,7 @@
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -107,11 +108,16 @@ def test_a_setting_that_only_failed_has_no_errors(tmp_path: Path) -> None:
     assert not (errors_by_setting(tradeoff)["speed_factor"] == 5.0).any()
 
 
+def written(folder: Path, content: list[dict[str, Any]]) -> Any:
+    """Runs, reference and path of measures that were written; the first is the reference."""
+    files = write(folder, content)
+    return read_plan_runs(files, files[0].parents[1])
+
+
 def test_the_longest_of_runs_that_differ_in_path_counts(tmp_path: Path) -> None:
     rng = np.random.default_rng(3)
     long = [measures(REFERENCE, seed, rng, blocks=16) for seed in (1, 2)]
-    files = write(tmp_path, contents() + long)
-    runs, _, arc_m = read_plan_runs(files, files[0].parents[1])
+    runs, _, arc_m = written(tmp_path, contents() + long)
     own = [run for run in runs if run.setting == Setting(*REFERENCE)]
     lengths = sorted(run.measures.arc_m / BLOCK_M for run in own)
     assert lengths == pytest.approx([8, 8, 16, 16])
@@ -177,17 +183,15 @@ def test_files_that_cannot_be_used_are_refused(tmp_path: Path) -> None:
     with pytest.raises(DocumentError, match=r"schema: .*another version"):
         read_plan_runs(write(tmp_path / "b", found), tmp_path)
     rng = np.random.default_rng(1)
-    failed = write(tmp_path / "c", [measures(REFERENCE, 1, rng, failure=FAILURE)])
     with pytest.raises(TableError, match="no run of the trade-off is complete"):
-        read_plan_runs(failed, failed[0].parents[1])
+        written(tmp_path / "c", [measures(REFERENCE, 1, rng, failure=FAILURE)])
 
 
 def test_a_run_twice_as_long_counts_as_two_of_its_bed(tmp_path: Path) -> None:
     rng = np.random.default_rng(11)
     found = [measures(REFERENCE, seed, rng) for seed in (1, 2, 3)]
     found += [measures(SOFT, seed, rng, effects=SOFTNESS, blocks=17) for seed in (1, 2, 3)]
-    files = write(tmp_path, found)
-    runs, _, _ = read_plan_runs(files, files[0].parents[1])
+    runs, _, _ = written(tmp_path, found)
     long = [run for run in runs if run.setting == Setting(*SOFT)]
     assert [len(run.stretches) for run in runs if run not in long] == [1, 1, 1]
     assert [len(run.stretches) for run in long] == [2, 2, 2]
@@ -200,6 +204,5 @@ def test_what_is_written_is_no_setting(tmp_path: Path) -> None:
     rng = np.random.default_rng(11)
     found = [measures(REFERENCE, 1, rng, study={"outputs.network_hz": 20.0})]
     found += [measures(REFERENCE, 2, rng, study={"outputs.network_hz": 100.0})]
-    files = write(tmp_path, found)
-    runs, reference, _ = read_plan_runs(files, files[0].parents[1])
+    runs, reference, _ = written(tmp_path, found)
     assert {run.setting for run in runs} == {reference}
