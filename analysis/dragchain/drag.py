@@ -112,7 +112,7 @@ def find_drag_peaks(time_s: Floats, drag_n: Floats, *, min_separation_s: float) 
     if not np.allclose(intervals, interval, rtol=1e-3, atol=0.0):
         raise SeriesError("peaks require a constant sampling interval")
     distance = max(1.0, min_separation_s / interval)
-    index, _ = find_peaks(-drag_n, prominence=np.std(drag_n, ddof=1), distance=distance)
+    index, _ = find_peaks(-drag_n, prominence=float(np.std(drag_n, ddof=1)), distance=distance)
     return DragPeaks(index.astype(np.int64), time_s[index], drag_n[index])
 
 
