@@ -13,7 +13,16 @@ from dragdeck.engine.reports import say, shown_bytes
 from dragdeck.engine.space import free_bytes
 from dragdeck.outlook.runs import plan_in_words
 from dragdeck.outlook.timestep import largest_of_case
-from dragdeck.project import OUTCOMES, PLACES, POINTS, WINDOWS, by_run, project_here, run_path, scaling_of
+from dragdeck.project import (
+    OUTCOMES,
+    PLACES,
+    POINTS,
+    WINDOWS,
+    by_run,
+    project_here,
+    run_path,
+    scaling_of,
+)
 from dragdeck.records.run import figures_of
 from dragdeck.rules import (
     ENGINE_RUN,
