@@ -7,9 +7,14 @@ import matplotlib
 from matplotlib.text import Text
 
 from dragchain.figures.style import drawing, true_minus
-from figures.charts import CHARTS as FIGURES
+from figures.charts import CHARTS
+from figures.drawings import draw_geometry
 
 IMAGES = Path(__file__).resolve().parents[2] / "images"
+
+FIGURES = {**CHARTS, "geometry": draw_geometry}
+"""What draws a figure, by the name of its file."""
+
 
 _SHOWN_PX, _LEAST_PX = 709, 9
 """Width of a figure on a page in a window of 1366 pixels; the smallest text there."""
