@@ -10,9 +10,11 @@ import pytest
 from audit_decks import DECK, without
 
 from dragdeck.audit.command import audit
-from dragdeck.audit.run_log import balance_of
+from dragdeck.audit.run_log import RunLog
 from dragdeck.cli import main
 from dragdeck.physics.contact_mechanics import damping_ratio
+from dragdeck.script.facts import Facts
+from dragdeck.script.flow import read_script
 
 COLUMNS = "id type x y z vx vy vz fx fy fz omegax omegay omegaz radius"
 R = 0.002
@@ -145,16 +147,18 @@ Step Atoms KinEng mass[2]
 INFO: Particle insertion ins: inserted 5 particle templates (mass 1.0) at step 50
      100       15  1.0  0
      200       12  1.0  2
+Loop time of 1.0 on 1 procs for 200 steps with 12 atoms
 """
 
 
 def test_the_balance_of_a_log(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    balance = balance_of(LOG, ["mass"])
-    assert balance is not None
-    assert (balance.expected, balance.counted, balance.last) == (15, 2, 12)
     log = tmp_path / "log"
     log.write_text(LOG + "WARNING: Less insertions than requested\nDangerous builds = 3\n")
     file = str(audit_decks.write(tmp_path))
+    outlet = "fix mass all massflow/mesh mesh p delete_atom yes\n"
+    meters = Facts(read_script(Path(file), text=outlet))
+    balance = RunLog(log, meters)
+    assert (balance.expected, balance.counted, balance.last) == (15, 2, 12)
     assert main(["audit", file, "--log", str(log), "--format", "json"]) == 1
     findings = json.loads(capsys.readouterr().out)["findings"]
     assert [(f["rule"], f["values"]) for f in findings] == [
