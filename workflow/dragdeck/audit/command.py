@@ -146,6 +146,8 @@ class Report:
         columns = self._contact_columns() if contacts else []
         pairs = self._frames(contacts) if columns else iter(())
         pair = next(pairs, None)
+        if pair is not None and not {*columns} <= pair.columns.keys():
+            pair, columns = None, []
         for frame in self._frames(dump):
             lacking = {"id", "x", "y", "z"} - frame.columns.keys()
             if lacking or not {"radius", "diameter"} & frame.columns.keys():
@@ -169,7 +171,7 @@ class Report:
         if run.energies:
             self.known["mean kinetic energy in the last frame, J/kg"] = run.energies[-1].mean
         if contacts and not columns:
-            why = "no compute pair/gran/local with id and force"
+            why = "no compute pair/gran/local with id and force, or other columns in its dump"
             self.add([NotApplied("DK207", why)])
         elif contacts:
             self.add(run.contact_results(", ".join(contacts)), "DK207")

@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dragdeck.arrays import Floats, Ints
 from dragdeck.audit.materials import constants_of, masses_of, radii_of, types_of
@@ -38,6 +39,10 @@ _ROUNDING = 0.01
 
 _DRIVES = ("move", "insert/", "cfd", "addforce", "adapt", "setforce", "freeze")
 _PLACE, _VELOCITY, _SPIN = ("x", "y", "z"), ("vx", "vy", "vz"), ("omegax", "omegay", "omegaz")
+_MEASURED = {"id", "type", *_PLACE, *_VELOCITY, *_SPIN, "fx", "fy", "fz", "radius", "diameter",
+             "density", "mass"}  # fmt: skip
+_LARGEST, _SMALLEST = 2.0**53, 1e-12
+"""Limits of the numbers in a dump, and of radii: what is beyond has diverged."""
 
 
 class Extreme(NamedTuple):
@@ -91,7 +96,7 @@ class Measures:
         self.through: dict[str, set[int]] = {}
         self.below: dict[str, set[int]] = {}
         self.bounds = np.array([[np.inf] * 3, [-np.inf] * 3])
-        self.frames = self.n_not_finite = self.n_contacts = self.n_beyond = 0
+        self.frames = self.n_unsound = self.n_contacts = self.n_beyond = 0
         self.force_sums = np.zeros(4)
         self.last: Scene | None = None
         self.kept: list[Scene] = []
@@ -106,10 +111,10 @@ class Measures:
 
     def add(self, frame: Frame) -> None:
         """Measure a frame."""
-        names = {"id", *_PLACE, *_VELOCITY, "radius", "diameter"} & frame.columns.keys()
-        finite = np.isfinite(frame.vectors(*names)).all(axis=1) & (radii_of(frame) > 0)
-        frame = frame.take(np.flatnonzero(finite))
-        self.n_not_finite += int((~finite).sum())
+        sound = _are_numbers(frame, _MEASURED & frame.columns.keys())
+        sound &= radii_of(frame) > _SMALLEST
+        frame = frame.take(np.flatnonzero(sound))
+        self.n_unsound += int((~sound).sum())
         self.frames += 1
         before, self.last_ids, self.last = self.last_ids, set(frame.ids("id").tolist()), None
         self.ids |= self.last_ids
@@ -169,6 +174,7 @@ class Measures:
         if self.last is None:
             return
         frame, centre, radius, *_ = self.last
+        rows = rows.take(np.flatnonzero(_are_numbers(rows, {*ids, *forces})))
         order = np.argsort(frame.ids("id"))
         known = frame.ids("id")[order]
         pair = rows.vectors(*ids).astype(np.int64).T
@@ -258,9 +264,9 @@ class Measures:
 
     def _balance(self, left_out: str) -> Results:
         missing = self.ids - self.last_ids
-        if self.n_not_finite:
-            message = f"{self.n_not_finite} rows have a number that is none"
-            yield self._finding("DK203", message, rows=self.n_not_finite)
+        if self.n_unsound:
+            message = f"{self.n_unsound} rows have nan, inf or a number that no particle can have"
+            yield self._finding("DK203", message, rows=self.n_unsound)
         for name, ids in self.through.items():
             if ids:
                 message = f"{len(ids)} particles went through the wall {name}, such as {min(ids)}"
@@ -281,7 +287,7 @@ class Measures:
         numbers = []
         for (frame, centre, radius, walls, contacts), mass in zip(scenes, masses, strict=True):
             types = np.append(types_of(frame), [wall.type for wall in walls]).astype(np.int64)
-            if mass is None or types.max() >= len(self.constants):
+            if mass is None or not (mass > 0).all() or types.max() >= len(self.constants):
                 return None
             density = mass / (4 / 3 * math.pi * radius**3)
             number = network_number(
@@ -338,6 +344,11 @@ class Measures:
         if error > _CUT:
             message = f"the contact forces on a particle miss its force by {100 * error:.1f} %"
             yield Finding("DK207", message, source, values={"error": error})
+
+
+def _are_numbers(rows: Frame, names: set[str]) -> NDArray[np.bool_]:
+    """Whether these columns of (N,) rows are numbers that have not diverged."""
+    return np.asarray((np.abs(rows.vectors(*names)) < _LARGEST).all(axis=1))
 
 
 def is_clumped(facts: Facts) -> bool:

@@ -11,6 +11,10 @@ from dragdeck.physics.rounding import is_prime
 from dragdeck.script.commands import EngineCommand
 from dragdeck.script.flow import Script
 
+_LARGEST = 1e60
+"""Numbers beyond it are no lengths, moduli or rates, and their powers overflow."""
+
+_MOST_TYPES = 1000
 _SMALLEST_SEED, _LARGEST_SEED = 10_000, 2**31
 _ELSEWHERE = {
     "nve/nonspherical", "check/timestep/bond", "hybrid/gran", "nve/sphere/omp", "gran/omp",
@@ -26,7 +30,7 @@ def as_number(word: str) -> float | None:
         value = float(word)
     except ValueError:
         return None
-    return value if math.isfinite(value) else None
+    return value if abs(value) < _LARGEST else None
 
 
 def as_numbers(words: Sequence[str], count: int = 0) -> list[float] | None:
@@ -198,7 +202,7 @@ class Facts:
         """The types of a wall's materials, from 1."""
         meshes = [self.meshes[name] for name in self.meshes_of(wall) if name in self.meshes]
         types = [as_number(fix.word("type")) for fix in meshes or [wall]]
-        return [int(number) for number in types if number is not None]
+        return [int(number) for number in types if number and 0 < number < _MOST_TYPES]
 
     def meshes_of(self, wall: Fix) -> Sequence[str]:
         """Names of the meshes of a wall."""

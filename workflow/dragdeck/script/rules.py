@@ -179,7 +179,7 @@ def absent(facts: Facts) -> Results:
         yield at("DK108", command, f"the script {name} is not there")
     read = {name: command for command in script.commands for name in names_read(command.words)}
     written = {w for c in script.commands if not names_read(c.words) for w in c.words}
-    if script.changes_files:
+    if read and script.changes_files:
         yield NotApplied("DK108", "the script makes or moves files itself")
     for name, command in read.items() if not (script.in_memory or script.changes_files) else ():
         if not set("*$") & set(name) | {name} & written and not is_there(script.folder / name):
