@@ -111,6 +111,57 @@ def test_missing_particles_and_numbers(tmp_path: Path, capsys: pytest.CaptureFix
     assert messages == [{"rows": 1}, {"missing": 1}]
 
 
+@pytest.mark.parametrize(
+    ("column", "word"),
+    [("radius", "0"), ("radius", "1e300"), ("x", "-1e300"), ("id", "nan"), ("type", "inf"),
+     ("omegax", "1e300"), ("fx", "nan"), ("vz", "-inf")],
+)  # fmt: skip
+def test_rows_that_have_diverged_are_counted_and_left_out(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], column: str, word: str
+) -> None:
+    words = sphere(2, 0.03).split()
+    words[COLUMNS.split().index(column)] = word
+    (tmp_path / "post").mkdir()
+    dump(tmp_path, [sphere(1, 0.01), sphere(2, 0.03)], [sphere(1, 0.01), " ".join(words)])
+    values = [f["values"] for f in report(tmp_path, capsys)["findings"] if f["rule"] == "DK203"]
+    assert values == [{"rows": 1}, {"missing": 1}]
+
+
+def test_types_and_columns_that_the_script_does_not_have(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    odd = sphere(2, 0.01 + 1.99 * R).replace("2 1 ", "2 7 ", 1)
+    settled(tmp_path, sphere(1, 0.01), odd)
+    names, pairs = "c_pairs[1] c_pairs[2] c_pairs[4] c_pairs[5]", tmp_path / "post/pairs_*.dump"
+    for columns, row in ((f"{names} c_pairs[6]", "1 2 1 0 0"), (names, "1 2 1 0")):
+        dump(tmp_path, [row], [row], name="pairs", columns=columns)
+        document = report(tmp_path, capsys, "--contacts", str(pairs))
+        assert "stability number" not in document["known"]
+    assert "other columns" in document["not_applied"][-1]["why"]
+
+
+def test_a_dump_that_leaves_particles_out_says_nothing_of_losses(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "post").mkdir()
+    dump(tmp_path, [sphere(1, 0.01), sphere(2, 0.03)], [sphere(1, 0.01)])
+    text = DECK.replace("run 8000", "dump_modify spheres thresh x > 0\nrun 8000")
+    document = report(tmp_path, capsys, text=text)
+    assert hits(document) == {}
+    assert [skip["rule"] for skip in document["not_applied"]] == ["DK203"]
+
+
+def test_walls_of_a_group_and_sides_of_walls(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "post").mkdir()
+    dump(tmp_path, [sphere(1, 0.01)], [sphere(1, -2 * R)], [sphere(1, -2 * R)])
+    assert hits(report(tmp_path, capsys)) == {"DK203": {"through": 1}}
+    assert hits(report(tmp_path, capsys, text=DECK.replace("boundary f f", "boundary p f"))) == {}
+    document = report(tmp_path, capsys, text=DECK.replace("wall0 all", "wall0 some"))
+    assert hits(document) == {} and document["known"]["contacts of"].startswith("without wall0")
+
+
 def test_spin_and_rest(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     settled(tmp_path, sphere(1, 0.01, spin=408), sphere(2, 0.03), sphere(3, 0.02))
     assert hits(report(tmp_path, capsys))["DK205"] == {"spin_rad_s": 408, "count": 1}

@@ -54,7 +54,9 @@ def audit(
         report = Report(script, {name: values for name, *values in var}, after, select, ignore)
         report.add(script_findings(report.script), "DK1")
         if engine:
-            report.add_engine()
+            from dragdeck.audit.zero_steps import engine_findings
+
+            report.add(engine_findings(report.script), "DK3")
         if dump:
             report.add_dumps(dump, contacts)
         if log is not None:
@@ -122,12 +124,6 @@ class Report:
                 self.every.append(result)
         skipped = {skip.rule for skip in self.skipped}
         self.applied |= {id for id in self.wanted if id.startswith(ids)} - skipped
-
-    def add_engine(self) -> None:
-        """Add what LIGGGHTS says of the script."""
-        from dragdeck.audit.zero_steps import engine_findings
-
-        self.add(engine_findings(self.script), "DK3")
 
     def add_log(self, file: Path) -> None:
         """Apply the rules on the log."""
@@ -197,13 +193,8 @@ class Report:
     def _left_out(self, patterns: Sequence[str]) -> str:
         """Why the dumps need not contain all particles; empty if they must."""
         ids = {command.words[1] for name in patterns if (command := self._dump_of(name))}
-        partial = [
-            command.words[1]
-            for command in self.facts.named("dump_modify")
-            if command.words[1:]
-            and {"thresh", "region"} & {*command.words}
-            and command.words[1] in ids
-        ]
+        partial = [c.words[1] for c in self.facts.named("dump_modify")
+                   if ids & {*c.words[1:2]} and {"thresh", "region"} & {*c.words}]  # fmt: skip
         return f"the dump {partial[0]} leaves particles out" if partial else ""
 
     def _contact_columns(self) -> list[str]:

@@ -186,9 +186,9 @@ class Measures:
         near = (distance < 1.5 * radius[pair].sum(axis=0)) & (distance > 0)
         pair, force, normal = pair[:, near], force[near], line[near] / distance[near, None]
         self.n_contacts += len(force)
-        if self.constants and not any(model.has("cohesion") for model in self.facts.models):
+        kinds, cohesive = types_of(frame)[pair], any(m.has("cohesion") for m in self.facts.models)
+        if self.constants and not cohesive and self._has_types(kinds):
             friction = np.array([[each.friction for each in row] for row in self.constants])
-            kinds = types_of(frame)[pair]
             across = force - np.einsum("ij,ij->i", force, normal)[:, None] * normal
             _, removed = within_friction(force, normal, friction[kinds[0], kinds[1]])
             sizes = np.linalg.norm(across, axis=1)
@@ -287,7 +287,7 @@ class Measures:
         numbers = []
         for (frame, centre, radius, walls, contacts), mass in zip(scenes, masses, strict=True):
             types = np.append(types_of(frame), [wall.type for wall in walls]).astype(np.int64)
-            if mass is None or not (mass > 0).all() or types.max() >= len(self.constants):
+            if mass is None or not (mass > 0).all() or not self._has_types(types):
                 return None
             density = mass / (4 / 3 * math.pi * radius**3)
             number = network_number(
@@ -295,6 +295,10 @@ class Measures:
             )
             numbers.append(number)
         return float(np.median(numbers))
+
+    def _has_types(self, types: Ints) -> bool:
+        """Whether the constants of all these types are known."""
+        return bool(((types >= 0) & (types < len(self.constants or ()))).all())
 
     def _spin(self) -> Results:
         gravity = math.hypot(*self.facts.gravity or ())

@@ -3,7 +3,7 @@
 import math
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -257,7 +257,9 @@ class _Reader:
             case "jump" if len(words) > 1:
                 self._jump(command)
             case "quit":
-                self.ended = not any(self._enter(self.name, label) for label in self._labels())
+                self.ended = True
+                while self.left_out and self.ended:  # a jump may have led past it
+                    self.ended = not self._enter(self.name, self.left_out.popitem()[0])
             case "run" | "read_restart" | "reset_timestep":
                 self.step = None if command.uncertain else self._step_after(words)
             case "shell":
@@ -327,11 +329,6 @@ class _Reader:
             if not self._enter(file, label):
                 self.script.note(command, f"jump to the label {label}, which is not there")
                 self.stack.append(before)
-
-    def _labels(self) -> Iterator[str]:
-        """Labels of jumps that may have led past a ``quit``, each once."""
-        while self.left_out:
-            yield self.left_out.popitem()[0]
 
     def _branch(self, command: EngineCommand) -> None:
         """Execute the commands of an ``if`` whose condition holds, or may hold."""
