@@ -30,9 +30,6 @@ _NEEDS = {
     "cohesionEnergyDensity": ("cohesion", ("easo/capillary/viscous", "washino/capillary/viscous")),
 }
 """Properties with the keyword that they need, and models of it that do not read them."""
-_LIMITED = {
-    "coefficientRestitution": "a coefficient of restitution", "youngsModulus": "a Young's modulus",
-}  # fmt: skip
 
 
 def script_findings(script: Script) -> list[Finding | NotApplied]:
@@ -145,9 +142,10 @@ def refused_value(facts: Facts) -> Results:
         return
     from dragdeck.physics.contact_mechanics import ENGINE_HARD_PA, ENGINE_SOFTEST_PA
 
-    limits = {"coefficientRestitution": (math.nextafter(0.05, 1), 1.0, "")}
+    words = "a coefficient of restitution"
+    limits = {"coefficientRestitution": (math.nextafter(0.05, 1), 1.0, words, "")}
     if facts.last("units")[:1] == ["si"]:
-        limits["youngsModulus"] = (ENGINE_SOFTEST_PA, ENGINE_HARD_PA, " Pa")
+        limits["youngsModulus"] = (ENGINE_SOFTEST_PA, ENGINE_HARD_PA, "a Young's modulus", " Pa")
     yes = {command.words[0] for command in facts.script.commands if "yes" in command.words}
     for fix, seed in facts.refused_seeds():
         yield at("DK107", fix.command, f"the seed {seed} is not a prime above 10,000", value=seed)
@@ -160,11 +158,11 @@ def refused_value(facts: Facts) -> Results:
                     f"{name} has {len(values)} values for {types:g} types, not {types * types:g}"
                 )
                 yield at("DK107", fix.command, message, value=len(values))
-        low, high, unit = limits.get(name, (-math.inf, math.inf, ""))
+        low, high, words, unit = limits.get(name, (-math.inf, math.inf, "", ""))
         for value in values or ():
             needed = "soft_particles" if value < low else "hard_particles" if value > high else ""
             if needed and not (unit and needed in yes):
-                message = f"{_LIMITED[name]} of {value:g}{unit}"
+                message = f"{words} of {value:g}{unit}"
                 message += f" without {needed} yes" if unit else ""
                 yield at("DK107", fix.command, message, value=value)
                 break
@@ -189,7 +187,7 @@ def absent(facts: Facts) -> Results:
 
 def mesh_without_wall(facts: Facts) -> Results:
     """DK109: a mesh that nothing but a motion names."""
-    used, moved = set(), set()
+    used, moved = set[str](), set[str]()
     for command in facts.script.commands:
         kind = "".join(command.words[3:4])
         if command.words[0] not in ("unfix", "group", "variable") and "mesh/surface" not in kind:
