@@ -60,7 +60,7 @@ class Energy(NamedTuple):
     unit: float
 
 
-class Scene(NamedTuple):
+class MeasuredFrame(NamedTuple):
     """A frame with its particles, the walls at its step, and the contacts of all these."""
 
     frame: Frame
@@ -98,8 +98,8 @@ class Measures:
         self.bounds = np.array([[np.inf] * 3, [-np.inf] * 3])
         self.frames = self.n_unsound = self.n_contacts = self.n_beyond = 0
         self.force_sums = np.zeros(4)
-        self.last: Scene | None = None
-        self.kept: list[Scene] = []
+        self.last: MeasuredFrame | None = None
+        self.kept: list[MeasuredFrame] = []
         self.every = 1
 
     @property
@@ -123,7 +123,7 @@ class Measures:
         centre, radius = frame.vectors(*_PLACE), radii_of(frame)
         walls = self.walls.at(frame.step, float(radius.max()))
         contacts = touching(centre, radius, *([wall] for wall in walls))
-        self.last = Scene(frame, centre, radius, walls, contacts)
+        self.last = MeasuredFrame(frame, centre, radius, walls, contacts)
         self.bounds = np.stack([np.minimum(self.bounds[0], centre.min(axis=0)),
                                 np.maximum(self.bounds[1], centre.max(axis=0))])  # fmt: skip
         self._add_overlap(self.last)
@@ -135,7 +135,7 @@ class Measures:
             if len(self.kept) > 2 * _FRAMES:
                 self.kept, self.every = self.kept[::2], 2 * self.every
 
-    def _add_overlap(self, scene: Scene) -> None:
+    def _add_overlap(self, scene: MeasuredFrame) -> None:
         (first, second), _, overlap = scene.contacts
         radii = np.append(scene.radius, np.full(len(scene.walls), np.inf))
         fractions = overlap / np.minimum(radii[first], radii[second])
@@ -145,7 +145,7 @@ class Measures:
             pair = f"particle {ids[first[at]]} with {ids[second[at]]}"
             self.overlap = Extreme(float(fractions[at]), pair, scene.frame.step)
 
-    def _add_sides(self, scene: Scene, before: set[int]) -> None:
+    def _add_sides(self, scene: MeasuredFrame, before: set[int]) -> None:
         """Particles that were on the other side of a plane or cylinder in the frame before."""
         ids, below = scene.frame.ids("id"), {}
         for wall in scene.walls if "p" not in "".join(self.facts.last("boundary")) else ():
@@ -155,7 +155,7 @@ class Measures:
                 self.through.setdefault(wall.name, set()).update(crossed)
         self.below = below
 
-    def _add_speed(self, scene: Scene) -> None:
+    def _add_speed(self, scene: MeasuredFrame) -> None:
         speed = np.linalg.norm(scene.frame.vectors(*_VELOCITY), axis=1)
         fastest = int(speed.argmax())
         if math.isnan(self.first_speed):
@@ -197,7 +197,7 @@ class Measures:
         if {"fx", "fy", "fz"} <= frame.columns.keys() and not self.walls.unknown:
             self._add_closure(self.last, pair, force)
 
-    def _add_closure(self, scene: Scene, pair: Ints, force: Floats) -> None:
+    def _add_closure(self, scene: MeasuredFrame, pair: Ints, force: Floats) -> None:
         """Add forces of particles without a wall: errors of their sums, and magnitudes."""
         mass, gravity = masses_of(scene.frame, self.facts), self.facts.gravity
         if mass is None or gravity is None:
@@ -380,7 +380,7 @@ def is_driven(facts: Facts) -> bool:
     return False
 
 
-def _of_spin(scene: Scene) -> Floats:
+def _of_spin(scene: MeasuredFrame) -> Floats:
     """Energy of rotation over mass, (N,), J/kg; 0 without spins."""
     if not {*_SPIN} <= scene.frame.columns.keys():
         return np.zeros(scene.frame.rows)

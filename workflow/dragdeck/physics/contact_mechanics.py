@@ -428,7 +428,7 @@ def largest_eigenvalue(
     return float(eigsh(operator, k=1, v0=start, tol=tolerance, return_eigenvectors=False)[0])
 
 
-class Surface(Protocol):
+class ContactSurface(Protocol):
     """A part of the surface of a body."""
 
     def contacts(self, centre_m: Floats) -> tuple[Floats, Floats]:
@@ -436,7 +436,7 @@ class Surface(Protocol):
 
 
 def touching(
-    centre: Floats, radius: Floats, *bodies: Sequence[Surface]
+    centre: Floats, radius: Floats, *bodies: Sequence[ContactSurface]
 ) -> tuple[Ints, Floats, Floats]:
     """Contacts of particles with each other and with other bodies, such as a bowl.
 
