@@ -95,7 +95,7 @@ def rejecting(folder: Path) -> set[str]:
     outputs = {"thermo": thermo, "workpiece_force": force, "particles": PARTICLES.as_part()}
     part = RunPart(part=1, checkpoint=None, from_step=0)
     checks = check_run(folder, CaseFile.read(folder / "case.json"), outputs, 0, [part], 1)
-    return {check.code for check in checks if not check.passed} - {"packing_whole"}
+    return {str(check.code) for check in checks if not check.passed} - {"packing_whole"}
 
 
 def audited(script: Path, capsys: pytest.CaptureFixture[str], *more: str) -> set[tuple[str, str]]:

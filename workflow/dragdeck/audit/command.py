@@ -180,7 +180,8 @@ class Report:
         files = [file for pattern in patterns for file in dump_files(pattern)]
         for file in sorted(files, key=lambda file: [*map(int, re.findall(r"\d+", file.name))]):
             command = self._dump_of(file.name) if ".bin" in file.suffixes[-2:] else None
-            yield from read_frames([file], layout_of(file, command and command.words[6:]))
+            columns = command.words[6:] if command else None
+            yield from read_frames([file], layout_of(file, columns))
 
     def _dump_of(self, name: str) -> EngineCommand | None:
         """The last dump of the script that writes files of such a name."""

@@ -88,8 +88,10 @@ def _shapes(facts: Facts, fix: Fix) -> Iterator[tuple[str, Shape | None]]:
     for name in facts.meshes_of(fix):
         triangles = _triangles(facts, facts.meshes[name]) if name in facts.meshes else None
         place = _place(facts, name)
-        known = triangles is not None and place is not None
-        yield name, partial(_moved, triangles, place) if known else None
+        if triangles is None or place is None:
+            yield name, None
+        else:
+            yield name, partial(_moved, triangles, place)
 
 
 def _moved(triangles: Floats, place: Place, step: float, reach_m: float) -> Distances:
@@ -119,6 +121,7 @@ def _triangles(facts: Facts, mesh: Fix) -> Floats | None:
     """Corners of the facets of a mesh as it is loaded, (F, 3, 3); None if they are not known."""
     from dragdeck.mesh.files import read
 
+    corners: Floats | None
     try:
         corners = np.asarray(read(facts.script.folder / mesh.word("file"), "m").triangles)
     except (InputError, OSError):
