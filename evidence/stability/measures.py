@@ -230,7 +230,7 @@ def _measure_resting(point: PointRun, run: Run) -> PointRow:
 
 def _bed(point: PointRun, case: CaseOfRun, frame: Frame) -> PointRow:
     radius = frame.radii
-    bodies, normal, overlap = touching(frame.centres, radius, case.bowl)
+    bodies, normal, overlap = touching(frame.centres, radius, case.bowl.walls)
     partner = np.where(bodies[1] == len(radius), BOWL, PARTICLE)
     contacts = Contacts(bodies, normal, overlap, partner)
     return {

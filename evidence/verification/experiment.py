@@ -24,7 +24,7 @@ _FRAMES_TIMES_BODIES = 25_000
 
 
 @dataclass(frozen=True)
-class FlatWall:
+class ExactPlane:
     """An exact plane.
 
     Attributes
@@ -116,7 +116,7 @@ class CollideCase(CaseFile):
     types: Sequence[NamedMaterial]
     pairs: Sequence[MeetingPair]
     bodies: Sequence[PlacedSphere]
-    walls: Sequence[FlatWall] = ()
+    walls: Sequence[ExactPlane] = ()
 
     def type_of(self, body: int | str) -> int:
         """Type of a particle, by its number, or of a wall, by its name."""
@@ -187,7 +187,7 @@ def experiment(
 class _CollideDeck(Deck):
     """What the collide template sees."""
 
-    walls: Sequence[FlatWall]
+    walls: Sequence[ExactPlane]
     steps: int
 
 

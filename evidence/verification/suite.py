@@ -20,8 +20,8 @@ from dragdeck.study.model import Study
 from dragdeck.study.workpiece import Material
 from evidence.verification.experiment import (
     ContactFacts,
+    ExactPlane,
     Experiment,
-    FlatWall,
     PlacedSphere,
     experiment,
 )
@@ -210,7 +210,9 @@ class Impacts(Test):
             types=types,
             pairs={(at, at if same else len(types)): pair for at, pair in enumerate(distinct, 1)},
             bodies=bodies,
-            walls=[FlatWall("plane", len(types), "zplane 0.0")] if self.partner == "plane" else [],
+            walls=[ExactPlane("plane", len(types), "zplane 0.0")]
+            if self.partner == "plane"
+            else [],
             limit_force=limit_force,
             timestep_s=dt,
             steps=math.ceil(_LONGEST_CONTACTS * max(times) / dt + 4 * _APPROACH_STEPS),
@@ -277,7 +279,10 @@ def _bounces(lab: Lab, made: Make) -> Iterator[Experiment]:
             types=[("media", particle), ("workpiece", wall)],
             pairs={(1, 2): Pair(restitution=1, friction=0)},
             bodies=[PlacedSphere(1, _RADIUS_M, (0, 0, top / 2), (0, 0, -speed))],
-            walls=[FlatWall("floor", 2, "zplane 0.0"), FlatWall("ceiling", 2, f"zplane {top!r}")],
+            walls=[
+                ExactPlane("floor", 2, "zplane 0.0"),
+                ExactPlane("ceiling", 2, f"zplane {top!r}"),
+            ],
             timestep_s=dt,
             steps=math.ceil(impacts * (flight + 1.03 * time) / dt),
             period=max(1, steps // 5),
@@ -335,7 +340,7 @@ def _on_plane(
         steps_per_contact=steps,
         types=[*[("media", particle)] * (last - 1), ("workpiece", floor)],
         bodies=bodies,
-        walls=[FlatWall("plane", last, "zplane 0.0")],
+        walls=[ExactPlane("plane", last, "zplane 0.0")],
         timestep_s=dt,
         steps=math.ceil(duration_s / dt),
         period=max(1, round(duration_s / dt / frames)),

@@ -10,9 +10,11 @@ import pytest
 from audit_decks import DECK, without
 
 from dragdeck.audit.command import audit
-from dragdeck.audit.run_log import balance_of
+from dragdeck.audit.run_log import RunLog
 from dragdeck.cli import main
 from dragdeck.physics.contact_mechanics import damping_ratio
+from dragdeck.script.facts import Facts
+from dragdeck.script.flow import read_script
 
 COLUMNS = "id type x y z vx vy vz fx fy fz omegax omegay omegaz radius"
 R = 0.002
@@ -109,6 +111,57 @@ def test_missing_particles_and_numbers(tmp_path: Path, capsys: pytest.CaptureFix
     assert messages == [{"rows": 1}, {"missing": 1}]
 
 
+@pytest.mark.parametrize(
+    ("column", "word"),
+    [("radius", "0"), ("radius", "1e300"), ("x", "-1e300"), ("id", "nan"), ("type", "inf"),
+     ("omegax", "1e300"), ("fx", "nan"), ("vz", "-inf")],
+)  # fmt: skip
+def test_rows_that_have_diverged_are_counted_and_left_out(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], column: str, word: str
+) -> None:
+    words = sphere(2, 0.03).split()
+    words[COLUMNS.split().index(column)] = word
+    (tmp_path / "post").mkdir()
+    dump(tmp_path, [sphere(1, 0.01), sphere(2, 0.03)], [sphere(1, 0.01), " ".join(words)])
+    values = [f["values"] for f in report(tmp_path, capsys)["findings"] if f["rule"] == "DK203"]
+    assert values == [{"rows": 1}, {"missing": 1}]
+
+
+def test_types_and_columns_that_the_script_does_not_have(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    odd = sphere(2, 0.01 + 1.99 * R).replace("2 1 ", "2 7 ", 1)
+    settled(tmp_path, sphere(1, 0.01), odd)
+    names, pairs = "c_pairs[1] c_pairs[2] c_pairs[4] c_pairs[5]", tmp_path / "post/pairs_*.dump"
+    for columns, row in ((f"{names} c_pairs[6]", "1 2 1 0 0"), (names, "1 2 1 0")):
+        dump(tmp_path, [row], [row], name="pairs", columns=columns)
+        document = report(tmp_path, capsys, "--contacts", str(pairs))
+        assert "stability number" not in document["known"]
+    assert "other columns" in document["not_applied"][-1]["why"]
+
+
+def test_a_dump_that_leaves_particles_out_says_nothing_of_losses(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "post").mkdir()
+    dump(tmp_path, [sphere(1, 0.01), sphere(2, 0.03)], [sphere(1, 0.01)])
+    text = DECK.replace("run 8000", "dump_modify spheres thresh x > 0\nrun 8000")
+    document = report(tmp_path, capsys, text=text)
+    assert hits(document) == {}
+    assert [skip["rule"] for skip in document["not_applied"]] == ["DK203"]
+
+
+def test_walls_of_a_group_and_sides_of_walls(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "post").mkdir()
+    dump(tmp_path, [sphere(1, 0.01)], [sphere(1, -2 * R)], [sphere(1, -2 * R)])
+    assert hits(report(tmp_path, capsys)) == {"DK203": {"through": 1}}
+    assert hits(report(tmp_path, capsys, text=DECK.replace("boundary f f", "boundary p f"))) == {}
+    document = report(tmp_path, capsys, text=DECK.replace("wall0 all", "wall0 some"))
+    assert hits(document) == {} and document["known"]["contacts of"].startswith("without wall0")
+
+
 def test_spin_and_rest(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     settled(tmp_path, sphere(1, 0.01, spin=408), sphere(2, 0.03), sphere(3, 0.02))
     assert hits(report(tmp_path, capsys))["DK205"] == {"spin_rad_s": 408, "count": 1}
@@ -145,16 +198,18 @@ Step Atoms KinEng mass[2]
 INFO: Particle insertion ins: inserted 5 particle templates (mass 1.0) at step 50
      100       15  1.0  0
      200       12  1.0  2
+Loop time of 1.0 on 1 procs for 200 steps with 12 atoms
 """
 
 
 def test_the_balance_of_a_log(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    balance = balance_of(LOG, ["mass"])
-    assert balance is not None
-    assert (balance.expected, balance.counted, balance.last) == (15, 2, 12)
     log = tmp_path / "log"
     log.write_text(LOG + "WARNING: Less insertions than requested\nDangerous builds = 3\n")
     file = str(audit_decks.write(tmp_path))
+    outlet = "fix mass all massflow/mesh mesh p delete_atom yes\n"
+    meters = Facts(read_script(Path(file), text=outlet))
+    balance = RunLog(log, meters)
+    assert (balance.expected, balance.counted, balance.last) == (15, 2, 12)
     assert main(["audit", file, "--log", str(log), "--format", "json"]) == 1
     findings = json.loads(capsys.readouterr().out)["findings"]
     assert [(f["rule"], f["values"]) for f in findings] == [

@@ -54,7 +54,7 @@ def test_particles_start_within_the_walls(name: str, made: Made) -> None:
     assert (np.min(gaps, axis=0) > particles.radii_m).all()
     near = KDTree(particles.positions_m).query(particles.positions_m, 2)[0][:, 1]
     assert near.min() > 2 * particles.radii_m.min()
-    bodies, *_ = touching(particles.positions_m, particles.radii_m, inside)
+    bodies, *_ = touching(particles.positions_m, particles.radii_m, inside.walls)
     assert not bodies.size
 
 
@@ -71,11 +71,13 @@ def test_ranks_share_the_whole_section(name: str) -> None:
 def test_contacts_with_a_column_and_with_planes() -> None:
     ring, box = bowl("annulus").container, bowl("trough").container
     at = np.array([[0.0, 0.0129, 0.02], [0.0395, 0.0, 0.0029]])
-    bodies, normal, overlap = touching(at, np.full(2, 0.003), ring)
+    bodies, normal, overlap = touching(at, np.full(2, 0.003), ring.walls)
     assert bodies.tolist() == [[1, 0], [2, 2]]
     assert overlap == pytest.approx([1e-4, 1e-4])
     assert normal == pytest.approx(np.array([[0, 0, -1], [0, -1, 0]]))
-    bodies, normal, overlap = touching(np.array([[-0.0371, 0.0196, 0.1]]), np.full(1, 0.003), box)
+    bodies, normal, overlap = touching(
+        np.array([[-0.0371, 0.0196, 0.1]]), np.full(1, 0.003), box.walls
+    )
     assert sorted(map(tuple, normal.tolist())) == [(-1.0, 0.0, 0.0), (0.0, 1.0, 0.0)]
     assert overlap == pytest.approx([1e-4, 1e-4])
 

@@ -29,7 +29,7 @@ from dragdeck.scenes.process import PROCESS, process_scene
 from dragdeck.scenes.workpiece import describe, workpiece_buoyancy
 from dragdeck.study.contact_law import Pair
 from dragdeck.study.workpiece import Material
-from evidence.verification.experiment import FlatWall, PlacedSphere, collide_scene, experiment
+from evidence.verification.experiment import ExactPlane, PlacedSphere, collide_scene, experiment
 
 Made = Callable[..., Case]
 
@@ -51,7 +51,7 @@ def test_a_particle_at_rest_weighs_its_reduced_weight(
         experiment(
             "resting", 1, "A resting particle", [], types=[("particle", glass), ("plane", glass)],
             pairs={(1, 1): pair, (1, 2): pair}, bodies=[PlacedSphere(1, radius, (0, 0, radius))],
-            walls=[FlatWall("floor", 2, "zplane 0.0")], timestep_s=1e-6, series="", vary="",
+            walls=[ExactPlane("floor", 2, "zplane 0.0")], timestep_s=1e-6, series="", vary="",
             contacts=[], gravity_m_s2=(0, 0, -9.81), steps_per_contact=1, steps=60_000,
             period=20_000,
         )

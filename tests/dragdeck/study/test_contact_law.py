@@ -47,7 +47,7 @@ from dragdeck.study.contact_law import (
 from dragdeck.study.model import Study
 from dragdeck.study.workpiece import Material
 from dragdeck.sweep.cases import load_cases
-from evidence.verification.experiment import FlatWall, PlacedSphere, collide_scene, experiment
+from evidence.verification.experiment import ExactPlane, PlacedSphere, collide_scene, experiment
 
 OPTIONAL = [name for name, row in coefficients().items() if row.model]
 USED = 0.1
@@ -284,8 +284,9 @@ def test_a_rolling_particle_slows_down_by_five_sevenths_of_the_coefficient(
     rolling = experiment(
         "rolling", 1, "A rolling particle", [],
         types=[("particle", steel), ("plane", steel)], pairs={(1, 2): pair}, bodies=[turning],
-        walls=[FlatWall("floor", 2, "zplane 0.0")], timestep_s=step, series="", vary="",
-        contacts=[], gravity_m_s2=(0, 0, -gravity), steps_per_contact=1, steps=50_000, period=1000,
+        walls=[ExactPlane("floor", 2, "zplane 0.0")], timestep_s=step, series="", vary="",
+        contacts=[],
+        gravity_m_s2=(0, 0, -gravity), steps_per_contact=1, steps=50_000, period=1000,
         rolling_model=model,
     )  # fmt: skip
     folder = tmp_path / "rolling"
@@ -396,7 +397,7 @@ def test_a_cohesive_contact_opens_at_its_tension(
         experiment(
             "hanging", 1, "A hanging particle", [], types=[("particle", glass), ("plane", glass)],
             pairs={(1, 1): weaker, (1, 2): weaker if wall else stronger}, bodies=bodies,
-            walls=[FlatWall("ceiling", 2, "zplane 0.0")], timestep_s=1e-6, series="", vary="",
+            walls=[ExactPlane("ceiling", 2, "zplane 0.0")], timestep_s=1e-6, series="", vary="",
             contacts=[], gravity_m_s2=(0, 0, pull / mass), steps_per_contact=1, steps=60_000,
             period=20_000,
         )

@@ -11,7 +11,7 @@ from trimesh import Trimesh
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
 from dragdeck.mesh import checks
-from dragdeck.mesh.checks import Finding
+from dragdeck.mesh.checks import MeshDefect
 from dragdeck.project import Project
 from dragdeck.scenes.filling import expected_bed
 from dragdeck.scenes.process import PROCESS
@@ -119,9 +119,11 @@ def test_a_fold_that_the_mesher_makes_is_no_defect_of_the_part(
     mesh, folded = trimesh.creation.cylinder(5.0, 80.0, sections=300), []
     size = study_of(project, mesh)[1].facet_size_m
 
-    def findings(body: Trimesh, **around: object) -> list[Finding]:
+    def findings(body: Trimesh, **around: object) -> list[MeshDefect]:
         if len(body.faces) != len(mesh.faces) and not folded:
-            folded.append(Finding("two facets lie on each other", "2", "none", "repair the mesh"))
+            folded.append(
+                MeshDefect("two facets lie on each other", "2", "none", "repair the mesh")
+            )
             return folded
         return checks.findings(body, **around)  # type: ignore[arg-type]
 

@@ -95,7 +95,7 @@ def test_the_critical_step_of_central_differences_with_lagging_damping() -> None
 
 def test_particles_that_touch_are_found_with_their_overlaps() -> None:
     centre = np.array([[0.0, 0.0, 0.9], [1.9, 0.0, 1.0], [1.9, 0.0, 3.1]])
-    bodies, _, overlap = touching(centre, np.ones(3), round_container(2.7))
+    bodies, _, overlap = touching(centre, np.ones(3), round_container(2.7).walls)
     rows = sorted(zip(*bodies.tolist(), overlap.tolist(), strict=True))
     assert [row[:2] for row in rows] == [(0, 1), (0, 3), (1, 3), (2, 3)]
     gap = math.hypot(1.9, 0.1)

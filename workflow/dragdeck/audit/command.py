@@ -3,20 +3,25 @@
 import json
 import re
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from fnmatch import fnmatch
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from dragdeck.errors import DragdeckError, InputError
-from dragdeck.script.commands import words_of
+from dragdeck.script.commands import EngineCommand, words_of
 from dragdeck.script.facts import Facts
-from dragdeck.script.findings import Finding, NotApplied, Rule, check_ids, rules, without_accepted
-from dragdeck.script.flow import Script, read_script
+from dragdeck.script.findings import Finding, NotApplied, check_ids, rules, without_accepted
+from dragdeck.script.flow import read_script
 from dragdeck.script.rules import script_findings
 
-_FAILS = ("error", "warning")
+if TYPE_CHECKING:
+    from dragdeck.dumps.frame import Frame
+
+_SEVERITIES = ("error", "warning", "note")
 _OF_CONTACTS = ("pos", "vel")
+"""What `pair/gran/local` writes before ids and forces, six columns each."""
 
 
 def audit(
@@ -42,36 +47,36 @@ def audit(
     """
     try:
         if explain is not None:
-            print(explained(explain))
+            print(rule_text(explain))
             return 0
         if script is None:
             raise InputError("no input script is given", remedy="give SCRIPT, or --explain ID")
         report = Report(script, {name: values for name, *values in var}, after, select, ignore)
-        report.add_script()
+        report.add(script_findings(report.script), "DK1")
         if engine:
             from dragdeck.audit.zero_steps import engine_findings
 
-            report.add(engine_findings(report.script), ["DK300"])
+            report.add(engine_findings(report.script), "DK3")
         if dump:
             report.add_dumps(dump, contacts)
         if log is not None:
             report.add_log(log)
-        print(report.as_json() if format == "json" else report.as_text())
+        print(json.dumps(report.document, indent=2) if format == "json" else report.text)
     except (DragdeckError, OSError) as error:
         print(f"dragdeck: {error}", file=sys.stderr)
         return 2
-    return int(any(finding.graded in _FAILS for finding in report.judged[0]))
+    return int(any(finding.graded != "note" for finding in report.judged[0]))
 
 
-def explained(id: str) -> str:
-    """What a rule means, with its evidence."""
+def rule_text(id: str) -> str:
+    """What the rules are whose ids begin so, with their evidence."""
     check_ids([id])
-    return "\n\n".join(_explained(rule) for name, rule in rules().items() if name.startswith(id))
-
-
-def _explained(rule: Rule) -> str:
-    head = f"{rule.id} {rule.severity}: {rule.title}"
-    return f"{head}\n  evidence: {rule.evidence}\n  remedy:   {rule.remedy}"
+    return "\n\n".join(
+        f"{rule.id} {rule.severity}: {rule.title}\n"
+        f"  evidence: {rule.evidence}\n  remedy:   {rule.remedy}"
+        for rule in rules().values()
+        if rule.id.startswith(id)
+    )
 
 
 class Report:
@@ -96,11 +101,11 @@ class Report:
         select: str,
         ignore: str,
     ) -> None:
-        self.selected, self.ignored = (
-            tuple(filter(None, ids.split(","))) for ids in (select, ignore)
-        )
-        check_ids([*self.selected, *self.ignored])
-        self.script: Script = read_script(file, variables, after=after)
+        chosen = [tuple(filter(None, ids.split(","))) for ids in (select, ignore)]
+        check_ids(id for ids in chosen for id in ids)
+        self.wanted = [id for id in rules() if id.startswith(chosen[0])
+                       and not (chosen[1] and id.startswith(chosen[1]))]  # fmt: skip
+        self.script = read_script(file, variables, after=after)
         self.facts = Facts(self.script)
         self.after = str(after)
         self.every: list[Finding] = []
@@ -108,70 +113,52 @@ class Report:
         self.applied: set[str] = set()
         self.known: dict[str, float | str] = {}
 
-    def add(self, results: Iterator[Finding | NotApplied], ids: Sequence[str]) -> None:
-        """Add what rules say, of which these were applied."""
+    def add(self, results: Iterable[Finding | NotApplied], *ids: str) -> None:
+        """Add what rules say whose ids begin so."""
         for result in results:
+            if result.rule not in self.wanted or result.file == self.after:
+                continue
             if isinstance(result, NotApplied):
                 self.skipped.append(result)
-            elif self._wanted(result.rule) and result.file != self.after:
+            else:
                 self.every.append(result)
-        self.applied |= {id for id in ids if self._wanted(id)} - {
-            skip.rule for skip in self.skipped
-        }
+        skipped = {skip.rule for skip in self.skipped}
+        self.applied |= {id for id in self.wanted if id.startswith(ids)} - skipped
 
-    def _wanted(self, id: str) -> bool:
-        return id.startswith(self.selected) and not (self.ignored and id.startswith(self.ignored))
-
-    def add_script(self) -> None:
-        """Apply the rules on the script."""
-        self.add(iter(script_findings(self.script)), [id for id in rules() if id < "DK2"])
-
-    def add_log(self, log: Path) -> None:
+    def add_log(self, file: Path) -> None:
         """Apply the rules on the log."""
-        from dragdeck.audit.measures import removal
-        from dragdeck.audit.run_log import balance_of, log_findings
+        from dragdeck.audit.run_log import RunLog
 
-        meters = self.facts.styled("massflow/mesh")
-        outlets = [fix.id for fix in meters if "delete_atom" in fix.words]
-        text = log.read_text(encoding="utf-8", errors="replace")
-        balance = balance_of(text, outlets)
-        unknown = "" if balance and balance.counted else removal(self.facts)
-        if self.facts.styled("multisphere", "particletemplate/multisphere"):
-            unknown = "particles are clumps"
-        if balance:
-            self.known |= {"inserted or there": balance.expected, "at the end": balance.last}
-        self.add(log_findings(log, text, balance, outlets, unknown), ["DK203", "DK208"])
+        log = RunLog(file, self.facts)
+        if log.last is not None:
+            self.known |= {"inserted or there": log.expected, "at the end": log.last}
+        self.add(log.results(), "DK203", "DK208")
 
     def add_dumps(self, dump: Sequence[str], contacts: Sequence[str]) -> None:
         """Apply the rules on the dumps."""
-        from dragdeck.audit.measures import ContactSums, Measures, matched
-        from dragdeck.dumps.reader import dump_files, layout_of, read_frames
+        from dragdeck.audit.measures import Measures
 
-        source = ", ".join(dump)
-        run, sums = Measures(self.facts, source), ContactSums()
-        ids, forces = self._contact_columns(contacts)
-
-        def frames(patterns: Sequence[str]) -> Iterator:  # type: ignore[type-arg]
-            files = [file for pattern in patterns for file in dump_files(pattern)]
-            files.sort(key=lambda file: [int(part) for part in re.findall(r"\d+", file.name)])
-            for file in files:
-                binary = ".bin" in file.suffixes[-2:]
-                yield from read_frames(
-                    [file], layout_of(file, self._columns(file) if binary else None)
-                )
-
-        for frame, touching in matched(frames(dump), frames(contacts)):
-            lacking = {"id", "x", "y", "z"} - set(frame.columns)
-            if lacking or not {"radius", "diameter"} & set(frame.columns):
+        run = Measures(self.facts, source := ", ".join(dump))
+        columns = self._contact_columns() if contacts else []
+        pairs = self._frames(contacts) if columns else iter(())
+        pair = next(pairs, None)
+        if pair is not None and not {*columns} <= pair.columns.keys():
+            pair, columns = None, []
+        for frame in self._frames(dump):
+            lacking = {"id", "x", "y", "z"} - frame.columns.keys()
+            if lacking or not {"radius", "diameter"} & frame.columns.keys():
                 names = ", ".join(sorted(lacking)) or "radius"
-                self.add(iter([NotApplied("DK201", f"{source} has no column {names}")]), [])
+                self.add([NotApplied("DK201", f"{source} has no column {names}")])
                 return
             run.add(frame)
-            if touching is not None and ids and run.last is not None:
-                sums.add(touching, ids, forces, run, run.last)
-        self.add(run.results(), [f"DK20{n}" for n in range(1, 7)])
-        self.known |= {"frames": run.frames, "contacts of": run.scope}
+            while pair is not None and pair.step < frame.step:
+                pair = next(pairs, None)
+            if pair is not None and pair.step == frame.step:
+                run.add_contacts(pair, columns[:2], columns[2:])
+        self.add(run.results(self._left_out(dump)), *(f"DK20{n}" for n in range(1, 7)))
         self.known |= {
+            "frames": run.frames,
+            "contacts of": run.scope,
             "largest overlap over radius": run.overlap.value,
             "largest speed, m/s": run.speed.value,
         }
@@ -179,67 +166,81 @@ class Report:
             self.known["stability number"] = run.stability
         if run.energies:
             self.known["mean kinetic energy in the last frame, J/kg"] = run.energies[-1].mean
-        if contacts:
-            self.add(sums.results(", ".join(contacts)), ["DK207"])
-            self.known["contacts above Coulomb's limit"] = f"{sums.beyond} of {sums.contacts}"
+        if contacts and not columns:
+            why = "no compute pair/gran/local with id and force, or other columns in its dump"
+            self.add([NotApplied("DK207", why)])
+        elif contacts:
+            self.add(run.contact_results(", ".join(contacts)), "DK207")
+            self.known["contacts above Coulomb's limit"] = f"{run.n_beyond} of {run.n_contacts}"
 
-    def _columns(self, file: Path) -> list[str] | None:
-        """Columns of a binary dump, as the script says them."""
-        for command in reversed([*self.facts.named("dump")]):
-            name = re.sub(r"\$\{\w+\}", "*", "".join(words_of(command.text)[5:6]))
-            if fnmatch(file.name, Path(name).name):
-                return command.words[6:]
-        return None
+    def _frames(self, patterns: Sequence[str]) -> "Iterator[Frame]":
+        """The frames of all files, in the order of the numbers in their names."""
+        from dragdeck.dumps.reader import dump_files, layout_of, read_frames
 
-    def _contact_columns(self, contacts: Sequence[str]) -> tuple[list[str], list[str]]:
-        """Columns with the ids and the forces of contacts between particles; none if not known."""
-        for compute in self.facts.named("compute") if contacts else ():
+        files = [file for pattern in patterns for file in dump_files(pattern)]
+        for file in sorted(files, key=lambda file: [*map(int, re.findall(r"\d+", file.name))]):
+            command = self._dump_of(file.name) if ".bin" in file.suffixes[-2:] else None
+            columns = command.words[6:] if command else None
+            yield from read_frames([file], layout_of(file, columns))
+
+    def _dump_of(self, name: str) -> EngineCommand | None:
+        """The last dump of the script that writes files of such a name."""
+        dumps = [*self.facts.named("dump")]
+        named = [re.sub(r"\$\{\w+\}|\$\w", "*", "".join(words_of(c.text)[5:6])) for c in dumps]
+        of_name = [command for command, pattern in zip(dumps, named, strict=True)
+                   if fnmatch(Path(name).name, Path(pattern).name)]  # fmt: skip
+        return of_name[-1] if of_name else None
+
+    def _left_out(self, patterns: Sequence[str]) -> str:
+        """Why the dumps need not contain all particles; empty if they must."""
+        ids = {command.words[1] for name in patterns if (command := self._dump_of(name))}
+        partial = [c.words[1] for c in self.facts.named("dump_modify")
+                   if ids & {*c.words[1:2]} and {"thresh", "region"} & {*c.words}]  # fmt: skip
+        return f"the dump {partial[0]} leaves particles out" if partial else ""
+
+    def _contact_columns(self) -> list[str]:
+        """Columns with ids and forces of contacts between particles; none if not known."""
+        for compute in self.facts.named("compute"):
             words = compute.words
             if words[3:4] == ["pair/gran/local"] and {"id", "force"} <= set(words):
                 begin = 6 * sum(name in words for name in _OF_CONTACTS)
-                places = [begin + n for n in (1, 2, 4, 5, 6)]
-                names = [f"c_{words[1]}[{place}]" for place in places]
-                return names[:2], names[2:]
-        if contacts:
-            self.skipped.append(NotApplied("DK207", "no compute pair/gran/local with id and force"))
-        return [], []
+                return [f"c_{words[1]}[{begin + n}]" for n in (1, 2, 4, 5, 6)]
+        return []
 
     @cached_property
     def judged(self) -> tuple[list[Finding], list[str]]:
         """Of all rules: findings that no comment accepts, and notes on unused comments."""
         return without_accepted(self.every, self.script, self.applied)
 
-    def as_text(self) -> str:
+    @property
+    def text(self) -> str:
         """A line for each finding with its remedy, and what was not checked."""
         findings, unused = self.judged
-        lines = [f"{finding}\n    {rules()[finding.rule].remedy}" for finding in findings]
-        lines += [f"{note} (unused comment)" for note in unused]
-        if self.known:
-            shown = (
-                f"{name} {v:.4g}" if isinstance(v, float) else f"{name} {v}"
-                for name, v in self.known.items()
-            )
-            lines.append("measured: " + "; ".join(shown))
-        if self.facts.dialect:
-            lines.append(f"dialect: {self.facts.dialect}")
-        lines += [f"not followed: {note}" for note in self.script.not_followed]
-        lines += [f"not applied: {skip.rule}: {skip.why}" for skip in self.skipped]
-        counts = [f"{n} {grade}(s)" for grade in ("error", "warning", "note")
-                  if (n := sum(finding.graded == grade for finding in findings))]  # fmt: skip
-        return "\n".join([*lines, ", ".join(counts) or "no findings"])
+        measured = [f"{name} {value:.4g}" if isinstance(value, float) else f"{name} {value}"
+                    for name, value in self.known.items()]  # fmt: skip
+        counts = {each: sum(f.graded == each for f in findings) for each in _SEVERITIES}
+        counted = [f"{count} {severity}(s)" for severity, count in counts.items() if count]
+        return "\n".join([
+            *(f"{finding}\n    {rules()[finding.rule].remedy}" for finding in findings),
+            *(f"{note} (unused comment)" for note in unused),
+            *(["measured: " + "; ".join(measured)] if measured else []),
+            *([f"dialect: {self.facts.dialect}"] if self.facts.dialect else []),
+            *(f"not followed: {note}" for note in self.script.not_followed),
+            *(f"not applied: {skip.rule}: {skip.why}" for skip in self.skipped),
+            ", ".join(counted) or "no findings",
+        ])  # fmt: skip
 
-    def as_json(self) -> str:
+    @property
+    def document(self) -> dict[str, Any]:
         """The same for programs."""
         findings, unused = self.judged
-        rows = [
-            {"rule": f.rule, "severity": f.graded, "file": f.file, "line": f.line,
-             "message": f.message, "remedy": rules()[f.rule].remedy, "values": dict(f.values)}
-            for f in findings
-        ]  # fmt: skip
-        document = {
+        return {
             "version": 1, "file": str(self.script.file), "dialect": self.facts.dialect,
-            "findings": rows, "unused": unused, "known": self.known,
-            "not_followed": self.script.not_followed,
+            "findings": [
+                {"rule": f.rule, "severity": f.graded, "file": f.file, "line": f.line,
+                 "message": f.message, "remedy": rules()[f.rule].remedy, "values": dict(f.values)}
+                for f in findings
+            ],
+            "unused": unused, "known": self.known, "not_followed": [*self.script.not_followed],
             "not_applied": [{"rule": skip.rule, "why": skip.why} for skip in self.skipped],
         }  # fmt: skip
-        return json.dumps(document, indent=2)

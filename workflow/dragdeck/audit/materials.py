@@ -1,5 +1,7 @@
 """The materials of a script: masses, and constants of contacts by type."""
 
+from collections import Counter
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -7,13 +9,14 @@ import numpy as np
 
 from dragdeck.arrays import Floats, Ints
 from dragdeck.dumps.frame import Frame
+from dragdeck.files import text_of
 from dragdeck.physics.contact_mechanics import (
     ContactConstants,
     effective_modulus,
     effective_shear,
     sphere_mass,
 )
-from dragdeck.script.facts import Facts, number
+from dragdeck.script.facts import Facts, as_number
 
 
 class _Elastic(NamedTuple):
@@ -25,23 +28,24 @@ class _Elastic(NamedTuple):
 def constants_of(facts: Facts) -> list[list[ContactConstants]] | None:
     """Constants of the contacts of each pair of types; None if the script does not say them."""
     moduli, ratios = facts.values("youngsModulus"), facts.values("poissonsRatio")
-    types = len(moduli)
-    laws = {law.normal for law in facts.laws}
-    if not types or len(ratios) != types or laws != {"hertz"}:
+    types, restitutions = range(len(moduli)), facts.matrix("coefficientRestitution")
+    frictions = [[0.0 for _ in types] for _ in types]
+    if facts.properties("coefficientFriction"):
+        frictions = facts.matrix("coefficientFriction")
+    sound = all(moduli) and all(-1 < ratio < 1 for ratio in ratios)
+    sound = sound and all(0 < value <= 1 for row in restitutions for value in row)
+    sizes = {len(ratios), len(restitutions), len(frictions)}
+    laws = {model.normal for model in facts.models}
+    if not moduli or not sound or sizes != {len(moduli)} or laws != {"hertz"}:
         return None
-    rows = []
-    for a in range(types):
-        row = []
-        for b in range(types):
-            restitution = facts.of_pair("coefficientRestitution", a + 1, b + 1)
-            friction = facts.of_pair("coefficientFriction", a + 1, b + 1) or 0.0
-            if not restitution:
-                return None
-            first, second = _Elastic(moduli[a], ratios[a]), _Elastic(moduli[b], ratios[b])
-            shears = effective_modulus(first, second), effective_shear(first, second)
-            row.append(ContactConstants(*shears, restitution, friction))
-        rows.append(row)
-    return rows
+    solids = [_Elastic(*constants) for constants in zip(moduli, ratios, strict=True)]
+
+    def constants(a: int, b: int) -> ContactConstants:
+        pair = solids[a], solids[b]
+        moduli_pa = effective_modulus(*pair), effective_shear(*pair)
+        return ContactConstants(*moduli_pa, restitutions[a][b], frictions[a][b])
+
+    return [[constants(a, b) for b in types] for a in types]
 
 
 def types_of(frame: Frame) -> Ints:
@@ -63,7 +67,7 @@ def masses_of(frame: Frame, facts: Facts) -> Floats | None:
     if "density" in frame.columns:
         density: Floats = frame.vectors("density")[:, 0]
     else:
-        known, kinds = facts_of_density(facts), types_of(frame)
+        known, kinds = _densities(facts), types_of(frame)
         if any(known.get(kind) is None for kind in np.unique(kinds).tolist()):
             return None
         density = np.array([known[kind] for kind in kinds.tolist()], dtype=np.float64)
@@ -71,25 +75,27 @@ def masses_of(frame: Frame, facts: Facts) -> Floats | None:
     return mass
 
 
-def facts_of_density(facts: Facts) -> dict[int, float]:
+@cache
+def _densities(facts: Facts) -> dict[int, float]:
     """Density of each type from 0 of which templates or data files say a single one, kg/m3."""
-    by_type: dict[int, set[float | None]] = {}
-    for fix in facts.styled("particletemplate/"):
-        words = fix.after("density", 2)
-        kind = number("".join(fix.after("atom_type"))) or 1
-        value = number(words[1]) if words[:1] == ["constant"] else None
-        by_type.setdefault(int(kind) - 1, set()).add(value)
+    rows = [(fix.word("atom_type") or "1", fix.after("density", 2))
+            for fix in facts.styled("particletemplate/")]  # fmt: skip
+    pairs = [(kind, words[1] if words[:1] == ["constant"] else "") for kind, words in
+             rows if len(words) == 2]  # fmt: skip
     for command in facts.named("read_data"):
-        file = Path(command.file).parent / command.words[1]
-        for kind, value in _densities(file):
-            by_type.setdefault(kind - 1, set()).add(value)
-    single = {kind: next(iter(values)) for kind, values in by_type.items() if len(values) == 1}
-    return {kind: value for kind, value in single.items() if value is not None}
+        pairs += _of_data_file(Path(command.file).parent / "".join(command.words[1:2]))
+    known = {(as_number(kind), as_number(density)) for kind, density in pairs}
+    types = Counter(kind for kind, _ in known)
+    return {
+        int(kind) - 1: density
+        for kind, density in known
+        if kind is not None and density is not None and types[kind] == 1
+    }
 
 
-def _densities(file: Path) -> set[tuple[int, float]]:
+def _of_data_file(file: Path) -> set[tuple[str, str]]:
     """Types and densities in the section Atoms of a data file of spheres."""
-    text = file.read_text(encoding="utf-8", errors="replace") if file.is_file() else ""
-    rows = text.partition("\nAtoms")[2].partition("\nVelocities")[0].splitlines()[1:]
+    text = text_of(file.read_bytes()) if file.is_file() else ""
+    rows = text.partition("\nAtoms")[2].partition("\nVelocities")[0].split("\n")[1:]
     words = [row.split()[:4] for row in rows if row.strip()[:1].isdigit()]
-    return {(int(row[1]), float(row[3])) for row in words if len(row) == 4}
+    return {(row[1], row[3]) for row in words if len(row) == 4}

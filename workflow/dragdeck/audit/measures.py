@@ -1,26 +1,24 @@
 """What the frames of dumps say of a run, together with its script."""
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dragdeck.arrays import Floats, Ints
 from dragdeck.audit.materials import constants_of, masses_of, radii_of, types_of
-from dragdeck.audit.walls import contacts_with, speeds, walls_of
+from dragdeck.audit.walls import WallAtStep, Walls, speeds
 from dragdeck.dumps.frame import Frame
-from dragdeck.physics.contact_mechanics import fall_speed, network_number
+from dragdeck.physics.contact_mechanics import network_number, touching
 from dragdeck.physics.coulomb import within_friction
+from dragdeck.physics.run_limits import run_limits, thrown_speed
 from dragdeck.script.facts import Facts
-from dragdeck.script.findings import Finding, NotApplied
+from dragdeck.script.findings import Finding, NotApplied, Results
 
 _MOST_OVERLAP = 0.1
-_REBOUND = 2.0
-"""Speed of a particle over that of the wall that hits it, at most."""
-
 _FRAMES = 20
 """Frames whose stability number is evaluated, as in the acceptance check of the time step."""
 
@@ -40,7 +38,11 @@ _ROUNDING = 0.01
 """Part of a tangential force that may be due to the digits of positions in a dump."""
 
 _DRIVES = ("move", "insert/", "cfd", "addforce", "adapt", "setforce", "freeze")
-Result = Iterator[Finding | NotApplied]
+_PLACE, _VELOCITY, _SPIN = ("x", "y", "z"), ("vx", "vy", "vz"), ("omegax", "omegay", "omegaz")
+_MEASURED = {"id", "type", *_PLACE, *_VELOCITY, *_SPIN, "fx", "fy", "fz", "radius", "diameter",
+             "density", "mass"}  # fmt: skip
+_LARGEST, _SMALLEST = 2.0**53, 1e-12
+"""Limits of the numbers in a dump, and of radii: what is beyond has diverged."""
 
 
 class Extreme(NamedTuple):
@@ -51,161 +53,225 @@ class Extreme(NamedTuple):
     step: int = 0
 
 
-NOTHING = Extreme()
-
-
 class Energy(NamedTuple):
-    """Of a frame: step, mean kinetic energy, and m g d or 0, per mass, J/kg."""
+    """Of a frame: mean kinetic energy, and m g d or 0, per mass, J/kg."""
 
-    step: int
     mean: float
     unit: float
 
 
-@dataclass
+class MeasuredFrame(NamedTuple):
+    """A frame with its particles, the walls at its step, and the contacts of all these."""
+
+    frame: Frame
+    centre: Floats
+    radius: Floats
+    walls: list[WallAtStep]
+    contacts: tuple[Ints, Floats, Floats]
+
+
 class Measures:
     """Measures of the frames so far.
 
     Attributes
     ----------
-    facts : Facts
-    source : str
-        Name of the dumps.
+    frames : int
     overlap : Extreme
         Largest overlap, over the smaller radius.
     speed : Extreme
         Largest speed, m/s.
     energies : list of Energy
-    ids, last_ids : set of int
-        Of particles in any frame, and in the last one.
+    n_contacts, n_beyond : int
+        Dumped contacts, and those above Coulomb's limit.
     """
 
-    facts: Facts
-    source: str
-    overlap: Extreme = NOTHING
-    speed: Extreme = NOTHING
-    energies: list[Energy] = field(default_factory=list)
-    ids: set[int] = field(default_factory=set)
-    last_ids: set[int] = field(default_factory=set)
-    bounds: Floats = field(default_factory=lambda: np.array([[np.inf] * 3, [-np.inf] * 3]))
-    first_speed: float = math.nan
-    not_finite: int = 0
-    last: Frame | None = None
-    frames: int = 0
-    kept: list[Frame] = field(default_factory=list)
-    every: int = 1
-
-    @cached_property
-    def walls(self) -> tuple[list, list[str]]:  # type: ignore[type-arg]
-        """Walls, and names of those that are not known."""
-        return walls_of(self.facts)
+    def __init__(self, facts: Facts, source: str) -> None:
+        self.facts, self.source, self.walls = facts, source, Walls(facts)
+        self.constants = constants_of(facts)
+        self.overlap, self.speed = Extreme(), Extreme()
+        self.energies: list[Energy] = []
+        self.first_speed = math.nan
+        self.ids: set[int] = set()
+        self.last_ids: set[int] = set()
+        self.through: dict[str, set[int]] = {}
+        self.below: dict[str, set[int]] = {}
+        self.bounds = np.array([[np.inf] * 3, [-np.inf] * 3])
+        self.frames = self.n_unsound = self.n_contacts = self.n_beyond = 0
+        self.force_sums = np.zeros(4)
+        self.last: MeasuredFrame | None = None
+        self.kept: list[MeasuredFrame] = []
+        self.every = 1
 
     @property
     def scope(self) -> str:
         """Which contacts the measures know."""
-        known, unknown = self.walls
-        if unknown:
-            return f"without {', '.join(unknown)}: a lower bound"
-        return "particles and walls" if known else "particles only: a lower bound"
+        if self.walls.unknown:
+            return f"without {', '.join(self.walls.unknown)}: a lower bound"
+        return "particles and walls" if self.walls.known else "particles only: a lower bound"
 
     def add(self, frame: Frame) -> None:
         """Measure a frame."""
-        names = [name for name in ("x", "y", "z", "radius", "diameter", "vx", "vy", "vz")
-                 if name in frame.columns]  # fmt: skip
-        finite = np.isfinite(frame.vectors(*names)).all(axis=1)
-        self.not_finite += int((~finite).sum())
-        frame = frame.take(np.flatnonzero(finite))
+        sound = _are_numbers(frame, _MEASURED & frame.columns.keys())
+        sound &= radii_of(frame) > _SMALLEST
+        frame = frame.take(np.flatnonzero(sound))
+        self.n_unsound += int((~sound).sum())
         self.frames += 1
-        self.last_ids = set(frame.columns["id"].astype(int).tolist())
+        before, self.last_ids, self.last = self.last_ids, set(frame.ids("id").tolist()), None
         self.ids |= self.last_ids
-        self.last = frame
         if not frame.rows:
             return
-        centre, radius = frame.vectors("x", "y", "z"), radii_of(frame)
+        centre, radius = frame.vectors(*_PLACE), radii_of(frame)
+        walls = self.walls.at(frame.step, float(radius.max()))
+        contacts = touching(centre, radius, *([wall] for wall in walls))
+        self.last = MeasuredFrame(frame, centre, radius, walls, contacts)
         self.bounds = np.stack([np.minimum(self.bounds[0], centre.min(axis=0)),
                                 np.maximum(self.bounds[1], centre.max(axis=0))])  # fmt: skip
-        self._add_overlap(frame, centre, radius)
-        if "vx" in frame.columns:
-            self._add_speed(frame, radius)
+        self._add_overlap(self.last)
+        self._add_sides(self.last, before)
+        if {*_VELOCITY} <= frame.columns.keys():
+            self._add_speed(self.last)
         if (self.frames - 1) % self.every == 0:
-            self.kept.append(frame)
+            self.kept.append(self.last)
             if len(self.kept) > 2 * _FRAMES:
                 self.kept, self.every = self.kept[::2], 2 * self.every
 
-    def _add_overlap(self, frame: Frame, centre: Floats, radius: Floats) -> None:
-        bodies, _, overlap = contacts_with(centre, radius, self.walls[0], frame.step)
-        if overlap.size:
-            others = np.append(radius, np.full(len(self.walls[0]), np.inf))
-            share = overlap / np.minimum(radius[bodies[0]], others[bodies[1]])
-            at = int(share.argmax())
-            if share[at] > self.overlap.value:
-                ids = [*frame.columns["id"].astype(int).tolist(), *["a wall"] * len(self.walls[0])]
-                first, second = ids[bodies[0, at]], ids[bodies[1, at]]
-                pair = f"particle {first} with {second}"
-                self.overlap = Extreme(float(share[at]), pair, frame.step)
+    def _add_overlap(self, scene: MeasuredFrame) -> None:
+        (first, second), _, overlap = scene.contacts
+        radii = np.append(scene.radius, np.full(len(scene.walls), np.inf))
+        fractions = overlap / np.minimum(radii[first], radii[second])
+        if len(fractions) and fractions.max() > self.overlap.value:
+            at = int(fractions.argmax())
+            ids = [*scene.frame.ids("id").tolist(), *(f"a wall, {w.name}" for w in scene.walls)]
+            pair = f"particle {ids[first[at]]} with {ids[second[at]]}"
+            self.overlap = Extreme(float(fractions[at]), pair, scene.frame.step)
 
-    def _add_speed(self, frame: Frame, radius: Floats) -> None:
-        speed = np.linalg.norm(frame.vectors("vx", "vy", "vz"), axis=1)
+    def _add_sides(self, scene: MeasuredFrame, before: set[int]) -> None:
+        """Particles that were on the other side of a plane or cylinder in the frame before."""
+        ids, below = scene.frame.ids("id"), {}
+        for wall in scene.walls if "p" not in "".join(self.facts.last("boundary")) else ():
+            below[wall.name] = set(ids[wall.distances(scene.centre)[0] < 0].tolist())
+            if wall.name in self.below:
+                crossed = (below[wall.name] ^ self.below[wall.name]) & before & self.last_ids
+                self.through.setdefault(wall.name, set()).update(crossed)
+        self.below = below
+
+    def _add_speed(self, scene: MeasuredFrame) -> None:
+        speed = np.linalg.norm(scene.frame.vectors(*_VELOCITY), axis=1)
         fastest = int(speed.argmax())
         if math.isnan(self.first_speed):
             self.first_speed = float(speed[fastest])
         if speed[fastest] > self.speed.value:
-            number = int(frame.columns["id"][fastest])
-            self.speed = Extreme(float(speed[fastest]), f"particle {number}", frame.step)
-        weight = radius**3 / (radius**3).sum()
-        energy = 0.5 * speed**2 + _of_spin(frame, radius)
-        gravity = np.linalg.norm(self.facts.gravity or [0.0])
-        unit = float((weight * gravity * 2 * radius).sum())
-        self.energies.append(Energy(frame.step, float((weight * energy).sum()), unit))
+            particle = f"particle {scene.frame.ids('id')[fastest]}"
+            self.speed = Extreme(float(speed[fastest]), particle, scene.frame.step)
+        weight = scene.radius**3 / (scene.radius**3).sum()
+        energy = 0.5 * speed**2 + _of_spin(scene)
+        gravity = math.hypot(*self.facts.gravity or ())
+        unit = float((weight * gravity * 2 * scene.radius).sum())
+        self.energies.append(Energy(float((weight * energy).sum()), unit))
 
-    def results(self) -> Result:
-        """What DK201 to DK206 say of the frames."""
-        clumped = bool(self.facts.styled("multisphere", "particletemplate/multisphere"))
+    def add_contacts(self, rows: Frame, ids: Sequence[str], forces: Sequence[str]) -> None:
+        """Add the dumped contacts between particles of the last frame."""
+        if self.last is None:
+            return
+        frame, centre, radius, *_ = self.last
+        rows = rows.take(np.flatnonzero(_are_numbers(rows, {*ids, *forces})))
+        order = np.argsort(frame.ids("id"))
+        known = frame.ids("id")[order]
+        pair = rows.vectors(*ids).astype(np.int64).T
+        at = np.searchsorted(known, pair).clip(max=len(known) - 1)
+        there = (known[at] == pair).all(axis=0)
+        pair, force = order[at[:, there]], rows.vectors(*forces)[there]
+        line = centre[pair[0]] - centre[pair[1]]
+        distance = np.linalg.norm(line, axis=1)
+        near = (distance < 1.5 * radius[pair].sum(axis=0)) & (distance > 0)
+        pair, force, normal = pair[:, near], force[near], line[near] / distance[near, None]
+        self.n_contacts += len(force)
+        kinds, cohesive = types_of(frame)[pair], any(m.has("cohesion") for m in self.facts.models)
+        if self.constants and not cohesive and self._has_types(kinds):
+            friction = np.array([[each.friction for each in row] for row in self.constants])
+            across = force - np.einsum("ij,ij->i", force, normal)[:, None] * normal
+            _, removed = within_friction(force, normal, friction[kinds[0], kinds[1]])
+            sizes = np.linalg.norm(across, axis=1)
+            self.n_beyond += int((removed > _ROUNDING * sizes).sum())
+            self.force_sums[:2] += removed.sum(), sizes.sum()
+        if {"fx", "fy", "fz"} <= frame.columns.keys() and not self.walls.unknown:
+            self._add_closure(self.last, pair, force)
+
+    def _add_closure(self, scene: MeasuredFrame, pair: Ints, force: Floats) -> None:
+        """Add forces of particles without a wall: errors of their sums, and magnitudes."""
+        mass, gravity = masses_of(scene.frame, self.facts), self.facts.gravity
+        if mass is None or gravity is None:
+            return
+        count, (first, second) = len(mass), scene.contacts[0]
+        totals, magnitudes = mass[:, None] * np.array(gravity), np.zeros(count)
+        np.add.at(totals, pair[0], force)
+        np.add.at(totals, pair[1], -force)
+        np.add.at(magnitudes, pair.ravel(), np.tile(np.linalg.norm(force, axis=1), 2))
+        inside = np.ones(count, dtype=bool)
+        inside[first[second >= count]] = False
+        errors = np.linalg.norm(totals - scene.frame.vectors("fx", "fy", "fz"), axis=1)
+        self.force_sums[2:] += errors[inside].sum(), magnitudes[inside].sum()
+
+    def results(self, left_out: str = "") -> Results:
+        """What DK201 to DK206 say of the frames.
+
+        Parameters
+        ----------
+        left_out : str
+            Why they need not contain all particles.
+        """
+        clumped = "particles are clumps, whose spheres overlap" if is_clumped(self.facts) else ""
         if clumped:
-            yield NotApplied("DK201", "particles are clumps, whose spheres overlap")
+            yield NotApplied("DK201", clumped)
         elif self.overlap.value > _MOST_OVERLAP:
             message = f"overlap of {100 * self.overlap.value:.1f} % of the radius: "
             message += f"{self.overlap.what}, step {self.overlap.step}"
             yield self._finding("DK201", message, overlap=self.overlap.value)
         yield from self._speeds()
-        yield from self._balance()
-        yield from [NotApplied("DK204", "particles are clumps")] if clumped else self._stability()
+        yield from self._balance(left_out)
+        if clumped or self.stability is None:
+            why = clumped or "density, hertz constants or time step are not known"
+            yield NotApplied("DK204", why)
+        elif self.stability > 1:
+            message = f"stability number {self.stability:.3g} ({self.scope}), limit 1"
+            yield self._finding("DK204", message, stability_number=self.stability)
         yield from self._spin()
         yield from self._rest()
 
     def _finding(self, rule: str, message: str, **values: float) -> Finding:
         return Finding(rule, message, self.source, values=values)
 
-    @cached_property
-    def speed_limit(self) -> float | None:
-        """Speed above every known cause, m/s; None if a cause is not known."""
-        gravity = self.facts.gravity
-        extent = self.bounds[1] - self.bounds[0]
-        box = self.facts.box
-        if box is not None:
-            extent = np.maximum(extent, [high - low for low, high in box])
+    def _speeds(self) -> Results:
+        gravity, box = self.facts.gravity, self.facts.box
         causes = [self.first_speed, *speeds(self.facts, self.bounds)]
         if gravity is None or any(map(math.isnan, causes)):
-            return None
-        size = float(np.linalg.norm(gravity))
-        height = float(np.abs(np.array(gravity) / size) @ extent) if size else 0.0
-        return (fall_speed(height, size) + _REBOUND * max(causes)) or None
-
-    def _speeds(self) -> Result:
-        limit = self.speed_limit
-        if limit is None:
             yield NotApplied("DK202", "velocities, or a cause of speed, are not known")
-        elif self.speed.value > limit:
+            return
+        extent = np.maximum(self.bounds[1] - self.bounds[0],
+                            [high - low for low, high in box.bounds] if box else 0.0)  # fmt: skip
+        size, speed = math.hypot(*gravity), max(causes)
+        height = float(np.abs(gravity) @ extent) / (size or 1.0)
+        limit = thrown_speed(size, height, speed)
+        energy = run_limits(len(self.ids), 1.0, size, height, speed).mean_kinetic_energy_j
+        mean = max(energy.mean for energy in self.energies)
+        if self.speed.value > limit > 0:
             message = f"{self.speed.what} at {self.speed.value:.3g} m/s, step {self.speed.step}; "
             message += f"every known cause gives at most {limit:.3g} m/s"
             yield self._finding("DK202", message, speed_m_s=self.speed.value, limit_m_s=limit)
+        elif mean > energy > 0:
+            message = f"a mean kinetic energy of {mean:.3g} J/kg; every known cause gives at most "
+            yield self._finding("DK202", f"{message}{energy:.3g} J/kg", energy_j_kg=mean)
 
-    def _balance(self) -> Result:
-        if self.not_finite:
-            message = f"{self.not_finite} rows have a position that is no number"
-            yield self._finding("DK203", message, rows=self.not_finite)
+    def _balance(self, left_out: str) -> Results:
         missing = self.ids - self.last_ids
-        if missing and (why := removal(self.facts)):
+        if self.n_unsound:
+            message = f"{self.n_unsound} rows have nan, inf or a number that no particle can have"
+            yield self._finding("DK203", message, rows=self.n_unsound)
+        for name, ids in self.through.items():
+            if ids:
+                message = f"{len(ids)} particles went through the wall {name}, such as {min(ids)}"
+                yield self._finding("DK203", message, through=len(ids))
+        if missing and (why := left_out or removal(self.facts)):
             yield NotApplied("DK203", why)
         elif missing:
             message = f"{len(missing)} of {len(self.ids)} particles are missing in the last frame"
@@ -214,77 +280,84 @@ class Measures:
     @cached_property
     def stability(self) -> float | None:
         """Median stability number of frames of the second half; None if constants are not known."""
-        constants, step_s = constants_of(self.facts), self.facts.timestep_s
-        frames = self.kept[len(self.kept) // 2 :]
-        masses = [masses_of(frame, self.facts) for frame in frames]
-        if constants is None or step_s is None or not masses:
+        step_s, scenes = self.facts.timestep_s, self.kept[len(self.kept) // 2 :]
+        masses = [masses_of(scene.frame, self.facts) for scene in scenes]
+        if self.constants is None or step_s is None or not masses:
             return None
         numbers = []
-        for frame, mass in zip(frames, masses, strict=True):
-            if mass is None:
+        for (frame, centre, radius, walls, contacts), mass in zip(scenes, masses, strict=True):
+            types = np.append(types_of(frame), [wall.type for wall in walls]).astype(np.int64)
+            if mass is None or not (mass > 0).all() or not self._has_types(types):
                 return None
-            centre, radius = frame.vectors("x", "y", "z"), radii_of(frame)
-            contacts = contacts_with(centre, radius, self.walls[0], frame.step)
-            classes = np.append(types_of(frame), [wall.type for wall in self.walls[0]]).astype(int)
             density = mass / (4 / 3 * math.pi * radius**3)
-            number = network_number(centre, radius, density, contacts, constants, step_s, classes)
+            number = network_number(
+                centre, radius, density, contacts, self.constants, step_s, types
+            )
             numbers.append(number)
         return float(np.median(numbers))
 
-    def _stability(self) -> Result:
-        number = self.stability
-        if number is None:
-            yield NotApplied("DK204", "density, hertz constants or time step are not known")
-        elif number > 1:
-            message = f"stability number {number:.3g} ({self.scope}), limit 1"
-            yield self._finding("DK204", message, stability_number=number)
+    def _has_types(self, types: Ints) -> bool:
+        """Whether the constants of all these types are known."""
+        return bool(((types >= 0) & (types < len(self.constants or ()))).all())
 
-    @property
-    def rests(self) -> bool:
-        """Whether the bed is at rest in the last frame."""
-        last = self.energies[-1]
-        return last.mean <= _AT_REST * (last.unit or max(energy.mean for energy in self.energies))
-
-    def _spin(self) -> Result:
-        if not self.energies or self.last is None or "omegax" not in self.last.columns:
+    def _spin(self) -> Results:
+        gravity = math.hypot(*self.facts.gravity or ())
+        if not self.energies or self.last is None or not {*_SPIN} <= self.last.frame.columns.keys():
             yield NotApplied("DK205", "no velocities and spins in the last frame")
             return
-        gravity = float(np.linalg.norm(self.facts.gravity or [0.0]))
         if not gravity:
             yield NotApplied("DK205", "no gravity, with which the energy of a spin is compared")
             return
-        radius = radii_of(self.last)
-        moving = 0.5 * (self.last.vectors("vx", "vy", "vz") ** 2).sum(axis=1)
-        unit = 2 * gravity * radius
-        spins = (_of_spin(self.last, radius) > _SPINS * unit) & (moving < _AT_REST * unit)
-        slow = np.median(moving) <= _AT_REST * np.median(unit)
-        if slow and spins.any():
-            rate = np.linalg.norm(self.last.vectors("omegax", "omegay", "omegaz"), axis=1)
-            at = int(np.where(spins, rate, 0).argmax())
-            message = f"particle {int(self.last.columns['id'][at])} spins at {rate[at]:.3g} rad/s "
-            message += f"at rest; {int(spins.sum())} such particles"
-            yield self._finding(
-                "DK205", message, spin_rad_s=float(rate[at]), count=int(spins.sum())
-            )
+        moving = 0.5 * (self.last.frame.vectors(*_VELOCITY) ** 2).sum(axis=1)
+        unit = 2 * gravity * self.last.radius
+        spins = (_of_spin(self.last) > _SPINS * unit) & (moving < _AT_REST * unit)
+        if spins.any() and np.median(moving) <= _AT_REST * np.median(unit):
+            rate = np.where(spins, np.linalg.norm(self.last.frame.vectors(*_SPIN), axis=1), 0)
+            at, count = int(rate.argmax()), int(spins.sum())
+            message = f"particle {self.last.frame.ids('id')[at]} spins at {rate[at]:.3g} rad/s "
+            message += f"at rest; {count} such particles"
+            yield self._finding("DK205", message, spin_rad_s=float(rate[at]), count=count)
 
-    def _rest(self) -> Result:
-        if not self.energies or self.rests:
+    def _rest(self) -> Results:
+        means = [energy.mean for energy in self.energies]
+        if not means or means[-1] <= _AT_REST * (self.energies[-1].unit or max(means)):
             return
-        last, third = self.energies[-1], len(self.energies) // 3
-        driven = is_driven(self.facts)
-        if not driven:
-            unit = f"{last.mean / last.unit:.2g} m g d" if last.unit else f"{last.mean:.2g} J/kg"
-            message = f"the mean kinetic energy of a particle is {unit} in the last frame"
+        last, third = self.energies[-1], len(means) // 3
+        if not is_driven(self.facts):
+            energy = f"{last.mean / last.unit:.2g} m g d" if last.unit else f"{last.mean:.2g} J/kg"
+            message = f"the mean kinetic energy of a particle is {energy} in the last frame"
             yield self._finding("DK206", message, energy_j_kg=last.mean)
         elif third < 2:
             yield NotApplied("DK206", "too few frames of a driven bed")
         else:
-            means = [float(np.mean([e.mean for e in part])) for part in
-                     (self.energies[-2 * third : -third], self.energies[-third:])]  # fmt: skip
-            ratio = means[1] / means[0] if means[0] else math.inf
+            before = math.fsum(means[-2 * third : -third])
+            ratio = math.fsum(means[-third:]) / before if before else math.inf
             if not 1 / _DRIFT <= ratio <= _DRIFT:
                 message = f"the mean kinetic energy changes by a factor of {ratio:.2g}"
                 yield self._finding("DK206", f"{message} in the last two thirds", ratio=ratio)
+
+    def contact_results(self, source: str) -> Results:
+        """What DK207 says of the dumped contacts."""
+        removed, tangential, errors, forces = self.force_sums.tolist()
+        above = removed / tangential if tangential else 0.0
+        error = errors / forces if forces else 0.0
+        if above > _CUT:
+            message = f"{100 * above:.1f} % of the tangential forces are above Coulomb's limit, in "
+            message += f"{self.n_beyond} of {self.n_contacts} contacts"
+            yield Finding("DK207", message, source, values={"above": above})
+        if error > _CUT:
+            message = f"the contact forces on a particle miss its force by {100 * error:.1f} %"
+            yield Finding("DK207", message, source, values={"error": error})
+
+
+def _are_numbers(rows: Frame, names: set[str]) -> NDArray[np.bool_]:
+    """Whether these columns of (N,) rows are numbers that have not diverged."""
+    return np.asarray((np.abs(rows.vectors(*names)) < _LARGEST).all(axis=1))
+
+
+def is_clumped(facts: Facts) -> bool:
+    """Whether particles are clumps of spheres."""
+    return bool(facts.styled("multisphere", "particletemplate/multisphere"))
 
 
 def removal(facts: Facts) -> str:
@@ -301,109 +374,15 @@ def is_driven(facts: Facts) -> bool:
     last = places[-1] if places else math.inf
     for fix in facts.fixes:
         turns = {"surface_vel", "surface_ang_vel", "shear"} & set(fix.words)
-        once = "once" in fix.after("insert_every")
+        once = fix.word("insert_every") == "once"
         if fix.begin < last <= fix.end and not once and (fix.words[0].startswith(_DRIVES) or turns):
             return True
     return False
 
 
-def _of_spin(frame: Frame, radius: Floats) -> Floats:
+def _of_spin(scene: MeasuredFrame) -> Floats:
     """Energy of rotation over mass, (N,), J/kg; 0 without spins."""
-    if "omegax" not in frame.columns:
-        return np.zeros(frame.rows)
-    spin: Floats = frame.vectors("omegax", "omegay", "omegaz")
-    energy: Floats = 0.2 * radius**2 * (spin**2).sum(axis=1)
-    return energy
-
-
-@dataclass
-class ContactSums:
-    """Coulomb's limit and force closure of the frames so far.
-
-    Attributes
-    ----------
-    contacts, beyond : int
-        Contacts, and those above Coulomb's limit.
-    tangential_n, removed_n : float
-        Sum of tangential forces, and what is above the limit.
-    force_n, error_n : float
-        Sums over particles without a wall of the forces of contacts, and of the difference from the
-        force in the dump.
-    """
-
-    contacts: int = 0
-    beyond: int = 0
-    tangential_n: float = 0.0
-    removed_n: float = 0.0
-    force_n: float = 0.0
-    error_n: float = 0.0
-
-    def add(
-        self, frame: Frame, ids: Sequence[str], forces: Sequence[str], run: Measures, at: Frame
-    ) -> None:
-        """Add the contacts of a frame between particles of the frame `at`."""
-        frame_ids = at.columns["id"].astype(np.int64)
-        order = np.argsort(frame_ids)
-        pair = frame.vectors(*ids).astype(np.int64).T
-        rows = order[np.searchsorted(frame_ids, pair, sorter=order).clip(max=len(order) - 1)]
-        there = (frame_ids[rows] == pair).all(axis=0)
-        rows, force = rows[:, there], frame.vectors(*forces)[there]
-        centre, radius = at.vectors("x", "y", "z"), radii_of(at)
-        line = centre[rows[0]] - centre[rows[1]]
-        distance = np.linalg.norm(line, axis=1)
-        near = distance < 1.5 * radius[rows].sum(axis=0)
-        rows, force, normal = rows[:, near], force[near], line[near] / distance[near, None]
-        constants = constants_of(run.facts)
-        kinds = types_of(at)[rows]
-        friction = np.array([[pair.friction for pair in row] for row in constants or [[]]])
-        self.contacts += len(force)
-        if constants and not any(law.has("cohesion") for law in run.facts.laws):
-            along = np.einsum("ij,ij->i", force, normal)
-            sizes = np.linalg.norm(force - along[:, None] * normal, axis=1)
-            _, removed = within_friction(force, normal, friction[kinds[0], kinds[1]])
-            self.beyond += int((removed > _ROUNDING * sizes).sum())
-            self.tangential_n += float(sizes.sum())
-            self.removed_n += float(removed.sum())
-        mass, gravity = masses_of(at, run.facts), run.facts.gravity
-        weight = None if mass is None or gravity is None else mass[:, None] * np.array(gravity)
-        if weight is not None and "fx" in at.columns and not run.walls[1]:
-            self._add_closure(rows, force, weight, run, at)
-
-    def _add_closure(
-        self, rows: Ints, force: Floats, weight: Floats, run: Measures, at: Frame
-    ) -> None:
-        total = np.zeros((at.rows, 3))
-        np.add.at(total, rows[0], force)
-        np.add.at(total, rows[1], -force)
-        bodies, _, _ = contacts_with(at.vectors("x", "y", "z"), radii_of(at), run.walls[0], at.step)
-        inside = np.ones(at.rows, dtype=bool)
-        inside[bodies[0, bodies[1] >= at.rows]] = False
-        error = total + weight - at.vectors("fx", "fy", "fz")
-        self.error_n += float(np.linalg.norm(error[inside], axis=1).sum())
-        magnitude = np.zeros(at.rows)
-        np.add.at(magnitude, rows.ravel(), np.tile(np.linalg.norm(force, axis=1), 2))
-        self.force_n += float(magnitude[inside].sum())
-
-    def results(self, source: str) -> Result:
-        """What DK207 says."""
-        cut = self.removed_n / self.tangential_n if self.tangential_n else 0.0
-        error = self.error_n / self.force_n if self.force_n else 0.0
-        if cut > _CUT:
-            message = f"{100 * cut:.1f} % of the tangential forces are above Coulomb's limit, in "
-            message += f"{self.beyond} of {self.contacts} contacts"
-            yield Finding("DK207", message, source, values={"above": cut})
-        if error > _CUT:
-            message = f"the contact forces on a particle miss its force by {100 * error:.1f} %"
-            yield Finding("DK207", message, source, values={"error": error})
-
-
-def matched(
-    particles: Iterable[Frame], contacts: Iterable[Frame]
-) -> Iterator[tuple[Frame, Frame | None]]:
-    """Frames of particles, each with the contacts of its step, if there are any."""
-    rest = iter(contacts)
-    waiting = next(rest, None)
-    for frame in particles:
-        while waiting is not None and waiting.step < frame.step:
-            waiting = next(rest, None)
-        yield frame, waiting if waiting is not None and waiting.step == frame.step else None
+    if not {*_SPIN} <= scene.frame.columns.keys():
+        return np.zeros(scene.frame.rows)
+    spin = scene.frame.vectors(*_SPIN)
+    return np.asarray(0.2 * scene.radius**2 * (spin**2).sum(axis=1))

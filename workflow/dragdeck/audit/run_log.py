@@ -1,12 +1,13 @@
-"""What the log of a run tells: warnings, and how many particles there should be."""
+"""What the log of a run tells: errors, warnings, and how many particles there should be."""
 
 import re
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
-from dragdeck.engine.log import engine_errors
-from dragdeck.script.findings import Finding, NotApplied
+from dragdeck.audit.measures import is_clumped, removal
+from dragdeck.engine.log import engine_errors, never_settled
+from dragdeck.files import text_of
+from dragdeck.script.facts import Facts, as_numbers
+from dragdeck.script.findings import Finding, NotApplied, Results
 
 _INSERTED = re.compile(r"INFO: Particle insertion \S+: inserted (\d+) particle templates")
 _WARNINGS = {
@@ -15,70 +16,76 @@ _WARNINGS = {
 }
 
 
-@dataclass(frozen=True)
-class Balance:
-    """Particles that were there or inserted, that were counted as they left, and at the end."""
-
-    expected: int
-    counted: int
-    last: int
+_NO_NUMBERS = {"nan", "-nan", "inf", "-inf"}
 
 
-def log_findings(
-    file: Path, text: str, balance: Balance | None, outlets: Sequence[str], unknown: str
-) -> Iterator[Finding | NotApplied]:
-    """What DK203 and DK208 say of a log.
+class RunLog:
+    """The log of a run, or what LIGGGHTS printed on the screen.
 
-    Parameters
+    Attributes
     ----------
-    file : Path
-    text : str
-        Its content.
-    balance : Balance or None
-        Of `balance_of`.
-    outlets : sequence of str
-        Ids of ``massflow/mesh``, which counts particles.
-    unknown : str
-        Why the balance cannot be told; empty if it can.
+    expected, counted : int
+        Particles that were there or inserted, and that outlets counted.
+    last : int or None
+        Particles at the end; None if no thermo table counts them.
     """
-    for error in engine_errors(text):
-        yield Finding("DK208", f"LIGGGHTS ended with {error}", str(file), severity="error")
-    for part, meaning in _WARNINGS.items():
-        lines = [line.strip() for line in text.splitlines() if part in line]
-        if lines:
-            message = f"{meaning}, {len(lines)} times: {lines[0][:120]}"
-            yield Finding("DK208", message, str(file), values={"lines": len(lines)})
-    builds = sum(map(int, re.findall(r"^Dangerous builds = (\d+)", text, re.MULTILINE)))
-    if builds:
-        message = f"{builds} neighbour lists were rebuilt too late (dangerous builds)"
-        yield Finding("DK208", message, str(file), values={"builds": builds})
-    if unknown or balance is None:
-        yield NotApplied("DK203", unknown or f"no thermo column Atoms in {file.name}")
-    elif (missing := balance.expected - balance.counted - balance.last) > 0:
-        counted = f", {balance.counted} counted at outlets" if outlets else ""
-        message = f"{missing} particles are missing: {balance.expected} were there or inserted"
-        message += f"{counted}, {balance.last} at the end"
-        yield Finding("DK203", message, str(file), values={"missing": missing})
 
+    def __init__(self, file: Path, facts: Facts) -> None:
+        meters = [fix.id for fix in facts.styled("massflow/mesh") if "delete_atom" in fix.words]
+        self.file, self.facts, self.text = file, facts, text_of(file.read_bytes())
+        self.outlets = [f"{meter}[2]" for meter in meters]
+        self.expected = self.counted = inserted = 0
+        self.last: int | None = None
+        self.not_finite, self.table = "", list[str]()
+        for line in self.text.split("\n"):
+            words = line.split()
+            row = dict(zip(self.table, words, strict=False)) if words[:1] != ["Step"] else {}
+            if words[:1] == ["Step"] or line.startswith("Loop time of"):
+                self.table = words if words[0] == "Step" else []
+            elif match := _INSERTED.search(line):
+                inserted += int(match[1])
+            elif len(words) == len(self.table) and _NO_NUMBERS & set(words):
+                self.not_finite = self.not_finite or line.strip()
+            elif len(words) == len(self.table) and row.get("Atoms", "").isdecimal():
+                last = int(row["Atoms"])
+                self.expected += last if self.last is None else inserted
+                counts = as_numbers([row[name] for name in self.outlets if name in row])
+                self.last, inserted, self.counted = last, 0, round(sum(counts or ()))
 
-def balance_of(text: str, outlets: Sequence[str] = ()) -> Balance | None:
-    """Particles of a run by its log; None if its thermo table does not count them."""
-    header: list[str] = []
-    expected, before, last, counted = None, 0, None, 0
-    for line in text.splitlines():
-        words = line.split()
-        if match := _INSERTED.search(line):
-            before += int(match[1])
-        elif words[:1] == ["Step"]:
-            header = words
-        elif words and len(words) == len(header) and words[0].isdigit():
-            row = dict(zip(header, words, strict=True))
-            if not row.get("Atoms", "").isdigit():
-                continue
-            last = int(row["Atoms"])
-            if expected is None:
-                expected, before = last, 0
-            expected, before = expected + before, 0
-            counts = [row[name] for name in (f"{outlet}[2]" for outlet in outlets) if name in row]
-            counted = round(sum(map(float, counts)))
-    return None if expected is None or last is None else Balance(expected, counted, last)
+    def results(self) -> Results:
+        """What DK203, DK206 and DK208 say of it."""
+        errors = [f"LIGGGHTS ended with {error}" for error in engine_errors(self.text)]
+        if self.not_finite:
+            errors.append(f"the thermo table contains a number that is none: {self.not_finite}")
+        if self.table and not errors:
+            errors.append("the log ends within a run")
+        for message in errors:
+            yield Finding("DK208", message, str(self.file), severity="error")
+        for part, meaning in _WARNINGS.items():
+            lines = [line.strip() for line in self.text.split("\n") if part in line]
+            if lines:
+                message = f"{meaning}, {len(lines)} times: {lines[0][:120]}"
+                yield self._finding("DK208", message, lines=len(lines))
+        builds = sum(map(int, re.findall(r"^Dangerous builds = (\d+)", self.text, re.MULTILINE)))
+        if builds:
+            message = f"{builds} neighbour lists were rebuilt too late (dangerous builds)"
+            yield self._finding("DK208", message, builds=builds)
+        if never_settled(self.text):
+            yield self._finding("DK206", "the bed did not come to rest in time")
+        yield from self._balance()
+
+    def _finding(self, rule: str, message: str, **values: float) -> Finding:
+        return Finding(rule, message, str(self.file), values=values)
+
+    def _balance(self) -> Results:
+        unknown = "" if self.counted else removal(self.facts)
+        if is_clumped(self.facts):
+            unknown = "particles are clumps"
+        if unknown or self.last is None:
+            why = unknown or f"no thermo column Atoms in {self.file.name}"
+            yield NotApplied("DK203", why)
+        elif (missing := self.expected - self.counted - self.last) > 0:
+            counted = f", {self.counted} counted at outlets" if self.outlets else ""
+            message = f"{missing} particles are missing: {self.expected} were there or inserted"
+            message += f"{counted}, {self.last} at the end"
+            yield self._finding("DK203", message, missing=missing)

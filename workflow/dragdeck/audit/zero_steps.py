@@ -27,6 +27,9 @@ _FILE_BLOCKS = 100_000
 def engine_findings(script: Script) -> Iterator[Finding | NotApplied]:
     """DK300: the error of LIGGGHTS in the first run of a script, with its line."""
     commands = list(_reduced(script))
+    if unknown := next((command for command in commands if command.uncertain), None):
+        yield NotApplied("DK300", f"whether LIGGGHTS executes {unknown.text.strip()} is not known")
+        return
     text = "\n".join(command.text for command in commands) + "\n"
     outside = next(leaving_folder(text, ""), None)
     if outside:

@@ -97,7 +97,7 @@ def _check(
         passed=passed,
         seen=seen,
         limit=limit,
-        number=number,
+        number=number if number is not None and math.isfinite(number) else None,
     )
 
 
@@ -224,8 +224,7 @@ def _thrown(
         f"{limit_m_s:.3g} m/s, a fall through the simulation box plus {SPEED_FACTOR:g} times the "
         "largest speed of the scene"
     )
-    known = fastest if fastest is not None and math.isfinite(fastest) else None
-    return _check("none_thrown", "no particle thrown", passed, seen, limit, number=known)
+    return _check("none_thrown", "no particle thrown", passed, seen, limit, number=fastest)
 
 
 def _complete(
@@ -264,11 +263,8 @@ def _stable_timestep(
         stable = f"{number**-2:.2g} times the time step is stable"
         limit = f"1; exceeded on purpose: {reason}" if reason else f"1; {stable}"
     seen = f"stability number {number:.3g} of the contacts, median of {len(numbers)} frames"
-    passed, known = number <= 1 or bool(reason), numbers and math.isfinite(number)
-    return _check(
-        "stable_timestep", "stable time step", passed, seen, limit,
-        number=number if known else None,
-    )  # fmt: skip
+    passed, median = number <= 1 or bool(reason), number if numbers else None
+    return _check("stable_timestep", "stable time step", passed, seen, limit, number=median)
 
 
 def _stability_number(case: CaseOfBed, rows: Floats) -> float:

@@ -59,7 +59,7 @@ class Surroundings:
     depth_m: float = np.inf
 
 
-class Finding(NamedTuple):
+class MeshDefect(NamedTuple):
     """One thing that is wrong, or doubtful, with a mesh.
 
     Parameters
@@ -84,7 +84,7 @@ def check(
     field: str | None = None,
     workpiece: bool = True,
     surroundings: Surroundings | None = None,
-) -> list[Finding]:
+) -> list[MeshDefect]:
     """Refuse a mesh that the engine would refuse or that makes no sense.
 
     Parameters
@@ -98,7 +98,7 @@ def check(
 
     Returns
     -------
-    list of Finding
+    list of MeshDefect
         The warnings.
 
     Raises
@@ -119,7 +119,7 @@ def check(
 
 def findings(
     mesh: Trimesh, *, workpiece: bool = True, surroundings: Surroundings | None = None
-) -> list[Finding]:
+) -> list[MeshDefect]:
     """List what is wrong with a mesh, the root causes first.
 
     Parameters
@@ -147,7 +147,7 @@ def findings(
 
 def _facets(
     bad: NDArray[np.bool_], problem: str, limit: str, remedy: str, measured: str = ""
-) -> list[Finding]:
+) -> list[MeshDefect]:
     """Return an error that names the bad facets, or nothing if there is none."""
     if not bad.any():
         return []
@@ -155,23 +155,23 @@ def _facets(
     shown = ", ".join(str(number) for number in numbers[:5])
     more = ", ..." if len(numbers) > 5 else ""
     value = f"{measured}{len(numbers)} of {len(bad)} facets (counted from 0: {shown}{more})"
-    return [Finding(problem, value, limit, remedy)]
+    return [MeshDefect(problem, value, limit, remedy)]
 
 
-def _empty(mesh: Trimesh) -> list[Finding]:
+def _empty(mesh: Trimesh) -> list[MeshDefect]:
     if len(mesh.faces):
         return []
     remedy = "export the surface as triangles; the file may have been cut short"
-    return [Finding("the mesh is empty", "0 facets", "at least one facet", remedy)]
+    return [MeshDefect("the mesh is empty", "0 facets", "at least one facet", remedy)]
 
 
-def _no_lengths(mesh: Trimesh) -> list[Finding]:
+def _no_lengths(mesh: Trimesh) -> list[MeshDefect]:
     bad = np.asarray(~are_lengths(mesh.triangles).all(axis=(1, 2)))
     problem, limit = "a coordinate is not a length", "finite numbers, at most 1e100 m"
     return _facets(bad, problem, limit, remedy="export the mesh again")
 
 
-def _implausible_size(mesh: Trimesh, scene: Surroundings) -> list[Finding]:
+def _implausible_size(mesh: Trimesh, scene: Surroundings) -> list[MeshDefect]:
     if _plausible(mesh, 1.0, scene):
         return []
     problem = "the size of the workpiece is not plausible in this bowl"
@@ -180,7 +180,7 @@ def _implausible_size(mesh: Trimesh, scene: Surroundings) -> list[Finding]:
         f"narrower than the bowl (diameter {2 * scene.bowl_radius_m:g} m), no longer than ten "
         f"bowls, no smaller than a particle's radius ({scene.particle_radius_m:g} m)"
     )
-    return [Finding(problem, value, limit, _unit_remedy(mesh, scene))]
+    return [MeshDefect(problem, value, limit, _unit_remedy(mesh, scene))]
 
 
 def _plausible(mesh: Trimesh, factor: float, scene: Surroundings) -> bool:
@@ -199,19 +199,19 @@ def _unit_remedy(mesh: Trimesh, scene: Surroundings) -> str:
     return "check the unit of the file and the axis of the part, or use a workpiece of another size"
 
 
-def _degenerate(mesh: Trimesh) -> list[Finding]:
+def _degenerate(mesh: Trimesh) -> list[MeshDefect]:
     bad = ~mesh.nondegenerate_faces(height=NODE_PRECISION_M)
     limit = f"a height above the precision of LIGGGHTS, {NODE_PRECISION_M:g} m"
     remedy = "remove degenerate facets in a mesh workpiece and export again, or state facet_size_m"
     return _facets(bad, "a facet has no area", limit, remedy)
 
 
-def _duplicates(mesh: Trimesh) -> list[Finding]:
+def _duplicates(mesh: Trimesh) -> list[MeshDefect]:
     remedy = "remove duplicate facets in a mesh workpiece and export again"
     return _facets(~mesh.unique_faces(), "a facet is duplicated", "every facet once", remedy)
 
 
-def _sharp_angles(mesh: Trimesh, sound: NDArray[np.bool_]) -> list[Finding]:
+def _sharp_angles(mesh: Trimesh, sound: NDArray[np.bool_]) -> list[MeshDefect]:
     smallest = np.where(sound, np.degrees(mesh.face_angles.min(axis=1)), np.inf)
     x, y, z = 1e3 * mesh.triangles_center[smallest.argmin()]
     at = f"at ({x:.4g}, {y:.4g}, {z:.4g}) mm, clamp upwards"
@@ -228,7 +228,7 @@ def _sharp_angles(mesh: Trimesh, sound: NDArray[np.bool_]) -> list[Finding]:
     return errors or [doubt._replace(severity="warning") for doubt in doubts]
 
 
-def _overlaps(mesh: Trimesh, sound: NDArray[np.bool_]) -> list[Finding]:
+def _overlaps(mesh: Trimesh, sound: NDArray[np.bool_]) -> list[MeshDefect]:
     """Find facets of one plane on the same side of the edge that they share."""
     nodes = np.asarray(mesh.vertices)
     start, end = (nodes[row] for row in mesh.face_adjacency_edges.T)
@@ -260,7 +260,7 @@ def _edge_use(mesh: Trimesh) -> Integers:
     return np.bincount(mesh.edges_unique_inverse)
 
 
-def _crowded_edges(mesh: Trimesh) -> list[Finding]:
+def _crowded_edges(mesh: Trimesh) -> list[MeshDefect]:
     neighbours = (_edge_use(mesh)[mesh.faces_unique_edges] - 1).sum(axis=1)
     measured, limit = f"{neighbours.max()} neighbours; ", f"at most {_MAX_NEIGHBOURS} neighbours"
     problem = "too many facets meet at the edges of one"
@@ -268,17 +268,17 @@ def _crowded_edges(mesh: Trimesh) -> list[Finding]:
     return _facets(neighbours > _MAX_NEIGHBOURS, problem, limit, remedy, measured)
 
 
-def _open_edges(mesh: Trimesh) -> list[Finding]:
+def _open_edges(mesh: Trimesh) -> list[MeshDefect]:
     if mesh.is_watertight:
         return []
     use = _edge_use(mesh)
     value = f"{np.count_nonzero(use != 2)} of {len(use)} edges do not join exactly two facets"
     limit = "a workpiece is a body: exactly two facets at every edge"
     remedy = "close the holes and remove inner walls in a mesh workpiece, then export again"
-    return [Finding("the mesh is not closed", value, limit, remedy)]
+    return [MeshDefect("the mesh is not closed", value, limit, remedy)]
 
 
-def _several_bodies(mesh: Trimesh) -> list[Finding]:
+def _several_bodies(mesh: Trimesh) -> list[MeshDefect]:
     from trimesh.graph import connected_component_labels
 
     body = connected_component_labels(mesh.face_adjacency, node_count=len(mesh.faces))
@@ -288,37 +288,37 @@ def _several_bodies(mesh: Trimesh) -> list[Finding]:
     value = f"{len(facets)} bodies; the largest has {facets.max()} of {len(mesh.faces)} facets"
     remedy = "unite them in CAD, or remove all others, and inner walls, then export again"
     limit = "one body: the surface leads from every facet to every other"
-    return [Finding("the mesh contains several bodies", value, limit, remedy)]
+    return [MeshDefect("the mesh contains several bodies", value, limit, remedy)]
 
 
-def _turned_normals(mesh: Trimesh) -> list[Finding]:
+def _turned_normals(mesh: Trimesh) -> list[MeshDefect]:
     turned, limit = facing_out(mesh), "corners counter-clockwise, seen from outside"
     if turned is mesh:
         return []
     if turned is None:
         remedy = "repair the mesh: a body has an inside and an outside"
         return [
-            Finding(
+            MeshDefect(
                 "the surface has one side only", "inside and outside are undefined", limit, remedy
             )
         ]
     problem = "the normals do not all point out of the body"
     value = "all point inwards" if mesh.is_winding_consistent else "mixed directions"
     remedy = "they are turned outwards for the run; turn them in the file too"
-    return [Finding(problem, value, limit, remedy, "warning")]
+    return [MeshDefect(problem, value, limit, remedy, "warning")]
 
 
-def _merged_nodes(mesh: Trimesh) -> list[Finding]:
+def _merged_nodes(mesh: Trimesh) -> list[MeshDefect]:
     merged = mesh.metadata.get(MERGED, 0)
     if not merged:
         return []
     value = f"{merged} merged, {len(mesh.vertices)} remain"
     limit = f"one node within the precision of LIGGGHTS, {NODE_PRECISION_M:g} m"
     remedy = "they are merged for the run; merge them in the file too"
-    return [Finding("nodes are duplicated", value, limit, remedy, "warning")]
+    return [MeshDefect("nodes are duplicated", value, limit, remedy, "warning")]
 
 
-def _lost_volume(mesh: Trimesh) -> list[Finding]:
+def _lost_volume(mesh: Trimesh) -> list[MeshDefect]:
     part = mesh.metadata.get(CAD_VOLUME, 0.0)
     lost = 1.0 - abs(mesh.volume) / part if part else 0.0
     if abs(lost) <= _LOST_VOLUME:
@@ -326,4 +326,4 @@ def _lost_volume(mesh: Trimesh) -> list[Finding]:
     value = f"{100 * lost:.3g} % of the part's volume is lost"
     remedy = "use a smaller facet_size_m"
     limit = f"at most {100 * _LOST_VOLUME:g} %"
-    return [Finding("the facets are coarse for this part", value, limit, remedy, "warning")]
+    return [MeshDefect("the facets are coarse for this part", value, limit, remedy, "warning")]

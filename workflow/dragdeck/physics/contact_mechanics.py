@@ -296,7 +296,7 @@ def stability_number(
     ----------
     Otsubo, O'Sullivan and Shire (2017), Computers and Geotechnics 86, 67-79.
     """
-    contacts = touching(centre_m, radius_m, bowl)
+    contacts = touching(centre_m, radius_m, bowl.walls)
     number = np.zeros(len(radius_m), dtype=np.int64) if classes is None else classes
     number = np.append(number, len(constants))  # the bowl comes after the classes
     return network_number(
@@ -428,34 +428,37 @@ def largest_eigenvalue(
     return float(eigsh(operator, k=1, v0=start, tol=tolerance, return_eigenvectors=False)[0])
 
 
-def touching_pairs(centre: Floats, radius: Floats) -> tuple[Ints, Floats, Floats]:
-    """Contacts of particles with each other, as in `touching`."""
+class ContactSurface(Protocol):
+    """A part of the surface of a body."""
+
+    def contacts(self, centre_m: Floats) -> tuple[Floats, Floats]:
+        """Distances, (N,), and normals towards (N, 3) points, (N, 3)."""
+
+
+def touching(
+    centre: Floats, radius: Floats, *bodies: Sequence[ContactSurface]
+) -> tuple[Ints, Floats, Floats]:
+    """Contacts of particles with each other and with other bodies, such as a bowl.
+
+    Returns
+    -------
+    (2, M), (M, 3) and (M,) ndarray
+        Bodies a and b, where N is the first other one; unit vector from a to b; overlap, m.
+    """
     from scipy.spatial import KDTree
 
     first, second = KDTree(centre).query_pairs(2 * radius.max(), output_type="ndarray").T
     away = centre[second] - centre[first]
     distance = np.linalg.norm(away, axis=1)
-    overlap = radius[first] + radius[second] - distance
-    hit = (overlap > 0) & (distance > 0)
-    return np.stack([first, second])[:, hit], away[hit] / distance[hit, None], overlap[hit]
-
-
-def touching(centre: Floats, radius: Floats, bowl: Container) -> tuple[Ints, Floats, Floats]:
-    """Contacts of particles with each other and with the walls of the bowl.
-
-    Returns
-    -------
-    (2, M), (M, 3) and (M,) ndarray
-        Bodies a and b, where N is the bowl; unit vector from a to b; overlap, m.
-    """
-    pairs, between, depth = touching_pairs(centre, radius)
-    everyone = np.arange(count := len(radius))
-    bodies, normals, overlaps = [pairs], [between], [depth]
-    for wall in bowl.walls:
-        gap, normal = wall.contacts(centre)
-        bodies.append(np.stack([everyone, np.full(count, count)]))
-        normals.append(-normal)
-        overlaps.append(radius - gap)
-    overlap = np.concatenate(overlaps)
-    hit = overlap > 0
-    return np.hstack(bodies)[:, hit], np.concatenate(normals)[hit], overlap[hit]
+    hit = (distance < radius[first] + radius[second]) & (distance > 0)
+    pairs = [np.stack([first, second])[:, hit]]
+    normals = [away[hit] / distance[hit, None]]
+    overlaps = [(radius[first] + radius[second] - distance)[hit]]
+    for body, surfaces in enumerate(bodies, start=len(radius)):
+        for surface in surfaces:
+            gap, normal = surface.contacts(centre)
+            near = np.flatnonzero(gap < radius)
+            pairs.append(np.stack([near, np.full(len(near), body)]))
+            normals.append(-normal[near])
+            overlaps.append((radius - gap)[near])
+    return np.hstack(pairs), np.concatenate(normals), np.concatenate(overlaps)

@@ -1,6 +1,7 @@
 """Rounded numbers, so that input scripts stay readable, and primes, as their seeds must be."""
 
 import math
+from functools import cache
 
 
 def round_to(value: float, digits: int) -> float:
@@ -23,6 +24,7 @@ def timestep(rayleigh_s: float, fraction: float) -> float:
     return round_to(math.floor(exact / unit * (1 + 1e-12)) * unit, 4)
 
 
+@cache
 def is_prime(number: int) -> bool:
     """Whether a number above 1 has no divisor."""
     return all(number % divisor for divisor in range(2, math.isqrt(number) + 1))

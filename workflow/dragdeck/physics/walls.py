@@ -5,7 +5,7 @@ kind of bowl.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Literal
 
 import numpy as np
@@ -13,8 +13,6 @@ from pydantic import PositiveFloat
 
 from dragdeck.arrays import Floats
 from dragdeck.parts import Part, omitted
-
-_AXES = {"xplane": 0, "yplane": 1, "zplane": 2}
 
 _SIDES = 120
 """Corners of a drawn circle."""
@@ -58,15 +56,37 @@ class Wall(Part):
         """
         if self.ends_m is not None:
             return _from_cone(centre_m, np.array(self.ends_m), self.sides)
-        normal = np.zeros_like(centre_m)
-        if self.shape in _AXES:
-            axis = _AXES[self.shape]
-            place = centre_m[:, axis]
-            normal[:, axis] = self.inwards
-        else:
-            place = np.linalg.norm(centre_m[:, :2], axis=1)
-            normal[:, :2] = self.inwards * centre_m[:, :2] / np.maximum(place, 1e-300)[:, None]
-        return self.inwards * (place - self.at_m), normal
+        distance, normal = from_primitive(self.shape, (self.at_m, 0.0, 0.0), centre_m)
+        return self.inwards * distance, self.inwards * normal
+
+
+def from_primitive(shape: str, sizes_m: Sequence[float], centre_m: Floats) -> tuple[Floats, Floats]:
+    """Distances of points from a plane or cylinder without end, and normals away from it.
+
+    Parameters
+    ----------
+    shape : str
+        As LIGGGHTS has it: ``xplane`` to ``zcylinder``.
+    sizes_m : sequence of float
+        Coordinate of a plane; or radius of a cylinder, and the coordinates of its axis.
+    centre_m : (N, 3) ndarray
+
+    Returns
+    -------
+    (N,) and (N, 3) ndarray
+        Distances are negative within a cylinder, or below a plane; unit vectors point to larger
+        ones.
+    """
+    axis = "xyz".index(shape[0])
+    normal = np.zeros_like(centre_m)
+    if shape.endswith("plane"):
+        normal[:, axis] = 1.0
+        return centre_m[:, axis] - sizes_m[0], normal
+    across = [number for number in range(3) if number != axis]
+    out = centre_m[:, across] - np.asarray(sizes_m[1:3])
+    place = np.linalg.norm(out, axis=1)
+    normal[:, across] = out / np.maximum(place, 1e-300)[:, None]
+    return place - sizes_m[0], normal
 
 
 def _from_cone(centre_m: Floats, ends_m: Floats, sides: int) -> tuple[Floats, Floats]:

@@ -32,7 +32,7 @@ from dragdeck.cases.bed import (
 )
 from dragdeck.cases.case import Case, mesh_file, of_each_workpiece
 from dragdeck.errors import Caution, InputError, together
-from dragdeck.mesh.checks import Finding, Surroundings, check
+from dragdeck.mesh.checks import MeshDefect, Surroundings, check
 from dragdeck.mesh.contacts import gap_fraction
 from dragdeck.mesh.files import read
 from dragdeck.mesh.shapes import cylinder, cylinder_facets, cylinder_radius
@@ -197,7 +197,7 @@ def _too_fine(case: Case) -> Iterator[Caution]:
     )
 
 
-def _of_case(case: Case, shape: MeshShape) -> "tuple[Trimesh, list[Finding]]":
+def _of_case(case: Case, shape: MeshShape) -> "tuple[Trimesh, list[MeshDefect]]":
     study = case.study
     sizes = study.bowl.container.clear_m, study.media.typical_radius_m, deepest(study.motion)
     surroundings = Surroundings(*sizes)
@@ -301,7 +301,7 @@ def _workpiece(shape: CylinderShape, length_m: float) -> "Trimesh":
 @lru_cache(maxsize=8)
 def _from_file(
     file: Path, shape: MeshShape, surroundings: Surroundings
-) -> "tuple[Trimesh, list[Finding]]":
+) -> "tuple[Trimesh, list[MeshDefect]]":
     mesh = _read(file, shape, 2 * surroundings.bowl_radius_m)
     problems = check(mesh, file=file, field="workpiece.shape", surroundings=surroundings)
     turned = facing_out(mesh)

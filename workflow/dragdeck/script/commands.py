@@ -34,6 +34,8 @@ class EngineCommand:
         Its file, if several were read.
     step : float or None
         The time step that the run has reached before it, if that is known.
+    uncertain : bool
+        Whether it is executed on a condition that is not known.
     """
 
     text: str
@@ -42,21 +44,20 @@ class EngineCommand:
     line: int = 0
     file: str = ""
     step: float | None = None
+    uncertain: bool = False
 
 
 def lines_of(deck: str) -> Iterator[tuple[int, str]]:
     """The lines of an input script without comments, each with what ``&`` adds, and its number."""
-    held, begin = "", 0
-    for number, line in enumerate(deck.splitlines(), start=1):
-        begin = begin if held else number
-        held += line.rstrip(" \t")
-        if held.endswith("&"):
-            held = held[:-1] or " "
+    parts: list[str] = []
+    lines = deck.split("\n")
+    for number, line in enumerate(lines, start=1):
+        line = line.rstrip(" \t\r\v\f")
+        if line.endswith("&") and number < len(lines):
+            parts.append(line[:-1])
             continue
-        yield begin, without_comment(held)
-        held = ""
-    if held:
-        yield begin, without_comment(held)
+        yield number - len(parts), without_comment("".join([*parts, line]))
+        parts.clear()
 
 
 def without_comment(line: str) -> str:
@@ -74,6 +75,11 @@ def commands(deck: str) -> Iterator[EngineCommand]:
 def words_of(text: str) -> list[str]:
     """The words of a command, without quotation marks."""
     return [next(filter(None, groups), "") for groups in _WORD.findall(text)]
+
+
+def is_quoted_in_full(text: str) -> bool:
+    """Whether every quotation mark that begins a word is closed: LIGGGHTS stops at another one."""
+    return not any(plain.startswith(("'", '"')) for *_, plain in _WORD.findall(text))
 
 
 def _commands(text: str, within: str, line: int) -> Iterator[EngineCommand]:

@@ -1,95 +1,149 @@
-"""What a script sets up: fixes, contact laws, properties, templates, regions and box."""
+"""What a script sets up: fixes, contact models, properties, templates, regions and box."""
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from typing import NamedTuple
 
 from dragdeck.physics.rounding import is_prime
 from dragdeck.script.commands import EngineCommand
 from dragdeck.script.flow import Script
 
-Bounds = tuple[tuple[float, float], tuple[float, float], tuple[float, float]]
+_LARGEST = 1e60
+"""Numbers beyond it are no lengths, moduli or rates, and their powers overflow."""
+
+_MOST_TYPES = 1000
+_SMALLEST_SEED, _LARGEST_SEED = 10_000, 2**31
+_ELSEWHERE = {
+    "nve/nonspherical", "check/timestep/bond", "hybrid/gran", "nve/sphere/omp", "gran/omp",
+    "mesh/surface/deform", "cfd/coupling/force/implicit/accumulated", "bond/gran",
+}  # fmt: skip
+_SIZES = {"block": slice(1, 7), "cylinder": slice(2, 7), "sphere": slice(1, 5)}
+"""Words of a region that are its sizes."""
 
 
-def number(word: str) -> float | None:
+def as_number(word: str) -> float | None:
     """The number that a word is; None for another word, or one with an unknown value."""
     try:
         value = float(word)
     except ValueError:
         return None
-    return value if math.isfinite(value) else None
+    return value if abs(value) < _LARGEST else None
 
 
-def numbers(words: Sequence[str]) -> list[float] | None:
-    """The numbers that all words are."""
-    values = [number(word) for word in words]
-    return None if None in values else [value for value in values if value is not None]
+def as_numbers(words: Sequence[str], count: int = 0) -> list[float] | None:
+    """The numbers that all words are; None also for fewer than `count` of them."""
+    values = [value for word in words if (value := as_number(word)) is not None]
+    return values if len(values) == len(words) >= count else None
 
 
-@dataclass(frozen=True)
+def certain(commands: Iterable[EngineCommand]) -> EngineCommand | None:
+    """The last of some commands; None where that depends on a condition that is not known."""
+    last = None
+    for command in reversed([*commands]):
+        if last and command.words != last.words:
+            return None
+        last = command
+        if not command.uncertain:
+            return last
+    return None
+
+
+@dataclass
 class Fix:
-    """A fix: its words from the style on, where it is set and, as places in the script, until when.
+    """A fix: where it is set and, as places in the script, until when.
 
     Attributes
     ----------
-    id : str
-    words : sequence of str
     command : EngineCommand
     begin, end : float
         Places among the commands; infinite if it stays.
     """
 
-    id: str
-    words: Sequence[str]
     command: EngineCommand
     begin: float
     end: float = math.inf
+
+    @property
+    def id(self) -> str:
+        """Its name."""
+        return self.command.words[1]
+
+    @property
+    def words(self) -> Sequence[str]:
+        """Its words from the style on."""
+        return self.command.words[3:]
 
     def after(self, word: str, count: int = 1) -> Sequence[str]:
         """So many words after a keyword; none without it."""
         at = self.words.index(word) + 1 if word in self.words else len(self.words)
         return self.words[at : at + count]
 
+    def word(self, keyword: str) -> str:
+        """The word after a keyword; empty without."""
+        return "".join(self.after(keyword))
+
+    def vector(self, keyword: str) -> list[float] | None:
+        """The three numbers after a keyword; none without it, None if they are not known."""
+        return as_numbers(self.after(keyword, 3), 3) if keyword in self.words else []
+
 
 @dataclass(frozen=True)
-class Law:
-    """The contact law of the particles, or of a wall."""
+class ContactModel:
+    """The contact model of the particles, or of a wall.
+
+    Attributes
+    ----------
+    wall : Fix or None
+    command : EngineCommand
+    normal : str
+        Model of the normal force.
+    settings : dict of str to str
+        Each word after that with the next one.
+    """
 
     wall: Fix | None
-    normal: str
-    models: dict[str, str]
     command: EngineCommand
+    normal: str
+    settings: dict[str, str]
 
     def has(self, keyword: str) -> str:
         """The model or setting of this keyword; empty where it is off."""
-        model = self.models.get(keyword, "off")
+        model = self.settings.get(keyword, "off")
         return "" if model in ("off", "no", "none") else model
 
 
-@dataclass(frozen=True)
+class Region(NamedTuple):
+    """Volume, m3, and bounds of a region, m."""
+
+    volume: float
+    bounds: Sequence[tuple[float, float]]
+
+
 class Facts:
     """What is known of a script."""
 
-    script: Script
+    def __init__(self, script: Script) -> None:
+        self.script = script
+        cleared = [at for at, c in enumerate(script.commands) if c.words[0] == "clear"]
+        self._begin = max(cleared, default=-1)
 
     @cached_property
     def fixes(self) -> list[Fix]:
         """Every fix, one that is set again in a loop once."""
         fixes: dict[tuple[str, ...], Fix] = {}
-        active: dict[str, tuple[str, ...]] = {}
-        cleared = 0
+        active: dict[str, Fix] = {}
         for place, command in enumerate(self.script.commands):
             words = command.words
-            ended = active if words[0] == "clear" else words[1:2] if words[0] == "unfix" else ()
-            for key in filter(None, [active.pop(name, None) for name in list(ended)]):
-                fixes[key] = replace(fixes[key], end=place)
-            cleared += words[0] == "clear"
+            ended = [*active] if words[0] == "clear" else words[1:2] * (words[0] == "unfix")
+            for fix in filter(None, [active.pop(name, None) for name in ended]):
+                fix.end = place
             if words[0] == "fix" and len(words) > 3:
-                key = (str(cleared), *words)
-                active[words[1]] = key
-                fixes.setdefault(key, Fix(words[1], words[3:], command, place))
+                key = (str(place > self._begin), *words)
+                active[words[1]] = fixes.setdefault(key, Fix(command, place))
+                active[words[1]].end = math.inf
         return list(fixes.values())
 
     def styled(self, *styles: str) -> list[Fix]:
@@ -98,28 +152,29 @@ class Facts:
 
     def present(self, *styles: str) -> list[Fix]:
         """Those that are set after the last ``clear``."""
-        cleared = [at for at, c in enumerate(self.script.commands) if c.words[0] == "clear"]
-        return [fix for fix in self.styled(*styles) if fix.begin > max(cleared, default=-1)]
+        return [fix for fix in self.styled(*styles) if fix.begin > self._begin]
 
     def named(self, *names: str) -> Iterator[EngineCommand]:
         """Commands of these names."""
         return (command for command in self.script.commands if command.words[0] in names)
 
     def last(self, name: str) -> list[str]:
-        """The words after the last command of this name."""
-        return next((c.words[1:] for c in reversed(self.script.commands) if c.words[0] == name), [])
+        """The words after the last command of this name; none without, or if not known."""
+        command = certain(self.named(name))
+        return command.words[1:] if command else []
 
     @cached_property
-    def laws(self) -> list[Law]:
-        """Contact laws that are written as ``model ...``; those of the particles are first."""
-        laws = []
-        for command in self.named("pair_style"):
-            if command.words[1:2] == ["gran"] and "model" in command.words[:-1]:
-                laws.append(_law(None, command.words, command))
-        for wall in self.styled("wall/gran"):
-            if wall.words[0] == "wall/gran" and "model" in wall.words[:-1]:
-                laws.append(_law(wall, wall.words, wall.command))
-        return laws
+    def models(self) -> list[ContactModel]:
+        """Contact models that are written as ``model ...``; those of the particles are first."""
+        particles = [(None, c) for c in self.named("pair_style") if c.words[1:2] == ["gran"]]
+        walls = [(fix, fix.command) for fix in self.styled("wall/gran")
+                 if fix.words[0] == "wall/gran"]  # fmt: skip
+        models = []
+        for wall, command in [*particles, *walls]:
+            if "model" in command.words[:-1]:
+                normal, *rest = command.words[command.words.index("model") + 1 :]
+                models.append(ContactModel(wall, command, normal, dict(pairwise(rest))))
+        return models
 
     def properties(self, name: str) -> list[Fix]:
         """The fixes that set a property."""
@@ -127,136 +182,112 @@ class Facts:
 
     def values(self, name: str) -> list[float]:
         """The values of a property at last, by type or by pair of types; none if not known."""
-        every = self.properties(name)
-        if not every:
-            return []
-        words = every[-1].words
-        return numbers(words[4 if words[2:3] == ["peratomtypepair"] else 3 :]) or []
+        command = certain(fix.command for fix in self.properties(name))
+        words = command.words[5:] if command else []
+        return as_numbers(words[2 if words[:1] == ["peratomtypepair"] else 1 :]) or []
 
-    def of_pair(self, name: str, first: int, second: int) -> float | None:
-        """A property of a pair of types, counted from 1."""
+    def matrix(self, name: str) -> list[list[float]]:
+        """A property of pairs of types, row by row; none if not known."""
         values = self.values(name)
         types = math.isqrt(len(values))
-        known = types**2 == len(values) and 0 < min(first, second) <= max(first, second) <= types
-        return values[(first - 1) * types + second - 1] if known else None
+        rows = [values[begin : begin + types] for begin in range(0, len(values), types or 1)]
+        return rows if types**2 == len(values) else []
+
+    @cached_property
+    def meshes(self) -> dict[str, Fix]:
+        """The meshes by their ids."""
+        return {fix.id: fix for fix in self.styled("mesh/surface")}
 
     def wall_types(self, wall: Fix) -> list[int]:
-        """The types of a wall's materials."""
-        fixes = {fix.id: fix for fix in self.styled("mesh/surface")}
-        meshes = [fixes[name] for name in self.meshes_of(wall) if name in fixes]
-        words = [word for fix in meshes or [wall] for word in fix.after("type")]
-        return [int(word) for word in words if word.isdigit()]
+        """The types of a wall's materials, from 1."""
+        meshes = [self.meshes[name] for name in self.meshes_of(wall) if name in self.meshes]
+        types = [as_number(fix.word("type")) for fix in meshes or [wall]]
+        return [int(number) for number in types if number and 0 < number < _MOST_TYPES]
 
     def meshes_of(self, wall: Fix) -> Sequence[str]:
         """Names of the meshes of a wall."""
-        (count,) = wall.after("n_meshes") or ("0",)
-        return wall.after("meshes", int(count) if count.isdigit() else 0)
+        return wall.after("meshes", int(as_number(wall.word("n_meshes")) or 0))
 
     @cached_property
     def radii(self) -> list[float] | None:
         """Radii of all templates, m; None if one is not known, or particles come from a file."""
-        templates = self.styled("particletemplate/")
-        words = [fix.after("radius", 2) for fix in templates]
-        values = [number(w[1]) if len(w) == 2 and w[0] == "constant" else None for w in words]
+        words = [fix.after("radius", 2) for fix in self.styled("particletemplate/")]
+        values = as_numbers([w[1] if len(w) == 2 and w[0] == "constant" else "" for w in words])
         others = [*self.named("read_restart", "read_data", "create_atoms"), *self.styled("adapt")]
-        if not values or others or any(v is None for v in values):
-            return None
-        return [value for value in values if value is not None]
-
-    def region(self, name: str) -> Bounds | None:
-        """The bounds of a block, cylinder or sphere, m."""
-        shape = self._shape(name)
-        return shape and shape[1]
-
-    def volume(self, name: str) -> float | None:
-        """Volume of a block, cylinder or sphere, m3."""
-        shape = self._shape(name)
-        return shape and shape[0]
-
-    def _shape(self, name: str) -> tuple[float, Bounds] | None:
-        words = next((c.words[2:] for c in self.named("region") if c.words[1:2] == [name]), [])
-        begin, end = {"block": (1, 7), "cylinder": (2, 7), "sphere": (1, 5)}.get(
-            words[0] if words else "", (0, 0)
-        )
-        values = numbers(words[begin:end])
-        if not values or len(values) < end - begin or {"side", "lattice", "move"} & set(words):
-            return None
-        if words[0] == "block":
-            sides = [(values[0], values[1]), (values[2], values[3]), (values[4], values[5])]
-            return math.prod(high - low for low, high in sides), (sides[0], sides[1], sides[2])
-        *centre, radius = values[: 3 + (words[0] == "sphere")]
-        sides = [(place - radius, place + radius) for place in centre]
-        if words[0] == "sphere":
-            return 4 / 3 * math.pi * radius**3, (sides[0], sides[1], sides[2])
-        sides.insert("xyz".index(words[1]), (values[3], values[4]))
-        return math.pi * radius**2 * (values[4] - values[3]), (sides[0], sides[1], sides[2])
+        return None if others else values or None
 
     @cached_property
-    def box(self) -> Bounds | None:
-        """The simulation box, m, if the script creates it."""
-        words = self.last("create_box")
-        return self.region(words[1]) if len(words) > 1 else None
+    def regions(self) -> dict[str, Region | None]:
+        """Blocks, cylinders and spheres by their names; None for one that is not known."""
+        commands: dict[str, list[EngineCommand]] = {}
+        for command in self.named("region"):
+            commands.setdefault("".join(command.words[1:2]), []).append(command)
+        last = {name: certain(of_name) for name, of_name in commands.items()}
+        return {name: _region(command.words[2:]) for name, command in last.items() if command}
+
+    @cached_property
+    def box(self) -> Region | None:
+        """The simulation box, if the script creates it."""
+        return self.regions.get("".join(self.last("create_box")[1:2]))
 
     @cached_property
     def timestep_s(self) -> float | None:
         """The last time step, s."""
-        words = self.last("timestep")
-        return number(words[0]) if words else None
+        return as_number("".join(self.last("timestep")[:1]))
 
     @cached_property
     def gravity(self) -> list[float] | None:
         """The acceleration of gravity at last, m/s2; zero without, None if not known."""
-        gravity = [fix for fix in self.styled("gravity") if fix.end == math.inf]
-        if not gravity:
+        fixes = [fix for fix in self.styled("gravity") if fix.end == math.inf]
+        if not fixes:
             return [0.0, 0.0, 0.0]
-        size, vector = number(gravity[-1].words[1]), numbers(gravity[-1].after("vector", 3))
+        size, vector = as_number("".join(fixes[-1].words[1:2])), fixes[-1].vector("vector")
         length = math.hypot(*vector) if vector else 0.0
-        if size is None or not vector or not length:
-            return None
-        return [size * part / length for part in vector]
+        known = size is not None and length and certain(fix.command for fix in fixes)
+        return [(size or 0.0) * part / length for part in vector or ()] if known else None
 
     @cached_property
     def dialect(self) -> str:
         """Which LIGGGHTS the script is for, as far as it shows: empty for the public 3.8."""
-        seeds = [seed for _, seed in self.seeds]
-        if any(
-            c.words[1:2] == ["gran"] and "model" not in c.words for c in self.named("pair_style")
-        ):
-            return "a fork, or a version before 3.0: a contact law without `model`"
-        if any(c.words[1].startswith("gran/") for c in self.named("pair_style") if c.words[1:]):
-            return "a version before 3.0: contact laws as styles of their own"
+        for command in self.named("pair_style"):
+            if command.words[1:2] == ["gran"] and "model" not in command.words:
+                return "a fork, or a version before 3.0: a contact law without `model`"
+            if "".join(command.words[1:2]).startswith("gran/"):
+                return "a version before 3.0: contact laws as styles of their own"
         for command in self.script.commands:
-            for word in _ELSEWHERE & set(command.words):
+            for word in sorted(_ELSEWHERE.intersection(command.words)):
                 return f"PFM or a commercial or bonded fork: {word}"
-        if seeds and not any(_accepted(seed) for seed in seeds):
+        if self.seeds and len(self.refused_seeds()) == len(self.seeds):
             return "PFM, or a version before 3.4: seeds that the public 3.8 refuses"
         return ""
 
     @cached_property
     def seeds(self) -> list[tuple[Fix, int]]:
         """Seeds of templates, distributions and insertions."""
-        seeds = []
-        for fix in self.styled("particletemplate/", "particledistribution/", "insert/"):
-            words = fix.after("seed") or fix.words[1:2]
-            if words and words[0].isdigit():
-                seeds.append((fix, int(words[0])))
-        return seeds
+        fixes = self.styled("particletemplate/", "particledistribution/", "insert/")
+        words = [(fix, fix.word("seed") or "".join(fix.words[1:2])) for fix in fixes]
+        return [(fix, int(word)) for fix, word in words if word.isdecimal() and len(word) < 20]
 
     def refused_seeds(self) -> list[tuple[Fix, int]]:
         """Seeds that the public 3.8 refuses."""
-        return [(fix, seed) for fix, seed in self.seeds if not _accepted(seed)]
+        return [(fix, seed) for fix, seed in self.seeds
+                if not _SMALLEST_SEED < seed < _LARGEST_SEED or not is_prime(seed)]  # fmt: skip
 
 
-_ELSEWHERE = {
-    "nve/nonspherical", "check/timestep/bond", "hybrid/gran", "nve/sphere/omp", "gran/omp",
-    "mesh/surface/deform", "cfd/coupling/force/implicit/accumulated", "bond/gran",
-}  # fmt: skip
-
-
-def _accepted(seed: int) -> bool:
-    return seed > 10_000 and is_prime(seed)
-
-
-def _law(wall: Fix | None, words: Sequence[str], command: EngineCommand) -> Law:
-    at = words.index("model") + 1
-    return Law(wall, words[at], dict(pairwise(words[at + 1 :])), command)
+def _region(words: Sequence[str]) -> Region | None:
+    kind = "".join(words[:1])
+    values = as_numbers(words[_SIZES[kind]]) if kind in _SIZES else None
+    if not values or {"side", "lattice", "move"} & set(words):
+        return None
+    match kind, values:
+        case "block", [left, right, front, back, low, high]:
+            bounds = [(left, right), (front, back), (low, high)]
+            return Region((right - left) * (back - front) * (high - low), bounds)
+        case "sphere", [*centre, radius] if len(centre) == 3:
+            bounds = [(place - radius, place + radius) for place in centre]
+            return Region(4 / 3 * math.pi * radius**3, bounds)
+        case "cylinder", [*centre, radius, low, high] if len(centre) == 2 and words[1] in "xyz":
+            bounds = [(place - radius, place + radius) for place in centre]
+            bounds.insert("xyz".index(words[1]), (low, high))
+            return Region(math.pi * radius**2 * (high - low), bounds)
+    return None

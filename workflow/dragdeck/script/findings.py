@@ -1,13 +1,14 @@
 """Findings on a script: rules as a table, where each was met, and comments that accept one."""
 
-import csv
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
+from typing import ClassVar
 
 from dragdeck.errors import InputError, choices
+from dragdeck.files import table_rows
 from dragdeck.script.commands import EngineCommand
 from dragdeck.script.flow import Script
 
@@ -28,8 +29,8 @@ class Rule:
 @cache
 def rules() -> Mapping[str, Rule]:
     """Every rule by its id; an id is never used again."""
-    with Path(__file__).with_name("rules.csv").open(encoding="utf-8", newline="") as stream:
-        return {row["id"]: Rule(**row) for row in csv.DictReader(stream)}
+    rows = table_rows(Path(__file__).with_name("rules.csv"))
+    return {row["id"]: Rule(**row) for row in rows}
 
 
 @dataclass(frozen=True)
@@ -73,6 +74,11 @@ class NotApplied:
 
     rule: str
     why: str
+    file: ClassVar[str] = ""
+    line: ClassVar[int] = 0
+
+
+Results = Iterator[Finding | NotApplied]
 
 
 def at(
@@ -87,10 +93,8 @@ class Acceptance:
     """A comment that accepts findings: on the line of a command, or on a line before it."""
 
     file: str
-    line: int
     lines: range
     ids: frozenset[str]
-    reason: str
 
     def holds(self, finding: Finding) -> bool:
         """Whether it accepts a finding; those from dumps have no line."""
@@ -108,22 +112,20 @@ def acceptances(script: Script) -> list[Acceptance]:
     """
     accepted = []
     for file, text in script.texts.items():
-        lines = text.splitlines()
-        for number, line in enumerate(lines, start=1):
+        last = 0
+        for number, line in reversed([*enumerate(text.split("\n"), start=1)]):
+            last = last if last and line.lstrip().startswith("#") else number
             if comment := _ACCEPTS.search(line):
-                ids, reason = frozenset(re.findall(r"DK\d+", comment[1])), comment[2].strip()
+                ids = frozenset(re.findall(r"DK\d+", comment[1]))
                 check_ids(ids, file, number)
-                if not reason:
+                if not comment[2].strip():
                     raise InputError(
                         "a comment that accepts a finding gives no reason",
                         file=file, line=number, value=comment[0],
                         remedy=f"write the reason after {' '.join(sorted(ids))}",
                     )  # fmt: skip
-                last = number
-                while lines[last - 1].lstrip().startswith("#") and last < len(lines):
-                    last += 1
-                accepted.append(Acceptance(file, number, range(number, last + 1), ids, reason))
-    return accepted
+                accepted.append(Acceptance(file, range(number, last + 1), ids))
+    return accepted[::-1]
 
 
 def check_ids(ids: Iterable[str], file: str | None = None, line: int | None = None) -> None:
@@ -152,5 +154,5 @@ def without_accepted(
     for comment in accepted:
         used = {finding.rule for finding in findings if comment.holds(finding)}
         for name in sorted((comment.ids & known) - used):
-            notes.append(f"{comment.file}:{comment.line}: nothing to ignore for {name}")
+            notes.append(f"{comment.file}:{comment.lines[0]}: nothing to ignore for {name}")
     return left, notes

@@ -2,28 +2,39 @@
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from dragdeck.errors import InputError
+from dragdeck.files import text_of
 from dragdeck.script.commands import (
     EngineCommand,
     inner_commands,
+    is_quoted_in_full,
     lines_of,
     without_comment,
     words_of,
 )
 from dragdeck.script.formula import value_of
 
-_MOST_COMMANDS = 20_000
+_MOST = 20_000
+"""Commands and values of variables that are followed; a long command counts several times."""
+
 _MOST_PASSES = 20
 """Passes of a loop that are followed: what differs after so many is a number of output files."""
 
+_MOST_FILES = 10
+"""That include each other."""
+
 _LARGEST_FILE = 4_000_000
-_QUOTED = r""""[^"]*"|'[^']*'"""
-_REFERENCE = re.compile(rf"({_QUOTED})|\$\{{(\w+)\}}|\$(\w)|(\$\()")
-_TEMPLATE = re.compile(r"\{\{.*?\}\}|\{%")
+_LONGEST_VALUE = 1000
+_DEEPEST = 30
+"""Formulas within each other."""
+
+_REFERENCE = re.compile(r"""("[^"]*"|'[^']*')|\$\{(\w+)\}|\$(\w)|(\$\()""")
+_TEMPLATE = re.compile(r"\{\{[^{}\n]*\}\}|\{%")
 _KEPT_STYLES = ("index", "loop", "world", "universe", "uloop")
 """Of variables that keep the value that they have."""
 
@@ -42,28 +53,44 @@ class Script:
     commands : list of EngineCommand
         In the order of execution, with the values of variables. A word with ``$`` has one that is
         not known.
-    not_followed : list of str
-        What could not be followed.
+    not_followed : dict of str
+        What could not be followed, in order.
     undefined : mapping of str to EngineCommand
         Variables that nothing defines, with the first command that uses each.
     absent : list of (EngineCommand, str)
         Scripts that it includes, or jumps to, and that are not there.
+    changes_files : bool
+        Whether it makes or moves files itself, so that nobody knows which are there.
     """
 
     file: Path
     in_memory: bool = False
     texts: dict[str, str] = field(default_factory=dict)
     commands: list[EngineCommand] = field(default_factory=list)
-    not_followed: list[str] = field(default_factory=list)
+    not_followed: dict[str, None] = field(default_factory=dict)
     undefined: dict[str, EngineCommand] = field(default_factory=dict)
     absent: list[tuple[EngineCommand, str]] = field(default_factory=list)
+    changes_files: bool = False
+
+    @property
+    def folder(self) -> Path:
+        """Where it finds its files."""
+        return self.file.parent
+
+    def note(self, command: EngineCommand, what: str) -> None:
+        """Note what could not be followed, and where."""
+        self.not_followed[f"{command.file}:{command.line}: {what}"] = None
 
 
 @dataclass
 class _Variable:
     style: str
-    values: Sequence[str]
+    values: Sequence[str] = ()
     at: int = 0
+
+
+_UNKNOWN = "unknown"
+_NOWHERE = EngineCommand("", [], uncertain=True)
 
 
 def read_script(
@@ -90,15 +117,15 @@ def read_script(
         A file cannot be read, or is no input script.
     """
     script = Script(file, text is not None)
-    if after is not None:
-        _Reader(script, after, variables or {}, None).follow()
-        script.commands.append(EngineCommand("clear", ["clear"]))
-    _Reader(script, file, variables or {}, text).follow()
+    for source in [after, file] if after else [file]:
+        _Reader(script, source, variables or {}, text if source is file else None).follow()
+        if source is not file:
+            script.commands.append(EngineCommand("clear", ["clear"]))
     return script
 
 
 def script_text(file: Path) -> str:
-    """The content of an input script.
+    """The content of an input script, or of a part of one.
 
     Raises
     ------
@@ -107,19 +134,20 @@ def script_text(file: Path) -> str:
     """
     remedy = "give the input script of LIGGGHTS"
     try:
-        if file.stat().st_size > _LARGEST_FILE:
-            raise InputError("the file is too large for an input script", file=file, remedy=remedy)
-        data = file.read_bytes()
+        if file.is_fifo():
+            raise InputError("a pipe is no file", file=file, remedy=remedy)
+        with file.open("rb") as stream:
+            content = stream.read(_LARGEST_FILE + 1)
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror}", file=file, remedy=remedy) from None
-    if b"\0" in data:
+    text = text_of(content)
+    if len(content) > _LARGEST_FILE:
+        raise InputError("the file is too large for an input script", file=file, remedy=remedy)
+    if "\0" in text:
         raise InputError("the file is not text", file=file, remedy=remedy)
-    text = data.decode("utf-8", "replace")
     if template := _TEMPLATE.search("\n".join(line for _, line in lines_of(text))):
         raise InputError("this is a template, not an input script", file=file, value=template[0],
                          remedy="fill in its values, and give the script that results")  # fmt: skip
-    if not any(line.strip() for _, line in lines_of(text)):
-        raise InputError("the file contains no command", file=file, remedy=remedy)
     return text
 
 
@@ -129,98 +157,116 @@ class _Reader:
     def __init__(
         self, script: Script, file: Path, variables: Mapping[str, Sequence[str]], text: str | None
     ) -> None:
-        self.script, self.folder = script, file.parent
+        self.script, self.folder, self.name = script, file.parent, str(file)
         self.variables = {name: _Variable("index", v) for name, v in variables.items()}
         self.missing: dict[str, EngineCommand] = {}
-        self.passes: dict[tuple[str, ...], int] = {}
+        self.times: Counter[object] = Counter()
         self.lines: dict[str, tuple[list[tuple[int, str]], dict[str, int]]] = {}
-        self.stack: list[tuple[str, Iterator[tuple[int, str]]]] = []
+        self.stack: list[tuple[str, int]] = []
         self.timestep: float | None = None
         self.step: float | None = 0.0
         self.skips_jump = self.ended = False
         self.count = self.depth = 0
         self.left_out: dict[str, None] = {}
-        self.name = str(file)
         script.texts[self.name] = script_text(file) if text is None else text
+        if text is None and not any(line.strip() for _, line in lines_of(script.texts[self.name])):
+            raise InputError("the file contains no command", file=file,
+                             remedy="give the input script of LIGGGHTS")  # fmt: skip
 
     def follow(self) -> None:
         self._enter(self.name)
         while self.stack and not self.ended:
-            file, lines = self.stack[-1]
-            number, line = next(lines, (0, ""))
-            if number:
-                self._execute(EngineCommand(line, [], line=number, file=file))
-            elif self.stack and self.stack[-1][1] is lines:
-                self.stack.pop()
-        defined = set(re.findall(r"\bvariable\s+(\w+)", "\n".join(self.script.texts.values())))
+            file, at = self.stack.pop()
+            lines, _ = self.lines[file]
+            if at < len(lines):
+                self.stack.append((file, at + 1))
+                number, line = lines[at]
+                command = EngineCommand(line, [], line=number, file=file)
+                try:
+                    self._execute(command)
+                except RecursionError:
+                    self.script.note(command, "a command that contains itself")
+                    self.ended = True
+        texts = "\n".join(self.script.texts.values())
+        defined = set(re.findall(r"\bvariable\s+(\w+)", texts))
         for name, command in self.missing.items():
             if name not in defined:
                 self.script.undefined.setdefault(name, command)
 
     def _enter(self, file: str, label: str = "") -> bool:
+        """Go on in a file; whether it has the label."""
         if file not in self.lines:
             lines = [*lines_of(self.script.texts[file])]
             every = [(words_of(line), at) for at, (_, line) in enumerate(lines) if "label" in line]
-            labels = {
-                "".join(words[1:2]): at for words, at in reversed(every) if words[:1] == ["label"]
-            }
+            labels = {words[1]: at for words, at in reversed(every)
+                      if words[:1] == ["label"] and len(words) > 1}  # fmt: skip
             self.lines[file] = lines, labels
-        lines, labels = self.lines[file]
-        if label and label not in labels:
-            return False
-        self.stack.append((file, iter(lines[labels[label] if label else 0 :])))
-        return True
+        at = self.lines[file][1].get(label) if label else 0
+        if at is not None:
+            self.stack.append((file, at))
+        return at is not None
 
-    def _read(self, command: EngineCommand, name: str) -> bool:
-        """Whether another script is there, and read."""
-        if "$" in name or len(self.stack) > 10:
-            self._note(command, f"{command.words[0]} {name}")
-        elif (file := self.folder / name).is_file():
-            self.script.texts.setdefault(str(file), script_text(file))
-            return True
-        else:
+    def _read(self, command: EngineCommand, name: str) -> str:
+        """Path of another script, whose content is then known; empty without."""
+        file, problem = self.folder / name, ""
+        if "$" in name or len(self.stack) > _MOST_FILES:
+            problem = "its name is not known" if "$" in name else "too many within each other"
+        elif not is_there(file) and not self.script.changes_files:
             self.script.absent.append((command, name))
-        return False
-
-    def _note(self, command: EngineCommand, what: str) -> None:
-        note = f"{command.file}:{command.line}: {what}"
-        if note not in self.script.not_followed:
-            self.script.not_followed.append(note)
+            return ""
+        else:
+            try:
+                self.script.texts.setdefault(str(file), script_text(file))
+            except InputError as error:
+                problem = error.problem
+        if problem:
+            self.script.note(command, f"{command.words[0]} {name}: {problem}")
+        return "" if problem else str(file)
 
     def _execute(self, command: EngineCommand) -> None:
         """Do a command; its words are those of its text with values in place of variables."""
-        self.count += 1
-        if self.count > _MOST_COMMANDS:
-            self._note(command, f"the commands after the first {_MOST_COMMANDS:,}")
+        self.count += 1 + len(command.text) // 200
+        if self.count > _MOST:
+            self.script.note(command, f"the commands after the first {_MOST:,}")
             self.ended = True
-        words = words_of(self._resolved(command.text, command))
-        command = replace(command, words=words, step=self.step)
-        if not command.words or self.ended:
+        elif not is_quoted_in_full(command.text):
+            self.script.note(command, "quotation marks that are not closed")
             return
-        words, uncertain = command.words, command.within.endswith("?")
+        words = words_of(self._resolved(command.text, command))
+        if not words or self.ended:
+            return
+        command = replace(command, words=words, step=self.step)
         match words[0]:
             case "variable" if len(words) > 2:
                 self._define(words, command)
             case "timestep" if len(words) > 1:
-                self.timestep = value_of(words[1], self._word)
+                step_s = value_of(words[1], self._word)
+                known = not command.uncertain or step_s == self.timestep
+                self.timestep = step_s if known else None
             case "if":
                 self._branch(command)
             case "next":
-                self._next(words[1:])
-            case "include" | "jump" | "quit" if uncertain:
-                self._note(command, f"{' '.join(words)}: its condition is not known")
+                self._next(words[1:], command)
+            case "include" | "jump" | "quit" if command.uncertain:
+                self.script.note(command, f"{' '.join(words)}: its condition is not known")
                 if words[:2] == ["jump", "SELF"]:
                     self.left_out.update(dict.fromkeys(words[2:3]))
-            case "include" if len(words) > 1 and self._read(command, words[1]):
-                self._enter(str(self.folder / words[1]))
+            case "include" if len(words) > 1:
+                if file := self._read(command, words[1]):
+                    self._enter(file)
             case "jump" if len(words) > 1:
                 self._jump(command)
             case "quit":
-                self.ended = not any(self._enter(self.name, label) for label in self._labels())
+                self.ended = True
+                while self.left_out and self.ended:  # a jump may have led past it
+                    self.ended = not self._enter(self.name, self.left_out.popitem()[0])
             case "run" | "read_restart" | "reset_timestep":
-                self.step = None if uncertain else self._step_after(words)
+                self.step = None if command.uncertain else self._step_after(words)
+            case "shell":
+                self.script.changes_files |= words[1:2] not in (["mkdir"], ["rmdir"], ["echo"])
             case "partition" | "python":
-                self._note(command, command.text.strip())
+                self.script.note(command, command.text.strip())
+                self.script.changes_files = True
         self.script.commands.append(command)
         if words[0] == "run":
             for inner in inner_commands(words):
@@ -235,26 +281,30 @@ class _Reader:
 
     def _define(self, words: Sequence[str], command: EngineCommand) -> None:
         name, style, values = words[1], words[2], words[3:]
-        if style == "delete":
+        if command.uncertain:
+            style, values = _UNKNOWN, ()
+        elif style == "delete":
             self.variables.pop(name, None)
             return
-        if style in _KEPT_STYLES and name in self.variables:
+        elif style in _KEPT_STYLES and name in self.variables:
             return
-        if style == "loop" and values:
-            numbers = [value_of(value, self._word) for value in values if value != "pad"]
-            first, last = (1, numbers[0]) if len(numbers) < 2 else (numbers[0], numbers[1])
+        elif style == "loop":
+            ends = [value_of(value, self._word) for value in values if value != "pad"]
+            first, last = [1.0, *ends][-2:] if ends else [None, None]
             if first is None or last is None:
-                self._note(command, f"variable {name}: the number of passes of a loop")
-                last = first = 1
+                self.script.note(command, f"variable {name}: the number of passes of a loop")
+                style, last, first = _UNKNOWN, 0, 0
             values = [str(n) for n in range(int(first), min(int(last), int(first) + 999) + 1)]
-        elif style == "equal" and command.within.endswith("?"):
-            style = "unknown"
+        self.times[name] += 1
         self.variables[name] = _Variable(style, values)
 
-    def _next(self, names: Sequence[str]) -> None:
+    def _next(self, names: Sequence[str], command: EngineCommand) -> None:
         for name in names:
             variable = self.variables.get(name)
-            if variable:
+            if variable and command.uncertain:
+                self.variables[name] = _Variable(_UNKNOWN)
+            elif variable:
+                self.times[name] += 1
                 variable.at += 1
                 if variable.at >= len(variable.values):
                     del self.variables[name]
@@ -264,23 +314,21 @@ class _Reader:
         if self.skips_jump:
             self.skips_jump = False
             return
-        file, label = command.words[1], "".join(command.words[2:3])
-        there = file == "SELF" or self._read(command, file)
-        file = self.stack[-1][0] if file == "SELF" else str(self.folder / file)
-        key = (command.file, str(command.line), file, label)
-        self.passes[key] = self.passes.get(key, 0) + 1
-        if self.passes[key] > _MOST_PASSES:
-            self._note(command, f"a loop after its first {_MOST_PASSES} passes")
-        elif there:
+        name, label = command.words[1], "".join(command.words[2:3])
+        file = self.stack[-1][0] if name == "SELF" else self._read(command, name)
+        key = command.file, command.line, file, label
+        self.times[key] += 1
+        if self.times[key] > _MOST_PASSES:
+            self.script.note(command, f"a loop after its first {_MOST_PASSES} passes")
+            self.step = None
+            for changed, times in self.times.items():
+                if times > 1 and changed in self.variables:
+                    self.variables[str(changed)] = _Variable(_UNKNOWN)
+        elif file:
             before = self.stack.pop()
             if not self._enter(file, label):
-                self._note(command, f"jump to the label {label}, which is not there")
+                self.script.note(command, f"jump to the label {label}, which is not there")
                 self.stack.append(before)
-
-    def _labels(self) -> Iterator[str]:
-        """Labels of jumps that may have led past a ``quit``, each once."""
-        while self.left_out:
-            yield self.left_out.popitem()[0]
 
     def _branch(self, command: EngineCommand) -> None:
         """Execute the commands of an ``if`` whose condition holds, or may hold."""
@@ -292,9 +340,9 @@ class _Reader:
                        len(words))  # fmt: skip
             known = known and holds is not None
             if holds is not False:
-                mark = "if" if known and not command.within.endswith("?") else "if?"
+                carried = replace(command, within="if", uncertain=command.uncertain or not known)
                 for inner in words[begin:end]:
-                    self._execute(replace(command, text=without_comment(inner), within=mark))
+                    self._execute(replace(carried, text=without_comment(inner)))
             if holds and known:
                 return
             at = end + (words[end : end + 1] == ["elif"])
@@ -303,53 +351,58 @@ class _Reader:
         text = self._resolved(condition, command)
         value = value_of(text, self._word)
         if value is None:
-            self._note(command, f"if {condition}: both ways are followed")
+            self.script.note(command, f"if {condition}: both ways are followed")
         return None if value is None else bool(value)
 
     def _resolved(self, text: str, command: EngineCommand) -> str:
         """A text with values in place of variables, but not in quotation marks."""
+        self.depth += 1
         parts, at = [], 0
         while match := _REFERENCE.search(text, at):
             parts.append(text[at : match.start()])
             at = match.end()
-            name = match[2] or match[3]
-            if match[4]:
+            if match[4] and self.depth < _DEEPEST:
                 at = _closing(text, at)
                 number = value_of(self._resolved(text[match.end() : at - 1], command), self._word)
                 parts.append("$()" if number is None else f"{number:.15g}")
-            elif name:
-                parts.append(self._value(name, command))
             else:
-                parts.append(match[0])
+                name = match[2] or match[3]
+                parts.append(self._value(name, command) if name else match[0])
+        self.depth -= 1
         return "".join([*parts, text[at:]])
 
     def _value(self, name: str, command: EngineCommand) -> str:
         variable = self.variables.get(name)
+        value = None
         if variable is None:
-            if not command.within.endswith("?"):
+            if not command.uncertain:
                 self.missing.setdefault(name, command)
-            return f"${{{name}}}"
-        if variable.style == "equal":
+        elif variable.style == "equal":
             number = self._word(f"v_{name}")
-            return f"${{{name}}}" if number is None else f"{number:.15g}"
-        known = variable.style in ("index", "loop", "string") and variable.values
-        return variable.values[variable.at] if known else f"${{{name}}}"
+            value = None if number is None else f"{number:.15g}"
+        elif variable.style in ("index", "loop", "string") and variable.values:
+            value = variable.values[variable.at]
+        return f"${{{name}}}" if value is None or len(value) > _LONGEST_VALUE else value
 
     def _word(self, word: str) -> float | None:
         """The value of a word in a formula."""
-        if word == "PI":
-            return math.pi
-        if word in ("dt", "step"):
-            return self.timestep if word == "dt" else self.step
+        known = {"PI": math.pi, "dt": self.timestep, "step": self.step}
+        if word in known:
+            return known[word]
         variable = self.variables.get(word[2:]) if word.startswith("v_") else None
-        if variable is None or not variable.values or self.depth > 30:
+        self.count += 1
+        if not variable or not variable.values or self.depth > _DEEPEST or self.count > _MOST:
             return None
-        self.depth += 1
-        try:
-            value = variable.values[variable.at]
-            return value_of(self._resolved(value, EngineCommand("", [], "?")), self._word)
-        finally:
-            self.depth -= 1
+        value = variable.values[variable.at]
+        return value_of(self._resolved(value, _NOWHERE), self._word)
+
+
+def is_there(file: Path) -> bool:
+    """Whether a file is there, whatever its name is."""
+    try:
+        return file.exists()
+    except OSError:
+        return False
 
 
 def _closing(text: str, at: int) -> int:

@@ -1,29 +1,28 @@
 """Formulas of LIGGGHTS: the value of those that need no running simulation."""
 
-import ast
 import math
 import operator
 import re
 from collections.abc import Callable, Mapping
-from typing import Any
 
-_OPERATORS: Mapping[type[ast.AST], Callable[..., Any]] = {
-    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul,
-    ast.Div: operator.truediv, ast.Mod: math.fmod, ast.Pow: operator.pow,
-    ast.USub: operator.neg, ast.UAdd: operator.pos, ast.Not: operator.not_,
-    ast.Eq: operator.eq, ast.NotEq: operator.ne, ast.Lt: operator.lt, ast.LtE: operator.le,
-    ast.Gt: operator.gt, ast.GtE: operator.ge,
+_TOKEN = re.compile(r"\s*(?:((?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[A-Za-z_]\w*|"
+                    r"&&|\|\||[<>=!]=|[-+*/%^<>!(),]))")  # fmt: skip
+_BINARY: Mapping[str, tuple[int, Callable[[float, float], float]]] = {
+    "||": (1, lambda a, b: a != 0 or b != 0), "&&": (2, lambda a, b: a != 0 and b != 0),
+    "==": (3, operator.eq), "!=": (3, operator.ne), "<": (4, operator.lt), "<=": (4, operator.le),
+    ">": (4, operator.gt), ">=": (4, operator.ge), "+": (5, operator.add), "-": (5, operator.sub),
+    "*": (6, operator.mul), "/": (6, operator.truediv), "%": (6, math.fmod), "^": (7, math.pow),
 }  # fmt: skip
-_FUNCTIONS: Mapping[str, Callable[..., Any]] = {
+"""Operators with their rank, as LIGGGHTS has them; those of the same rank from left to right."""
+
+_UNARY: Mapping[str, Callable[[float], float]] = {"-": operator.neg, "!": operator.not_}
+_UNARY_RANK = 8
+_FUNCTIONS: Mapping[str, Callable[..., float]] = {
     "sqrt": math.sqrt, "exp": math.exp, "ln": math.log, "log": math.log10, "abs": abs,
     "sin": math.sin, "cos": math.cos, "tan": math.tan, "asin": math.asin, "acos": math.acos,
     "atan": math.atan, "atan2": math.atan2, "ceil": math.ceil, "floor": math.floor,
     "round": lambda x: math.floor(x + 0.5),
 }  # fmt: skip
-_AS_PYTHON = (
-    (r"\^", "**"), (r"&&", " and "), (r"\|\|", " or "), (r"!(?!=)", " not "),
-    (r"(?<![\w.])0+(?=\d)", ""),
-)  # fmt: skip
 _LONGEST = 1000
 
 
@@ -36,38 +35,41 @@ def value_of(formula: str, name: Callable[[str], float | None]) -> float | None:
     name : callable
         The value of a word such as ``PI`` or ``v_x``, or None.
     """
-    for pattern, replacement in _AS_PYTHON:
-        formula = re.sub(pattern, replacement, formula)
-    try:
-        if len(formula) > _LONGEST:
-            return None
-        return float(_value(ast.parse(formula.strip(), mode="eval").body, name))
-    except (ArithmeticError, KeyError, RecursionError, SyntaxError, TypeError, ValueError):
+    tokens = _TOKEN.findall(formula)[::-1]
+    if len(formula) > _LONGEST or "".join(formula.split()) != "".join(tokens[::-1]):
         return None
+    try:
+        value = float(_value(tokens, name))
+    except (ArithmeticError, LookupError, RecursionError, TypeError, ValueError):
+        return None
+    return value if math.isfinite(value) and not tokens else None
 
 
-def _value(node: ast.AST, name: Callable[[str], float | None]) -> Any:
-    match node:
-        case ast.Constant(value=int() | float() as number):
-            return float(number)
-        case ast.Name(id=word):
-            return name(word)
-        case ast.UnaryOp(op=action, operand=inner):
-            return _OPERATORS[type(action)](_value(inner, name))
-        case ast.BinOp(left=left, op=action, right=right):
-            return _OPERATORS[type(action)](_value(left, name), _value(right, name))
-        case ast.Compare(left=left, ops=[action], comparators=[right]):
-            return _OPERATORS[type(action)](_value(left, name), _value(right, name))
-        case ast.BoolOp(op=ast.And(), values=parts):
-            return all([_known(_value(part, name)) for part in parts])
-        case ast.BoolOp(values=parts):
-            return any([_known(_value(part, name)) for part in parts])
-        case ast.Call(func=ast.Name(id=word), args=parts):
-            return _FUNCTIONS[word](*(_value(part, name) for part in parts))
-    raise ValueError(ast.dump(node))
-
-
-def _known(value: float | None) -> float:
-    if value is None:
-        raise TypeError(value)
+def _value(tokens: list[str], name: Callable[[str], float | None], above: int = 0) -> float:
+    """The value of tokens in reverse order up to an operator of this rank or a lower one."""
+    token = tokens.pop()
+    if token in _UNARY:
+        value = _UNARY[token](_value(tokens, name, _UNARY_RANK))
+    elif token == "(":
+        (value,) = _bracket(tokens, name)
+    elif tokens[-1:] == ["("]:
+        tokens.pop()
+        value = _FUNCTIONS[token](*_bracket(tokens, name))
+    else:
+        known = float(token) if token[0] in ".0123456789" else name(token)
+        if known is None:
+            raise ValueError(token)
+        value = known
+    while tokens and (rank := _BINARY.get(tokens[-1], (0,))[0]) > above:
+        value = _BINARY[tokens.pop()][1](value, _value(tokens, name, rank))
     return value
+
+
+def _bracket(tokens: list[str], name: Callable[[str], float | None]) -> list[float]:
+    """The values up to a closing bracket, which is taken too."""
+    values = [_value(tokens, name)]
+    while (token := tokens.pop()) == ",":
+        values.append(_value(tokens, name))
+    if token != ")":
+        raise ValueError(token)
+    return values

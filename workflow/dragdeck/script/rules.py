@@ -1,27 +1,28 @@
 """Rules on an input script: each hit is a fact that LIGGGHTS does not tell."""
 
 import math
-from collections.abc import Callable, Iterator
-from itertools import combinations
+from collections.abc import Callable
 
-from dragdeck.script.commands import EngineCommand, names_read
-from dragdeck.script.facts import Facts, Fix, number, numbers
-from dragdeck.script.findings import Finding, NotApplied, at
-from dragdeck.script.flow import Script
+from dragdeck.script.commands import names_read
+from dragdeck.script.facts import ContactModel, Facts, Fix, as_number, as_numbers
+from dragdeck.script.findings import Finding, NotApplied, Results, at
+from dragdeck.script.flow import Script, is_there
 
 _MOST_BINS = 2e7
 _BINS_PER_PARTICLE = 100
 _BYTES_PER_BIN = 4
+_MOST_MOTIONS = 50
+"""Of a mesh, that are compared with a later one."""
+
 _RANDOM_FRACTION = 0.3
 """Solid fraction up to which spheres are inserted at random places without fail."""
-
 
 _COEFFICIENTS = {
     "tangential": "coefficientFriction",
     "rolling_friction": "coefficientRollingFriction",
     "cohesion": "cohesionEnergyDensity",
 }
-"""Keywords of a contact law, with the coefficient that each needs."""
+"""Keywords of a contact model, with the coefficient that each needs."""
 
 _NEEDS = {
     "coefficientRollingFriction": ("rolling_friction", ()),
@@ -30,172 +31,144 @@ _NEEDS = {
 }
 """Properties with the keyword that they need, and models of it that do not read them."""
 
-Result = Iterator[Finding | NotApplied]
-
 
 def script_findings(script: Script) -> list[Finding | NotApplied]:
     """What the rules DK101 to DK112 say of a script, in the order of its lines."""
     facts = Facts(script)
     results = [result for rule in _RULES for result in rule(facts)]
-    order = list(script.texts)
-    return sorted(
-        results,
-        key=lambda r: (order.index(r.file), r.line) if isinstance(r, Finding) else (len(order), 0),
-    )
+    order = [*script.texts, ""]
+    return sorted(results, key=lambda r: (order.index(r.file), r.line))
 
 
-def no_friction(facts: Facts) -> Result:
+def no_friction(facts: Facts) -> Results:
     """DK101: friction without a tangential model."""
-    friction = facts.values("coefficientFriction")
-    laws = [law for law in facts.laws if law.wall is None]
-    if any(friction) and laws and not laws[-1].has("tangential"):
-        message = f"a friction coefficient of {max(friction):g} has no effect between particles"
-        yield at("DK101", laws[-1].command, message, friction=max(friction))
+    friction = max(facts.values("coefficientFriction"), default=0.0)
+    last = [model for model in facts.models if not model.wall][-1:]
+    if friction and last and not last[0].command.uncertain and not last[0].has("tangential"):
+        message = f"a friction coefficient of {friction:g} has no effect between particles"
+        yield at("DK101", last[0].command, message, friction=friction)
 
 
-def different_wall(facts: Facts) -> Result:
+def different_wall(facts: Facts) -> Results:
     """DK102: walls without a model that the particles have, and with a coefficient for it."""
-    particles = [law for law in facts.laws if law.wall is None]
+    particles = [model for model in facts.models if not model.wall]
+    kinds = {as_number(fix.word("atom_type")) for fix in facts.styled("particletemplate/")}
     for keyword, name in _COEFFICIENTS.items() if particles else ():
-        model, several = particles[0].has(keyword), len(facts.values(name)) > 1
-        lacking = [
-            (law, law.wall, value)
-            for law in facts.laws
-            if law.wall and law.wall.end == math.inf and not law.has(keyword)
-            and (value := _at_wall(facts, law.wall, name))
-        ]  # fmt: skip
-        if lacking and model and (keyword != "cohesion" or model.startswith("sjkr")):
-            law, _, value = lacking[0]
-            walls = ", ".join(dict.fromkeys(wall.id for _, wall, _ in lacking))
-            message = f"no {keyword} {model} at the walls {walls}: {name} {value:g} has no effect"
-            yield at("DK102", law.command, message, "" if several else "note", value=value)
+        model, rows = particles[0].has(keyword), facts.matrix(name)
+        if not model or (keyword == "cohesion" and not model.startswith("sjkr")):
+            continue
+        types = range(1, len(rows) + 1)
+        inserted = [row for kind, row in zip(types, rows, strict=True) if kind in kinds] or rows
+        lacking: dict[str, tuple[ContactModel, float]] = {}
+        for wall in facts.models:
+            if wall.wall and wall.wall.end == math.inf and not wall.has(keyword):
+                sides = {kind for kind in facts.wall_types(wall.wall) if kind in types}
+                value = max((row[kind - 1] for row in inserted for kind in sides), default=0.0)
+                lacking |= {wall.wall.id: (wall, value)} if value else {}
+        if lacking:
+            wall, value = next(iter(lacking.values()))
+            message = f"no {keyword} {model} at the walls {', '.join(lacking)}: {name} {value:g}"
+            severity = "" if len(rows) > 1 else "note"
+            yield at("DK102", wall.command, f"{message} has no effect", severity, value=value)
 
 
-def _at_wall(facts: Facts, wall: Fix, name: str) -> float:
-    """The largest coefficient of particles with a wall."""
-    types = math.isqrt(len(facts.values(name)))
-    kinds = {"".join(fix.after("atom_type")) for fix in facts.styled("particletemplate/")}
-    inserted = {int(kind) for kind in kinds if kind.isdigit()} or range(1, types + 1)
-    pairs = [facts.of_pair(name, a, b) for b in facts.wall_types(wall) for a in inserted]
-    return max((value for value in pairs if value is not None), default=0.0)
-
-
-def unused_property(facts: Facts) -> Result:
-    """DK103: a property that no contact law reads."""
-    if not facts.laws or len([*facts.named("pair_style")]) > len(
-        [w for w in facts.laws if not w.wall]
-    ):
+def unused_property(facts: Facts) -> Results:
+    """DK103: a property that no contact model reads."""
+    known = [model for model in facts.models if not model.wall]
+    if not known or len([*facts.named("pair_style")]) > len(known):
         return
     for name, (keyword, others) in _NEEDS.items():
-        models = {law.has(keyword) for law in facts.laws}
-        if any(facts.values(name)) and models <= {"", *others}:
-            command, value = facts.properties(name)[-1].command, max(facts.values(name))
+        models = {model.has(keyword) for model in facts.models}
+        value = max(facts.values(name), default=0.0)
+        if value and models <= {"", *others}:
             model = f"no contact law has {keyword}"
             if models - {""}:
                 model = f"{keyword} {', '.join(sorted(models - {''}))} does not read it"
+            command = facts.properties(name)[-1].command
             yield at("DK103", command, f"{name} {value:g} has no effect: {model}", value=value)
 
 
-def spinning(facts: Facts) -> Result:
+def spinning(facts: Facts) -> Results:
     """DK104: epsd or epsd2 without torsionTorque on."""
-    for law in () if facts.dialect else facts.laws:
-        model = law.has("rolling_friction")
-        if model.startswith("epsd") and not law.has("torsionTorque"):
-            yield at("DK104", law.command, f"rolling_friction {model} without torsionTorque on")
+    for model in () if facts.dialect else facts.models:
+        rolling = model.has("rolling_friction")
+        if rolling.startswith("epsd") and not model.has("torsionTorque"):
+            yield at("DK104", model.command, f"rolling_friction {rolling} without torsionTorque on")
             return
 
 
-def empty_grid(facts: Facts) -> Result:
+def empty_grid(facts: Facts) -> Results:
     """DK105: a neighbour grid with far more bins than particles."""
-    skin = number("".join(facts.last("neighbor")[:1]))
-    boundary = facts.last("boundary")[:3]
-    if any(set(word) & set("s$") for word in boundary):
+    skin = as_number("".join(facts.last("neighbor")[:1]))
+    if set("s$") & set("".join(facts.last("boundary")[:3])):
         return
     if facts.box is None or facts.radii is None or skin is None:
         yield NotApplied("DK105", "box, largest radius or skin")
         return
     size = (2 * max(facts.radii) + skin) / 2
-    bins = math.prod((high - low) / size for low, high in facts.box)
-    particles = _particles(facts)
-    if bins > _MOST_BINS and (particles is None or bins > _BINS_PER_PARTICLE * particles):
+    bins = math.prod((high - low) / size for low, high in facts.box.bounds) if size > 0 else 0.0
+    words = [fix.word("nparticles") or fix.word("particles_in_region")
+             for fix in facts.styled("insert/")]  # fmt: skip
+    particles = sum(as_numbers(words) or ())
+    if bins > _MOST_BINS and bins > _BINS_PER_PARTICLE * particles:
+        count = f" for {particles:,.0f} particles" if particles else ""
+        message = f"the box has {bins:.2g} bins{count}: about {bins * _BYTES_PER_BIN / 1e9:.2g} GB,"
         command = next(facts.named("create_box"))
-        count = "" if particles is None else f" for {particles:,.0f} particles"
-        yield at(
-            "DK105", command,
-            f"the box has {bins:.2g} bins{count}: about {bins * _BYTES_PER_BIN / 1e9:.2g} GB, and "
-            "slow neighbour lists",
-            bins=bins,
-        )  # fmt: skip
+        yield at("DK105", command, f"{message} and slow neighbour lists", bins=bins)
 
 
-def _particles(facts: Facts) -> float | None:
-    """The number of particles that are inserted; None if one is not known."""
-    counts = [
-        number("".join(fix.after("nparticles") or fix.after("particles_in_region")))
-        for fix in facts.styled("insert/")
-    ]
-    return None if not counts or None in counts else sum(filter(None, counts))
-
-
-def too_dense(facts: Facts) -> Result:
+def too_dense(facts: Facts) -> Results:
     """DK106: an insertion beyond the solid fraction of random places."""
     for fix in facts.styled("insert/pack"):
-        volume = facts.volume("".join(fix.after("region")))
-        every = fix.after("insert_every")[:1] == ["once"]
-        count = fix.after("particles_in_region") or (fix.after("nparticles") if every else ())
-        share = number("".join(fix.after("volumefraction_region")))
-        if share is None and volume and facts.radii and number("".join(count)) is not None:
-            share = float("".join(count)) * 4 / 3 * math.pi * min(facts.radii) ** 3 / volume
-        if "no" in fix.after("overlapcheck"):
+        if fix.word("overlapcheck") == "no":
             continue
-        if share is None:
+        once = fix.word("insert_every") == "once"
+        count = fix.word("particles_in_region") or (fix.word("nparticles") if once else "")
+        fraction, particles = as_number(fix.word("volumefraction_region")), as_number(count)
+        region = facts.regions.get(fix.word("region"))
+        if fraction is None and region and region.volume and facts.radii and particles is not None:
+            fraction = particles * 4 / 3 * math.pi * min(facts.radii) ** 3 / region.volume
+        if fraction is None:
             yield NotApplied("DK106", f"radius or region of the insertion {fix.id}")
-        elif share > _RANDOM_FRACTION:
-            message = f"the insertion {fix.id} asks for a solid fraction of {share:.2g}"
-            yield at("DK106", fix.command, message, solid_fraction=share)
+        elif fraction > _RANDOM_FRACTION:
+            message = f"the insertion {fix.id} asks for a solid fraction of {fraction:.2g}"
+            yield at("DK106", fix.command, message, solid_fraction=fraction)
 
 
-def refused_value(facts: Facts) -> Result:
+def refused_value(facts: Facts) -> Results:
     """DK107: values that LIGGGHTS 3.8.0 refuses."""
-    from dragdeck.physics.contact_mechanics import ENGINE_HARD_PA, ENGINE_SOFTEST_PA
-
     if facts.dialect:
         yield NotApplied("DK107", f"the script is for {facts.dialect}")
         return
-    allowed = {
-        c.words[0] for c in facts.named("soft_particles", "hard_particles") if "yes" in c.words
-    }
+    from dragdeck.physics.contact_mechanics import ENGINE_HARD_PA, ENGINE_SOFTEST_PA
+
+    words = "a coefficient of restitution"
+    limits = {"coefficientRestitution": (math.nextafter(0.05, 1), 1.0, words, "")}
     if facts.last("units")[:1] == ["si"]:
-        for fix in facts.properties("youngsModulus"):
-            for value in numbers(fix.words[3:]) or []:
-                soft = value < ENGINE_SOFTEST_PA and "soft_particles" not in allowed
-                hard = value > ENGINE_HARD_PA and "hard_particles" not in allowed
-                if soft or hard:
-                    needed = "soft_particles" if soft else "hard_particles"
-                    message = f"a Young's modulus of {value:g} Pa without {needed} yes"
-                    yield at("DK107", fix.command, message, value=value)
-                    break
+        limits["youngsModulus"] = (ENGINE_SOFTEST_PA, ENGINE_HARD_PA, "a Young's modulus", " Pa")
+    yes = {command.words[0] for command in facts.script.commands if "yes" in command.words}
     for fix, seed in facts.refused_seeds():
         yield at("DK107", fix.command, f"the seed {seed} is not a prime above 10,000", value=seed)
-    for fix in facts.properties("coefficientRestitution"):
-        wrong = [value for value in facts.values(fix.words[1]) if not 0.05 < value <= 1]
-        if wrong:
-            message = f"a coefficient of restitution of {wrong[0]:g}"
-            yield at("DK107", fix.command, message, value=wrong[0])
-    yield from _wrong_sizes(facts)
-
-
-def _wrong_sizes(facts: Facts) -> Result:
     for fix in facts.styled("property/global"):
-        words = fix.words
-        if words[2:3] == ["peratomtypepair"] and (values := numbers(words[3:])):
-            types, count = int(values[0]), len(values) - 1
-            if count != types**2:
-                message = f"{words[1]} has {count} values for {types} types, not {types**2}"
-                yield at("DK107", fix.command, message, value=count)
+        name, form, values = *[*fix.words[1:3], "", ""][:2], as_numbers(fix.words[3:])
+        if values and form == "peratomtypepair":
+            types, *values = values
+            if len(values) != types * types:
+                message = (
+                    f"{name} has {len(values)} values for {types:g} types, not {types * types:g}"
+                )
+                yield at("DK107", fix.command, message, value=len(values))
+        low, high, words, unit = limits.get(name, (-math.inf, math.inf, "", ""))
+        for value in values or ():
+            needed = "soft_particles" if value < low else "hard_particles" if value > high else ""
+            if needed and not (unit and needed in yes):
+                message = f"{words} of {value:g}{unit}"
+                message += f" without {needed} yes" if unit else ""
+                yield at("DK107", fix.command, message, value=value)
+                break
 
 
-def absent(facts: Facts) -> Result:
+def absent(facts: Facts) -> Results:
     """DK108: variables that nothing defines, and files that are not there."""
     script = facts.script
     for name, command in script.undefined.items():
@@ -204,79 +177,76 @@ def absent(facts: Facts) -> Result:
         yield at("DK108", command, f"the script {name} is not there")
     read = {name: command for command in script.commands for name in names_read(command.words)}
     written = {w for c in script.commands if not names_read(c.words) for w in c.words}
-    for name, command in read.items() if not script.in_memory else ():
-        there = "*" in name or "$" in name or (script.file.parent / name).exists()
-        if not there and name not in written:
+    if read and script.changes_files:
+        yield NotApplied("DK108", "the script makes or moves files itself")
+    for name, command in read.items() if not (script.in_memory or script.changes_files) else ():
+        if not set("*$") & set(name) | {name} & written and not is_there(script.folder / name):
             restart = command.words[0] in ("read_restart", "variable")
             yield at("DK108", command, f"the file {name} is not there", "note" if restart else "")
 
 
-def mesh_without_wall(facts: Facts) -> Result:
+def mesh_without_wall(facts: Facts) -> Results:
     """DK109: a mesh that nothing but a motion names."""
-    for mesh in facts.styled("mesh/surface"):
-        users = [
-            command
-            for command in facts.script.commands
-            if command is not mesh.command
-            and command.words[0] not in ("unfix", "group", "variable")
-            and (mesh.id in command.words[2:] or _refers(command, mesh.id))
-            and command.words[3:4] != ["move/mesh"]
-        ]  # fmt: skip
-        if not users:
-            moved = any(mesh.id in fix.words for fix in facts.styled("move/mesh"))
-            what = "is moved, but no wall" if moved else "is in no wall"
-            yield at("DK109", mesh.command, f"the mesh {mesh.id} {what}: particles pass through it")
+    used, moved = set[str](), set[str]()
+    for command in facts.script.commands:
+        kind = "".join(command.words[3:4])
+        if command.words[0] not in ("unfix", "group", "variable") and "mesh/surface" not in kind:
+            names = moved if kind == "move/mesh" else used
+            names.update(word.removeprefix("f_").partition("[")[0] for word in command.words[2:])
+    for name in facts.meshes.keys() - used:
+        what = "is moved, but no wall" if name in moved else "is in no wall"
+        message = f"the mesh {name} {what}: particles pass through it"
+        yield at("DK109", facts.meshes[name].command, message)
 
 
-def _refers(command: EngineCommand, name: str) -> bool:
-    return any(f"f_{name}[" in word for word in command.words)
-
-
-def centre_left_behind(facts: Facts) -> Result:
+def centre_left_behind(facts: Facts) -> Results:
     """DK110: simultaneous motions of a mesh of which a rotation keeps its centre."""
-    motions = facts.styled("move/mesh")
     resumed = any(facts.named("read_restart"))
-    for first, second in combinations(motions, 2):
-        same = first.after("mesh") == second.after("mesh") and second.begin < first.end
-        if not same or first.command.line == second.command.line:
+    earlier: dict[str, list[Fix]] = {}
+    for motion in facts.styled("move/mesh"):
+        earlier.setdefault(motion.word("mesh"), []).append(motion)
+    pairs = [(first, second) for motions in earlier.values() for place, second in enumerate(motions)
+             for first in motions[max(place - _MOST_MOTIONS, 0) : place]]  # fmt: skip
+    for first, second in pairs:
+        if second.begin >= first.end or first.command.line == second.command.line:
             continue
-        kinds = [fix.words[3] if len(fix.words) > 3 else "" for fix in (first, second)]
+        kinds = ["".join(fix.words[3:4]) for fix in (first, second)]
         if kinds[0] == "rotate" and kinds[1] in ("linear", "wiggle") and _across(first, second):
             message = f"the rotation {first.id} is defined before the translation {second.id}"
             yield at("DK110", second.command, f"{message}: its centre stays behind")
-        elif kinds[1] == "rotate" and resumed and numbers(second.after("origin", 3)):
+        elif kinds[1] == "rotate" and resumed and second.vector("origin"):
             message = f"after read_restart, the centre of the rotation {second.id} is that before"
             yield at("DK110", second.command, f"{message} the motion {first.id}")
 
 
 def _across(turn: Fix, shift: Fix) -> bool:
     """Whether a translation is not along the axis of a rotation."""
-    axis = numbers(turn.after("axis", 3))
-    way = numbers(shift.after("linear", 3) or shift.after("amplitude", 3))
-    if not axis or not way or len(axis) < 3 or len(way) < 3:
+    axis, way = turn.vector("axis"), shift.vector("linear") or shift.vector("amplitude")
+    if not axis or not way:
         return False
     length = math.hypot(*axis) * math.hypot(*way)
     return abs(sum(a * b for a, b in zip(axis, way, strict=True))) < length * (1 - 1e-6)
 
 
-def evaluated_again(facts: Facts) -> Result:
+def evaluated_again(facts: Facts) -> Results:
     """DK111: contact forces in a dump."""
+    columns = {w.partition("[")[0] for dump in facts.named("dump") for w in dump.words[5:]}
     for compute in facts.named("compute"):
         words = compute.words
         local = words[3:4] in (["pair/gran/local"], ["wall/gran/local"])
-        if local and any(word.startswith("force") for word in words[4:]):
-            name = f"c_{words[1]}["
-            if any(word.startswith(name) for c in facts.named("dump") for word in c.words):
-                yield at("DK111", compute, f"the forces of {words[3]} are not those of the step")
-                return
+        forces = local and any(word.startswith("force") for word in words[4:])
+        if forces and f"c_{words[1]}" in columns:
+            yield at("DK111", compute, f"the forces of {words[3]} are not those of the step")
+            return
 
 
-def unmeasurable(facts: Facts) -> Result:
+def unmeasurable(facts: Facts) -> Results:
     """DK112: no dump with ids and radii; contacts that are computed too late."""
-    dumps = [c for c in facts.named("dump") if c.words[3:4] and c.words[3].startswith("custom")]
-    if dumps and facts.laws and not any({"id", "radius", "x"} <= set(c.words) for c in dumps):
-        lacking = [name for name in ("id", "radius", "x") if name not in dumps[0].words]
-        yield at("DK112", dumps[0], f"no dump has {' and '.join(lacking)}")
+    needed = ("id", "radius", "x")
+    dumps = [c for c in facts.named("dump") if "".join(c.words[3:4]).startswith("custom")]
+    if dumps and facts.models and not any({*needed} <= set(dump.words) for dump in dumps):
+        lacking = " and ".join(name for name in needed if name not in dumps[0].words)
+        yield at("DK112", dumps[0], f"no dump has {lacking}")
     ran = False
     for command in facts.script.commands:
         ran = (ran or command.words[0] == "run") and command.words[0] != "clear"
@@ -286,7 +256,7 @@ def unmeasurable(facts: Facts) -> Result:
             return
 
 
-_RULES: tuple[Callable[[Facts], Result], ...] = (
+_RULES: tuple[Callable[[Facts], Results], ...] = (
     no_friction, different_wall, unused_property, spinning, empty_grid, too_dense, refused_value,
     absent, mesh_without_wall, centre_left_behind, evaluated_again, unmeasurable,
 )  # fmt: skip
