@@ -215,27 +215,26 @@ class _Bytes:
             (np.dtype(each.kind).itemsize, int(each.length[1:] or 0), each.length.startswith("i"))
             for each in element.properties
         ]
-        firsts, lengths = np.ones((2, len(sizes), rows), np.int64)
-        for row in range(rows):
-            place = self._place
-            for column, (size, width, signed) in enumerate(sizes):
+        begins, counts, body, place = list[int](), list[int](), self._body, self._place
+        for _ in range(rows):
+            for size, width, signed in sizes:
+                count = 1
                 if width:
-                    count = self._body[place : place + width]
-                    lengths[column, row] = int.from_bytes(count, byte_order, signed=signed)
+                    count = int.from_bytes(body[place : place + width], byte_order, signed=signed)
                     place += width
-                firsts[column, row] = place
-                place += size * max(int(lengths[column, row]), 0)
-            if place > len(self._body) or lengths[:, row].min() < 0:
+                begins.append(place)
+                counts.append(count)
+                place += size * count
+            if place > len(body) or min(counts[-len(sizes) :]) < 0:
                 raise self._short(element)
             self._place = place
         values = dict[str, Any]()
-        for each, first, length, (size, *_) in zip(
-            element.properties, firsts, lengths, sizes, strict=True
-        ):
-            begins = np.repeat(first - size * (np.cumsum(length) - length), length)
-            items = (begins + size * np.arange(len(begins)))[:, None] + np.arange(size)
-            numbers_of = np.frombuffer(self._body, np.uint8)[items].view(self._order + each.kind)
-            values[each.name] = (numbers_of.ravel(), length) if each.length else numbers_of.ravel()
+        for number, (each, (size, *_)) in enumerate(zip(element.properties, sizes, strict=True)):
+            first, length = (np.array(part[number :: len(sizes)]) for part in (begins, counts))
+            starts = np.repeat(first - size * (np.cumsum(length) - length), length)
+            items = (starts + size * np.arange(len(starts)))[:, None] + np.arange(size)
+            numbers_of = np.frombuffer(body, np.uint8)[items].view(self._order + each.kind).ravel()
+            values[each.name] = (numbers_of, length) if each.length else numbers_of
         return rows, values
 
     def _kind(self, element: _Element) -> np.dtype[Any]:
@@ -342,6 +341,14 @@ class _Lines:
 def _quick_words(text: str) -> tuple[Floats, Integers, Integers] | None:
     """Numbers in lines of words, how many are in each line, and which lines these are, from 0."""
     content = text.encode()
+    width = content.partition(b"\n")[0].count(b" ") + 1
+    alike = quick_columns(content + b"\n", [NUMBER] * width)
+    if alike is not None:
+        return (
+            np.column_stack(alike).ravel(),
+            np.full(len(alike[0]), width),
+            np.arange(len(alike[0])),
+        )
     columns = quick_columns(content.replace(b" ", b"\n") + b"\n", [NUMBER])
     if columns is None:
         return None

@@ -25,6 +25,9 @@ BLANK = " \t;,\x1a"
 
 LINE = re.compile("\n")
 
+_SHORTEST = 2
+"""Characters of the shortest row, its end included."""
+
 _MISSING = ("", "nan", "n/a", "#n/a", "#nv", "null")
 MOST_MISSING = 0.01
 """Part of the values of a column that may be missing where its reader can do without them."""
@@ -85,12 +88,15 @@ class Table:
             it may be a decimal comma or not; it names the line of each in the first bad piece.
         """
         rows = _Rows(self, [*names], gaps)
-        read, count = [rows.none], 0
+        read, count, missing, left = [rows.none], 0, 0, len(self.text)
         try:
             for line, text in pieces(self.text, LINE, "a line"):
                 read.append(rows.read(self.first_line + line - 1, text))
-                count += len(read[-1][0])
-                if self.most is not None and count > self.most:
+                lines, columns = read[-1]
+                count, left = count + len(lines), left - len(text)
+                missing += np.isnan(columns).sum(axis=1).max()
+                many = missing > MOST_MISSING * (count + left / _SHORTEST)
+                if many or (self.most is not None and count > self.most):
                     break
         except InputError as error:
             if error.file is None:
