@@ -19,7 +19,7 @@ def class_numbers(particle_id: Ints, first_ids: Sequence[int]) -> Ints:
     return np.searchsorted(first_ids or [1], particle_id, side="right") - 1
 
 
-def values_of(column: Any) -> NDArray[Any]:
+def numpy_of(column: Any) -> NDArray[Any]:
     """A column of numbers of pyarrow, (N,), NaN where it has none; its own way imports pandas."""
     parts = [np.empty(0, str(column.type))]
     for chunk in column.chunks:
@@ -85,7 +85,7 @@ def quick_columns(
         elif kind in (NUMBER, WHOLE):
             if column.null_count:
                 return None
-            numbers.append(values_of(column))
+            numbers.append(numpy_of(column))
         elif kind != END and not compute.all(compute.equal(column, kind)).as_py():
             return None
     return numbers

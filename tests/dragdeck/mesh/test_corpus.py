@@ -119,6 +119,7 @@ READ: dict[str, str | bytes] = {
     "groups.obj": f"g a b\n{NODES}s 1\nusemtl x y\n{ROWS}",
     "quadrilaterals and triangles.obj": NODES
     + "".join([*POLYGONS.splitlines(True)[:1], *ROWS.splitlines(True)[2:]]),
+    "a corner of a pentagon twice.obj": NODES + POLYGONS.replace("f 1 3 4", "f 1 3 3 3 4"),
     "a corner twice in a row.obj": NODES + POLYGONS.replace("f 1 3 4", "f 1 3 3 4"),
     "it goes on at its end.obj": NODES + ROWS.rstrip() + " \\",
     "decimal commas.obj": (NODES + ROWS).replace("40", "40,0"),
@@ -240,6 +241,9 @@ REFUSED: dict[str, tuple[str | bytes, str, int | None]] = {
     "a long line.obj": (f"{NODES}f {'1 2 3 ' * 4000}\n", "too many words", 9),
     "two corners.obj": (f"{NODES}{ROWS}f 1 2\n", "too few corners", 21),
     "no node.obj": (f"{NODES}{ROWS}f 1 2 9\n", "not there", 21),
+    "a bent polygon.obj": ("v -5 0 5\nv 5 0 5\nv 5 0 -5\nv -5 0 -5\nv 0 5 -5\nf 1 2 3 4 5\n",
+                           "cannot be divided into triangles", None),
+    "the same corners.obj": (f"{NODES}f {'1 2 4 3 ' * 9}\n", "cannot be divided", None),
     "no node 0.obj": (f"{NODES}{ROWS}f 0 1 2\n", "not there", 21),
     "no whole number.obj": (f"{NODES}{ROWS}f 1.0 2.0 3.0\n", "not a corner", 21),
     "empty.stl": ("", "neither text nor whole binary", None),

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from dragdeck.arrays import ANY, END, TEXT, Floats, Ints, quick_columns, values_of
+from dragdeck.arrays import ANY, END, TEXT, Floats, Ints, numpy_of, quick_columns
 from dragdeck.errors import InputError, together
 from dragdeck.mesh.polygons import pieces
 
@@ -195,7 +195,7 @@ class _Rows:
     def _plain(self, lines: Ints, cells: Sequence[Any]) -> _Piece | None:
         """Plain numbers, and empty cells where there may be gaps, but for rows without a value."""
         try:
-            columns = [values_of(self._pointed(column).cast("float64")) for column in cells]
+            columns = [numpy_of(self._pointed(column).cast("float64")) for column in cells]
         except ValueError:
             return None
         empty = [column.null_count if name in self.gaps else 0
@@ -315,10 +315,10 @@ def _divided(content: bytes, cells: int) -> bytes:
     Rows in which these commas are not between digits are returned as they are.
     """
     marks = np.frombuffer(content, np.uint8).copy()
-    ends, commas = np.flatnonzero(marks == ord("\n")), np.flatnonzero(marks == ord(","))
-    if len(commas) != (cells - 1) * len(ends):
+    ends, places = np.flatnonzero(marks == ord("\n")), np.flatnonzero(marks == ord(","))
+    if len(places) != (cells - 1) * len(ends):
         return content
-    commas = commas.reshape(len(ends), cells - 1)
+    commas = places.reshape(len(ends), cells - 1)
     decimal = commas[:, ::2]
     beside = marks[np.concatenate([decimal - 1, decimal + 1])]
     even = (commas[:, -1] < ends).all() and (commas[1:, 0] > ends[:-1]).all()
