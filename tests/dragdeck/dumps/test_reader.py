@@ -193,6 +193,21 @@ def test_a_column_keeps_its_type(tmp_path: Path, before: str, after: str, messag
         next(frames)
 
 
+@pytest.mark.parametrize(
+    ("written", "message"),
+    [
+        (head("id x x") + "3 0.5 0.25\n", "row 0: x is 0.5 and 0.25"),
+        (head("id element x x") + "3 Si 0.5 0.25\n", "row 0: x is b'0.5' and b'0.25'"),
+        (head("id x", 2) + "3 1\n9007199254740993 1\n", "row 1: id is 9007199254740992"),
+    ],
+)
+def test_what_could_be_another_number_is_refused(tmp_path: Path, written: str, message) -> None:
+    file = tmp_path / "a.dump"
+    file.write_text(written)
+    with pytest.raises(DumpError, match=message):
+        next(read_dump(file))
+
+
 def test_a_last_row_without_line_end_is_read_with_a_word(tmp_path: Path) -> None:
     file = tmp_path / "a.dump"
     file.write_text(head("id x", 2) + "3 0.5\n4 0.25")

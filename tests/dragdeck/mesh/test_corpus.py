@@ -77,6 +77,26 @@ def binary_ply(list_count: str = "uchar", row: str = "<B3i", count: int = 3) -> 
     )
 
 
+def mixed_ply(order: str) -> bytes:
+    """Quadrilaterals and triangles in turn, each behind a list and a number of its own."""
+    faces = [QUADS[0], *FACETS[2:4], QUADS[2], *FACETS[6:8], QUADS[4], *FACETS[10:]]
+    extra = "property list ushort double knots\nproperty uchar part\n"
+    head = ply(face=f"{extra}property list char uint vertex_index\n").split("end_header")[0]
+    head = head.replace("face 12", f"face {len(faces)}")
+    if order == "ascii":
+        rows = [f"{n % 3}{n % 3 * ' 0.5'} {n} {len(face)} {' '.join(map(str, face))}\n"
+                for n, face in enumerate(faces)]  # fmt: skip
+        return f"{head}end_header\n{ply().split('end_header')[1][1:].split('3 0')[0]}".encode() + (
+            "".join(rows).encode()
+        )
+    mark = {"little": "<", "big": ">"}[order]
+    content = b"".join(struct.pack(f"{mark}3f", *point) for point in POINTS)
+    for n, face in enumerate(faces):
+        content += struct.pack(f"{mark}H{n % 3}dB", n % 3, *[0.5] * (n % 3), n)
+        content += struct.pack(f"{mark}b{len(face)}I", len(face), *face)
+    return head.replace("ascii", f"binary_{order}_endian").encode() + b"end_header\n" + content
+
+
 def vtk(cells: Sequence[Sequence[int]] = FACETS, kind: int = 5, dataset: str = "") -> str:
     size = sum(len(cell) + 1 for cell in cells)
     rows = "".join(f"{len(cell)} {' '.join(map(str, cell))}\n" for cell in cells)
@@ -99,6 +119,7 @@ READ: dict[str, str | bytes] = {
     "groups.obj": f"g a b\n{NODES}s 1\nusemtl x y\n{ROWS}",
     "quadrilaterals and triangles.obj": NODES
     + "".join([*POLYGONS.splitlines(True)[:1], *ROWS.splitlines(True)[2:]]),
+    "a corner of a pentagon twice.obj": NODES + POLYGONS.replace("f 1 3 4", "f 1 3 3 3 4"),
     "a corner twice in a row.obj": NODES + POLYGONS.replace("f 1 3 4", "f 1 3 3 4"),
     "it goes on at its end.obj": NODES + ROWS.rstrip() + " \\",
     "decimal commas.obj": (NODES + ROWS).replace("40", "40,0"),
@@ -126,6 +147,7 @@ READ: dict[str, str | bytes] = {
     "whole coordinates.ply": ply("property int x\nproperty int y\nproperty int z\n"),
     "binary.ply": binary_ply(),
     "binary, counts of 4 bytes.ply": binary_ply("int", "<4i"),
+    **{f"of several sizes, {order}.ply": mixed_ply(order) for order in ("ascii", "little", "big")},
     "triangles.vtk": vtk(),
     "quadrilaterals.vtk": vtk(QUADS, 9),
 }  # fmt: skip
@@ -219,6 +241,9 @@ REFUSED: dict[str, tuple[str | bytes, str, int | None]] = {
     "a long line.obj": (f"{NODES}f {'1 2 3 ' * 4000}\n", "too many words", 9),
     "two corners.obj": (f"{NODES}{ROWS}f 1 2\n", "too few corners", 21),
     "no node.obj": (f"{NODES}{ROWS}f 1 2 9\n", "not there", 21),
+    "a bent polygon.obj": ("v -5 0 5\nv 5 0 5\nv 5 0 -5\nv -5 0 -5\nv 0 5 -5\nf 1 2 3 4 5\n",
+                           "cannot be divided into triangles", None),
+    "the same corners.obj": (f"{NODES}f {'1 2 4 3 ' * 9}\n", "cannot be divided", None),
     "no node 0.obj": (f"{NODES}{ROWS}f 0 1 2\n", "not there", 21),
     "no whole number.obj": (f"{NODES}{ROWS}f 1.0 2.0 3.0\n", "not a corner", 21),
     "empty.stl": ("", "neither text nor whole binary", None),
@@ -246,6 +271,7 @@ REFUSED: dict[str, tuple[str | bytes, str, int | None]] = {
                      None),
     "an unknown type.ply": (ply("property quad x\n"), "not a line of a PLY header", 4),
     "cut.ply": (binary_ply()[:-1], "byte 508 of 520", None),
+    "cut among sizes.ply": (mixed_ply("big")[:-1], "byte 510 of 541", None),
     "a huge list.ply": (binary_ply("int", "<4i", 2**31 - 1), "not a row", None),
     "a negative list.ply": (binary_ply("int", "<4i", -3), "not a row", None),
     "polygon data.vtk": (vtk(dataset="POLYDATA"), "POLYDATA", None),

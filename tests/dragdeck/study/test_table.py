@@ -1,5 +1,7 @@
 """Tables of users: what is read, and what is refused instead of being cut, shifted or guessed."""
 
+import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -9,12 +11,23 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dragdeck.errors import InputError
-from dragdeck.study import table
+from dragdeck.study import rows, table
 from dragdeck.study.force_record import in_words, read_samples
 from dragdeck.study.reference import Signal
 from dragdeck.study.table import read_table
 
 TIME, FORCE = [0.0, 0.005, 0.01, 0.015], [-0.06, 0.42, -1234.5, 2.0]
+
+
+@pytest.fixture(params=["one piece", "a piece per line"])
+def in_pieces(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rows are the same wherever a piece of their file ends."""
+
+    def lines(text: str, *_: object) -> Iterator[tuple[int, str]]:
+        return enumerate(text.splitlines(keepends=True), 1)
+
+    if request.param != "one piece":
+        monkeypatch.setattr(rows, "pieces", lines)
 
 
 def written(folder: Path, content: str | bytes) -> Path:
@@ -35,6 +48,7 @@ def written(folder: Path, content: str | bytes) -> Path:
         "time_s,fx_n\n0,-0.06\n# a comment\n0.005,0.42\n\n0.01,-1234.5\n0.015,2",
     ],
 )  # fmt: skip
+@pytest.mark.usefixtures("in_pieces")
 def test_what_is_unambiguous_is_read(content: str, tmp_path: Path) -> None:
     time, force, _ = read_samples(written(tmp_path, content), "fx_n")
     np.testing.assert_array_equal(time, TIME)
@@ -79,12 +93,26 @@ EXPORTS: dict[str, tuple[str | bytes, str]] = {
     ),
     "signs of typesetters": ("time_s\tfx_n\n" + ROWS.replace("-", "\u2212"), "fx_n"),
     "milliseconds": ("t [ms],Fx [kN]\n0,-6e-5\n5,4.2e-4\n10,-1.2345\n15,2e-3\n", "fx_kn"),
+    "six components": (
+        "Dynamometer\nTime;Fx;Fy;Fz;Mx;My;Mz\ns;N;N;N;Nm;Nm;Nm\n"
+        + ROWS.replace(".", ",").replace("\t", ";").replace("\n", ";1,0;2;3;4,5;6\n"), "fx_n",
+    ),
+    "LabVIEW, a comment in its first row": (
+        "LabVIEW Measurement\t\n***End_of_Header***\t\nX_Value\tFx [N]\tComment\n"
+        + ROWS.replace("\n", "\tbegin\n", 1), "fx_n",
+    ),
+    "quotes": ('"Zeit [s]";"Fx [N]"\n' + "".join(
+        f'"{time}";"{force}"\n'.replace(".", ",") for time, force in zip(TIME, FORCE, strict=True)
+    ), "fx_n"),
+    "padded, with signs": (
+        "time_s ;fx_n\n" + ROWS.replace("\t", " ; ").replace("0.42", "+0.42"), "fx_n"),
     "UTF-16": (("time_s\tfx_n\n" + ROWS).encode("utf-16"), "fx_n"),
     "Latin-1": (("Prüfstand 3\ntime_s\tfx_n\n" + ROWS).encode("latin-1"), "fx_n"),
     "old line ends": (("time_s\tfx_n\n" + ROWS).replace("\n", "\r"), "fx_n"),
 }  # fmt: skip
 
 
+@pytest.mark.usefixtures("in_pieces")
 @pytest.mark.parametrize("program", EXPORTS)
 def test_exports_of_programs_give_the_same_numbers(program: str, tmp_path: Path) -> None:
     content, column = EXPORTS[program]
@@ -139,7 +167,7 @@ def test_no_digit_is_ever_lost(
     text = text.replace(".", ",") if comma else text
     file = written(tmp_path_factory.mktemp("table"), text)
     try:
-        (got,) = read_table(file).numbers(["fx_n"])
+        _, (got,) = read_table(file).numbers(["fx_n"])
     except InputError as error:
         assert comma and digits
         assert "decimal comma" in str(error)
@@ -166,6 +194,7 @@ REFUSED: dict[str, tuple[str | bytes, dict[str, Any], int | None, str]] = {
     "too large": (HEAD + "0,1e999\n", {}, 2, "a finite number"),
     "underscore": (HEAD + "0,1_000\n", {}, 2, "'1_000' is text"),
     "a blank line": ("fx_n\n1\n2\n\n4\n", {"rate_hz": 200}, 4, "series without times"),
+    "an open quotation": ('time_s,fx_n,note\n0,1,"a\n0.005,2,b"\n', {}, 2, "not a CSV file"),
     "a comment": ("fx_n\n1\n# 2\n3\n", {"rate_hz": 200}, 3, "series without times"),
     "a first comment": ("fx_n\n# 1\n2\n3\n", {"rate_hz": 200}, 2, "series without times"),
     "another rate": (HEAD + "0,1\n0.005,2\n0.01,3\n", {"rate_hz": 100}, None, "contradicts the"),
@@ -177,10 +206,12 @@ REFUSED: dict[str, tuple[str | bytes, dict[str, Any], int | None, str]] = {
     "the column twice": ("time_s,fx_n,fx_n\n0,1,2\n", {}, 1, "2 column(s)"),
     "a header of LabVIEW": ("LabVIEW Measurement\t\nSeparator\tTab\n", {}, 1, "no column(s)"),
     "a huge cell": (HEAD + '0,"' + "1" * 200_000, {}, 2, "not a CSV file"),
-    "empty": ("\n# nothing\n", {}, None, "the file is empty"),
+    "empty": ("\n", {}, None, "the file is empty"),
+    "comments alone": ("\n# nothing\n", {}, None, "nothing but comments within 2 lines"),
 }  # fmt: skip
 
 
+@pytest.mark.usefixtures("in_pieces")
 @pytest.mark.parametrize("name", REFUSED)
 def test_what_is_not_is_refused_with_its_line(name: str, tmp_path: Path) -> None:
     content, fields, line, words = REFUSED[name]
@@ -202,6 +233,21 @@ def test_errors_are_named_together_up_to_five(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="20 more such lines") as caught:
         read_samples(written(tmp_path, HEAD + rows), "fx_n")
     assert [error.line for error in (caught.value, *caught.value.more)] == [*range(2, 7), None]
+
+
+def test_of_a_long_table_the_first_bad_piece_is_told(tmp_path: Path) -> None:
+    file = written(tmp_path, HEAD + "0.005,-2.5\n" * 100_000 + "0.005,x\n" * 100_000)
+    with pytest.raises(InputError, match="'x' is text") as caught:
+        read_samples(file, "fx_n")
+    (*_, more) = caught.value.more
+    count, last = re.findall(r"[\d]+", more.problem)
+    assert (caught.value.line, int(last) - int(count)) == (100_002, 100_006)
+    assert int(last) < 200_001
+
+
+def test_a_series_below_its_unit_needs_no_times(tmp_path: Path) -> None:
+    file = written(tmp_path, "Messung 3\nFx\nN\n" + "".join(f"{force}\n" for force in FORCE))
+    assert read_samples(file, "fx_n", 200)[1].tolist() == FORCE
 
 
 def test_a_huge_file_is_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -175,7 +175,7 @@ def _try_table(folder: Path, content: bytes) -> None:
     try:
         table = read_table(file)
         known = sorted(name for name in table.names if name in names) == sorted(names)
-        found = table.numbers(names) if known else []
+        read_lines, found = table.numbers(names) if known else ([], [])
     except DragdeckError as error:
         assert "a.csv" in str(error), "the message does not name the file"
         return
@@ -187,9 +187,9 @@ def _try_table(folder: Path, content: bytes) -> None:
     mark = next((mark for mark in ";\t" if mark in lines[0]), ",")
     _, *rows = [[cell.strip() for cell in line.split(mark)] for line in lines]
     head = [*table.names]
-    if len(rows) > len(table.rows):  # units below the names
+    if len(rows) > len(read_lines):  # units below the names
         del rows[0]
-    if mark != table.separator:  # decimal commas between commas
+    if table.joined:  # decimal commas between commas
         rows = [[f"{a}.{b}" for a, b in zip(row[::2], row[1::2], strict=True)] for row in rows]
     assert all(len(row) == len(head) for row in rows), "an uneven row was taken"
     for name, values in zip(names, found, strict=True):

@@ -22,6 +22,7 @@ from dragdeck.dumps.numbers import (
     columns_of_words,
     first_rows,
     named_columns,
+    refuse_unlike,
 )
 from dragdeck.errors import DumpError
 
@@ -109,6 +110,9 @@ def _text_frame(at: Cursor) -> tuple[int, bytes, list[str]]:
 
 
 def _ordered(at: Cursor, cells: Cells, names: list[str]) -> Cells:
+    for place, name in enumerate(names):
+        if (first := names.index(name)) < place:
+            refuse_unlike(name, cells[first], cells[place])
     return cells[[names.index(name) for name in at.layout.header]]
 
 

@@ -27,6 +27,10 @@ class WrongRow(Exception):
         super().__init__(problem)
 
 
+_INEXACT = 2**53
+"""From here on a float is not each whole number."""
+
+
 def cells_of_text(text: bytes, width: int) -> Cells:
     """Numbers of whole lines, each of so many: those of Python's ``float``, bit for bit.
 
@@ -77,6 +81,8 @@ def columns_of_words(text: bytes, names: Sequence[str]) -> Columns:
     columns: dict[str, Any] = {}
     for place, name in enumerate(names):
         words = [row[place] for row in rows]
+        if (first := names.index(name)) < place:
+            refuse_unlike(name, np.array([row[first] for row in rows]), np.array(words))
         if name in COLUMNS_OF_WORDS:
             columns[name] = np.array([word.decode("utf-8", "replace") for word in words], object)
         else:
@@ -90,9 +96,27 @@ def columns_of_numbers(cells: Cells, names: Sequence[str]) -> Columns:
     return {name: _whole_if_it_is(cell, name) for name, cell in zip(names, cells, strict=True)}
 
 
+def refuse_unlike(name: str, first: NDArray[Any], second: NDArray[Any]) -> None:
+    """Refuse two columns of one name, (N,), that differ.
+
+    Raises
+    ------
+    WrongRow
+        At the first row in which they do.
+    """
+    differ = np.flatnonzero((first != second) & ((first == first) | (second == second)))
+    if len(differ):
+        row = int(differ[0])
+        shown = f"{name} is {first[row]} and {second[row]}"
+        raise WrongRow(row, shown, "the same value in both columns of that name")
+
+
 def _whole_if_it_is(column: Cells, name: str) -> Any:
     if not is_integer_column(name):
         return column
+    if (np.abs(column) >= _INEXACT).any():
+        row = int(np.argmax(np.abs(column) >= _INEXACT))
+        raise WrongRow(row, f"{name} is {column[row]:.0f}", f"a number below {_INEXACT}")
     try:
         return whole_numbers(column, name)
     except WrongRow:

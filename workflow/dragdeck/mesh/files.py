@@ -239,7 +239,25 @@ def _triangles(nodes: Integers, points: Floats) -> Integers:
     import pyvista
 
     polygons = pyvista.PolyData.from_regular_faces(points, nodes.tolist())
-    return np.asarray(polygons.triangulate().regular_faces, dtype=np.int64)
+    divided = polygons.triangulate()  # it leaves out what it cannot divide
+    if divided.n_cells < len(nodes) * (corners - 2) and not math.isclose(
+        divided.area, _flat_area(points[nodes]), rel_tol=1e-6
+    ):
+        raise InputError(
+            "a polygon cannot be divided into triangles",
+            value=f"one of {len(nodes)} with {corners} corners",
+            limit="flat polygons that do not cross themselves",
+            remedy="export triangles alone",
+        )
+    return np.asarray(divided.regular_faces, dtype=np.int64)
+
+
+def _flat_area(corners: Floats) -> float:
+    """Area of flat polygons, (M, k, 3), bent inwards or not."""
+    since = corners - corners[:, :1]
+    return float(
+        np.linalg.norm(np.cross(since[:, :-1], since[:, 1:]).sum(axis=1), axis=1).sum() / 2
+    )
 
 
 def _split(quads: Integers, points: Floats) -> Integers:

@@ -1,8 +1,7 @@
 """Faces in PLY files: text, or binary of either byte order."""
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from itertools import takewhile
+from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -20,6 +19,7 @@ from dragdeck.mesh.polygons import (
     pieces,
     refuse_two_marks,
 )
+from dragdeck.mesh.surface import Floats, Integers
 
 _HEAD = re.compile(rb"\bend_header[ \t]*(\r\n|\r|\n)")
 _LINE = re.compile("\n")
@@ -34,8 +34,8 @@ _KINDS = {
     **dict.fromkeys(("float", "float32"), "f4"),
     **dict.fromkeys(("double", "float64"), "f8"),
 }
-_FEW = 64
-"""Rows that are read one by one, and that are tried first."""
+_FEW, _WALKED = 64, 10_000
+"""Rows that are tried first, and that are read one by one where lists differ in length."""
 
 _INDICES = "vertex_indices", "vertex_index"
 
@@ -64,7 +64,8 @@ class _Element(NamedTuple):
 
 
 _Values = Mapping[str, Any]
-"""By the names of properties: numbers, (M,), or the lists of M rows, (M, k)."""
+"""By the names of properties: numbers, (M,), or lists one after the other and their lengths, (M,).
+"""
 
 
 def ply(content: bytes) -> Polygons:
@@ -144,13 +145,13 @@ def _polygons(parts: Mapping[str, list[_Values]], elements: Mapping[str, _Elemen
     points = np.column_stack(columns).astype(np.float64)
     corners, sizes = [np.empty(0, int)], [np.empty(0, int)]
     for part in parts["face"]:
-        values = part[named[0]]
+        values, counts = part[named[0]]
         nodes_of = values.astype(np.int64)
         wrong = values[(nodes_of != values) | (nodes_of < 0) | (nodes_of >= len(points))]
         if wrong.size:
             raise no_such_node(wrong[0].item(), range(len(points)))
-        corners.append(nodes_of.ravel())
-        sizes.append(np.full(len(values), values.shape[1]))
+        corners.append(nodes_of)
+        sizes.append(counts)
     return Polygons(points, by_size(np.concatenate(corners), np.concatenate(sizes)))
 
 
@@ -160,7 +161,7 @@ class _Rows(Protocol):
     unit: str
 
     def take(self, element: _Element, most: int) -> tuple[int, _Values]:
-        """How many of the next rows are alike, at most so many, and their values."""
+        """The values of some of the next rows, at most so many, and of how many."""
         ...
 
     def rest(self) -> int:
@@ -169,7 +170,7 @@ class _Rows(Protocol):
 
 
 def _values(rows: _Rows, element: _Element) -> Iterator[_Values]:
-    """The values of an element, in parts in which all lists are as long as in the first row."""
+    """The values of an element, in parts."""
     left = element.rows if element.properties else 0
     while left:
         count, values = rows.take(element, left)
@@ -198,10 +199,43 @@ class _Bytes:
             if each.length:
                 alike &= rows[f"{place} count"] == rows[f"{place} count"][0]
         count, self._likely = _alike(alike, self._likely)
+        if count < min(_FEW, len(alike)):
+            return self._walk(element, min(most, _WALKED))
         self._place += count * kind.itemsize
+        columns = [rows[str(place)][:count] for place in range(len(element.properties))]
         return count, {
-            each.name: rows[str(place)][:count] for place, each in enumerate(element.properties)
+            each.name: (column.ravel(), np.full(count, column.shape[1])) if each.length else column
+            for each, column in zip(element.properties, columns, strict=True)
         }
+
+    def _walk(self, element: _Element, rows: int) -> tuple[int, _Values]:
+        """The next rows, whose lists differ in length."""
+        byte_order: Any = "big" if self._order == ">" else "little"
+        sizes = [
+            (np.dtype(each.kind).itemsize, int(each.length[1:] or 0), each.length.startswith("i"))
+            for each in element.properties
+        ]
+        begins, counts, body, place = list[int](), list[int](), self._body, self._place
+        for _ in range(rows):
+            for size, width, signed in sizes:
+                count = 1
+                if width:
+                    count = int.from_bytes(body[place : place + width], byte_order, signed=signed)
+                    place += width
+                begins.append(place)
+                counts.append(count)
+                place += size * count
+            if place > len(body) or min(counts[-len(sizes) :]) < 0:
+                raise self._short(element)
+            self._place = place
+        values = dict[str, Any]()
+        for number, (each, (size, *_)) in enumerate(zip(element.properties, sizes, strict=True)):
+            first, length = (np.array(part[number :: len(sizes)]) for part in (begins, counts))
+            starts = np.repeat(first - size * (np.cumsum(length) - length), length)
+            items = (starts + size * np.arange(len(starts)))[:, None] + np.arange(size)
+            numbers_of = np.frombuffer(body, np.uint8)[items].view(self._order + each.kind).ravel()
+            values[each.name] = (numbers_of, length) if each.length else numbers_of
+        return rows, values
 
     def _kind(self, element: _Element) -> np.dtype[Any]:
         """The row that stands here."""
@@ -242,78 +276,86 @@ class _Lines:
         refuse_two_marks(rows, "^.*")
         self._pieces = pieces(rows, _LINE, "a line")
         self._before = text_of(head.string[: head.end()]).count("\n")
-        self._text, self._line, self._likely = "", 0, _FEW
+        self._words, self._starts, self._lines = np.empty(0), np.zeros(1, int), np.empty(0, int)
+        self._text, self._first = "", 0
+        self._damage: InputError | None = None
 
     def take(self, element: _Element, most: int) -> tuple[int, _Values]:
         """As in `_Rows`."""
-        self._fill()
-        first, words = self._text.partition("\n")[0], self._text.partition("\n")[0].split(" ")
-        lengths = _lengths(element, words)
-        if lengths is None:
-            value, line = (first[:60], self._line) if first else ("the end of the file", None)
-            raise element.wrong_row(value, line=line)
-        rows = _cut(self._text, min(most, self._likely))[0]
-        columns = quick_columns(f"{rows}\n".encode(), [NUMBER] * len(words))
-        if columns is None:
-            self._likely = _FEW
-            lines = _cut(rows, _FEW)[0].split("\n")
-            alike_lines = takewhile(lambda line: line.count(" ") == len(words) - 1, lines)
-            numbered = enumerate(alike_lines, self._line)
-            columns = [*np.array([numbers(line.split(" "), number) for number, line in numbered]).T]
-        alike = np.ones(len(columns[0]), dtype=bool)
-        values, place = dict[str, Any](), 0
-        for each, length in zip(element.properties, lengths, strict=True):
+        if not self._fill():
+            raise self._damage or element.wrong_row("the end of the file")
+        place, ends = self._starts[:-1][:most].copy(), self._starts[1:][:most]
+        good, values = np.ones(len(place), dtype=bool), dict[str, Any]()
+        for each in element.properties:
+            good &= place < ends
+            values[each.name] = self._words[np.where(good, place, 0)]
+            place += 1
             if each.length:
-                alike &= columns[place] == length
-                listed = np.array(columns[place + 1 : place + 1 + length]).T
-                values[each.name] = listed.reshape(len(alike), length)
-            else:
-                values[each.name] = columns[place]
-            place += 1 + length
-        count, self._likely = _alike(alike, self._likely)
-        self._text = _cut(self._text, count)[1]
-        self._line += count
-        return count, {name: column[:count] for name, column in values.items()}
+                numbers_of = values[each.name]
+                good &= (numbers_of >= 0) & (numbers_of <= ends - place) & (numbers_of % 1 == 0)
+                counts = np.where(good, numbers_of, 0).astype(np.int64)
+                first = np.repeat(place - np.cumsum(counts) + counts, counts)
+                values[each.name] = self._words[first + np.arange(len(first))], counts
+                place += counts
+        good &= place == ends
+        if not good.all():
+            line = int(self._lines[np.argmin(good)])
+            row = self._text.split("\n")[line - self._first]
+            raise element.wrong_row(row[:60], line=line)
+        self._starts, self._lines = self._starts[len(place) :], self._lines[len(place) :]
+        return len(place), values
 
-    def _fill(self) -> None:
-        """Go on to the next line that is not blank."""
-        while not (text := self._text.lstrip("\n")):
-            line, piece = next(self._pieces, (0, ""))
+    def _fill(self) -> bool:
+        """Whether there is a further row; those of the next piece are read if need be."""
+        while not len(self._lines):
+            line, piece = (0, "") if self._damage else next(self._pieces, (0, ""))
             if not piece:
+                return False
+            self._text, self._first = one_space(piece.removesuffix("\n")), self._before + line
+            self._words, counts, self._lines = _quick_words(self._text) or self._slow_words()
+            self._starts = np.concatenate([[0], np.cumsum(counts)])
+            self._lines = self._lines + self._first
+        return True
+
+    def _slow_words(self) -> tuple[Floats, Integers, Integers]:
+        """As `_quick_words`, of the lines before the first that is no row of numbers."""
+        words, counts, lines = [np.empty(0)], list[int](), list[int]()
+        for line, row in enumerate(self._text.split("\n")):
+            try:
+                words += [numbers(row.split(" "), self._first + line)] if row else []
+            except InputError as error:
+                self._damage = error
                 break
-            self._text, self._line = one_space(piece), self._before + line
-        self._line += len(self._text) - len(text)
-        self._text = text
+            counts += [len(words[-1])] if row else []
+            lines += [line] if row else []
+        return np.concatenate(words), np.array(counts, int), np.array(lines, int)
 
     def rest(self) -> int:
         """As in `_Rows`."""
         rest = 0
-        while True:
-            self._fill()
-            if not self._text:
-                return rest
-            rest += self._text.count("\n") + (not self._text.endswith("\n"))
-            self._text = ""
+        while self._fill():
+            rest, self._lines = rest + len(self._lines), self._lines[:0]
+        return rest + (self._damage is not None)
 
 
-def _cut(text: str, lines: int) -> tuple[str, str]:
-    """So many lines, without the end of the last, and the rest."""
-    if text.count("\n") < lines:
-        return text, ""
-    parts = text.split("\n", lines)
-    return "\n".join(parts[:lines]), parts[lines]
-
-
-def _lengths(element: _Element, words: Sequence[str]) -> list[int] | None:
-    """Lengths of the lists in a row of words, 0 of a single value; None if it is no such row."""
-    lengths, place = list[int](), 0
-    for each in element.properties:
-        count = words[place] if each.length and place < len(words) else "0"
-        if not re.fullmatch(r"\d{1,9}", count):
-            return None
-        lengths.append(int(count))
-        place += 1 + lengths[-1]
-    return lengths if place == len(words) else None
+def _quick_words(text: str) -> tuple[Floats, Integers, Integers] | None:
+    """Numbers in lines of words, how many are in each line, and which lines these are, from 0."""
+    content = text.encode()
+    width = content.partition(b"\n")[0].count(b" ") + 1
+    alike = quick_columns(content + b"\n", [NUMBER] * width)
+    if alike is not None:
+        return (
+            np.column_stack(alike).ravel(),
+            np.full(len(alike[0]), width),
+            np.arange(len(alike[0])),
+        )
+    columns = quick_columns(content.replace(b" ", b"\n") + b"\n", [NUMBER])
+    if columns is None:
+        return None
+    marks = np.frombuffer(content, np.uint8)
+    marks = marks[(marks == ord(" ")) | (marks == ord("\n"))]
+    ends = np.flatnonzero(np.append(marks == ord("\n"), [True])) + 1
+    return columns[0], np.diff(ends, prepend=0), np.arange(len(ends))
 
 
 def _alike(alike: Any, likely: int) -> tuple[int, int]:

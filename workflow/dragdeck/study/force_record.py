@@ -12,9 +12,11 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import butter, correlate, sosfiltfilt
 from scipy.stats import theilslopes
 
+from dragdeck.arrays import Floats, Ints
 from dragdeck.errors import InputError, RecordError
 from dragdeck.study.reference import Signal, Span
-from dragdeck.study.table import MOST_MISSING, Floats, Table, column_name, read_table
+from dragdeck.study.rows import MOST_MISSING, Table
+from dragdeck.study.table import column_name, read_table
 
 TIME_COLUMNS = {"time_s": 1.0, "time_ms": 1e-3, "time_us": 1e-6}
 FORCE_COLUMNS = {"force_n": 1.0, "force_mn": 1e-3, "force_kn": 1e3}
@@ -77,22 +79,22 @@ def read_record(file: Path) -> Record:
 
 def read_samples(
     file: Path, column: str | None = None, rate_hz: float | None = None
-) -> tuple[Floats, Floats, Sequence[int]]:
+) -> tuple[Floats, Floats, Ints]:
     """Times in s, forces in N and lines of a CSV file; see `read_record`.
 
     `column` names the force where it is not one of `FORCE_COLUMNS`; `rate_hz` stands in for times.
     """
     table = read_table(file)
     name = _column(table, FORCE_COLUMNS) if column is None else column
-    time, forces = _series(table, [name], rate_hz)
-    return time, forces[0], table.lines
+    lines, time, forces = _series(table, [name], rate_hz)
+    return time, forces[0], lines
 
 
 def _series(
     table: Table, columns: Sequence[str], rate_hz: float | None, angle: str | None = None, *,
     gaps: bool = False,
-) -> tuple[Floats, Floats]:  # fmt: skip
-    """Times, (N,) in s, and columns, (k, N) in N, at last an angle in rad; with `gaps`, with NaN.
+) -> tuple[Ints, Floats, Floats]:  # fmt: skip
+    """Lines, (N,), times, s, and columns, (k, N) in N, an angle in rad at last; `gaps` as NaN.
 
     Raises
     ------
@@ -106,15 +108,15 @@ def _series(
     missing = names if gaps else ()
     if rate_hz is None or {*table.names} & {*TIME_COLUMNS}:
         time_name = _column(table, TIME_COLUMNS)
-        time, *values = table.numbers([time_name, *names], missing)
+        lines, (time, *values) = table.numbers([time_name, *names], missing)
         time *= TIME_COLUMNS[time_name]
     else:
-        table.refuse_gaps()
-        values = table.numbers(names, missing)
+        lines, values = table.numbers(names, missing)
+        table.refuse_gaps(lines)
         time = np.arange(len(values[0])) / rate_hz
     if rate_hz is not None:
         _refuse_other_rate(time, rate_hz, table.file)
-    return time, np.array(values) * np.array([*units.values()])[:, None]
+    return lines, time, np.array(values) * np.array([*units.values()])[:, None]
 
 
 def in_words(file: Path, signal: Signal | None = None) -> str:
@@ -122,12 +124,12 @@ def in_words(file: Path, signal: Signal | None = None) -> str:
     table, gaps = read_table(file), signal is not None
     angle, rate_hz = (signal.angle_column, signal.rate_hz) if signal else (None, None)
     columns = signal.columns if signal else [_column(table, FORCE_COLUMNS)]
-    time, values = _series(table, columns, rate_hz, angle, gaps=gaps)
+    lines, time, values = _series(table, columns, rate_hz, angle, gaps=gaps)
     rate = (len(time) - 1) / (time[-1] - time[0]) if len(time) > 1 else math.nan
     forces = values[: len(columns)]
     ends = " to ".join(
         ", ".join([f"{time[row]:.6g} s", *(f"{force:.6g} N" for force in forces[:, row])])
-        + f" (line {table.lines[row]})"
+        + f" (line {lines[row]})"
         for row in (0, -1)
     )
     names = ", ".join([column_name(name) for name in [*columns, *([angle] if angle else [])]])
@@ -173,14 +175,14 @@ def _refuse_other_rate(time: Floats, rate_hz: float, file: Path) -> None:
         raise InputError(problem, file=file, value=f"{rate_hz:g} Hz", limit=limit, remedy=remedy)
 
 
-def check_samples(time_s: Floats, force_n: Floats, lines: Sequence[int] | None = None) -> Record:
+def check_samples(time_s: Floats, force_n: Floats, lines: Ints | None = None) -> Record:
     """Check that samples are numbers at even times, and turn compression positive.
 
     Parameters
     ----------
     time_s, force_n : (N,) ndarray
         Times, s, and forces, N.
-    lines : sequence of int, optional
+    lines : (N,) array, optional
         Where they stand in their file; none: numbers of samples, from 1.
 
     Raises
@@ -204,16 +206,16 @@ def check_samples(time_s: Floats, force_n: Floats, lines: Sequence[int] | None =
     return Record(even, force_n, interval)
 
 
-def _places(count: int, lines: Sequence[int] | None) -> tuple[str, Sequence[int]]:
+def _places(count: int, lines: Ints | None) -> tuple[str, Ints]:
     """What samples are called in messages, and their numbers; a few are refused."""
     if count < _LEAST_SAMPLES:
         raise RecordError(
             "short", "too few samples", value=str(count), limit=f"at least {_LEAST_SAMPLES}"
         )
-    return ("line", lines) if lines else ("sample", range(1, count + 1))
+    return ("sample", np.arange(1, count + 1)) if lines is None else ("line", lines)
 
 
-def _even(time_s: Floats, lines: Sequence[int] | None) -> tuple[Floats, float]:
+def _even(time_s: Floats, lines: Ints | None) -> tuple[Floats, float]:
     """Even times and their interval, s; errors are those of `check_samples`."""
     word, places = _places(len(time_s), lines)
     back = np.flatnonzero(np.diff(time_s) <= 0.0)
@@ -371,8 +373,8 @@ def measured_signal(
         ``clipped`` or ``slow``.
     """
     table, angle = read_table(file), signal.angle_column
-    time, values = _series(table, signal.columns, signal.rate_hz, angle, gaps=True)
-    time, values, missing, interval = _gathered(time, values, table.lines, bool(angle))
+    lines, time, values = _series(table, signal.columns, signal.rate_hz, angle, gaps=True)
+    time, values, missing, interval = _gathered(time, values, lines, bool(angle))
     raws = values[: len(signal.columns)]
     rests = [_within(time, span, "rest_s") for span in signal.rest_s]
     forces = np.array([signal.sign * (raw - _baseline(time, raw, rests)) for raw in raws])
@@ -401,7 +403,7 @@ def measured_signal(
 
 
 def _gathered(
-    time: Floats, values: Floats, lines: Sequence[int], has_angle: bool
+    time: Floats, values: Floats, lines: Ints, has_angle: bool
 ) -> tuple[Floats, Floats, NDArray[np.bool_], float]:
     """Even times, (N,) in s; columns, (k, N), missing samples interpolated; where; interval, s."""
     filled_time, filled = _with_holes(time, values)

@@ -162,11 +162,11 @@ def _read(
         value = ",".join(header)[:200] if set(needed) & set(header) else None  # quote only a table
         line = table.header_line
         raise InputError(problem, file=file, line=line, value=value, limit=limit)
-    values = dict(zip(header, table.numbers(header), strict=True))
-    zero = np.zeros(len(table.lines))
+    lines, numbers = table.numbers(header)
+    values, zero = dict(zip(header, numbers, strict=True)), np.zeros(len(lines))
     points = np.transpose([values.get(name, zero) for name in columns]).tolist()
     places[field] = file, None, None
-    for number, line in enumerate(table.lines):
+    for number, line in enumerate(lines.tolist()):
         places[f"{field}.{number}"] = file, line, None
         for at, name in [*enumerate(columns), ("speed_m_s", "speed_m_s")]:
             places[f"{field}.{number}.{at}"] = file, line, name

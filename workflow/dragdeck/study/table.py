@@ -7,40 +7,30 @@ programs write a head before the names of the columns, and units below them or i
 import csv
 import re
 from collections import Counter
-from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass
-from itertools import islice, zip_longest
+from collections.abc import Sequence
+from itertools import zip_longest
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
-from dragdeck.errors import InputError, together
+from dragdeck.errors import InputError
 from dragdeck.files import text_of
-
-Floats = NDArray[np.float64]
+from dragdeck.mesh.polygons import pieces
+from dragdeck.study.rows import BLANK, LINE, Table, cells_of, is_number, is_row, without_ends
 
 _MOST_BYTES = 64_000_000
-_MOST_NAMED = 5
-"""Errors of a table that are named."""
-
-_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
-_GROUPED = re.compile(r"[-+]?[1-9]\d{0,2}(,\d{3})+", re.ASCII)
-"""What may be thousands as well as a decimal comma."""
 
 _UNITS = {
-    "s": "s", "ms": "ms", "us": "us", "\u00b5s": "us", "\u03bcs": "us", "N": "n", "mN": "mn",
-    "kN": "kn", "m": "m", "mm": "mm", "kg": "kg", "g": "g",
+    "s": "s", "sec": "s", "ms": "ms", "us": "us", "\u00b5s": "us", "\u03bcs": "us",
+    "N": "n", "mN": "mn", "kN": "kn", "m": "m", "mm": "mm", "kg": "kg", "g": "g",
     "deg": "deg", "\u00b0": "deg", "rad": "rad",
 }  # fmt: skip
 """Units as programs write them, and as names of columns end with them."""
 
-_BLANK = " \t;,"
-"""What lines without a value consist of: Excel writes its separators below a table."""
-
-_MISSING = ("", "nan", "n/a", "#n/a", "#nv", "null")
-MOST_MISSING = 0.01
-"""Part of the values of a column that may be missing where its reader can do without them."""
+_OTHER_UNITS = {
+    *("-", "%", "Nm", "Nmm", "kNm", "N/m", "V", "mV", "A", "mA", "W", "kW", "Hz", "kHz", "rpm"),
+    *("1/min", "U/min", "min", "h", "cm", "um", "\u00b5m", "\u03bcm", "mm/s", "mm/min"),
+    *("m/s", "m/min", "m/s2", "m/s\u00b2", "bar", "Pa", "kPa", "MPa", "\u00b0C", "K", "J", ""),
+}  # fmt: skip
+"""Units of columns that no reader wants, in a line of units."""
 
 _BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]")
 _BEHIND = re.compile(r"(.*\S)\s*(?:/|,|\sin)\s*(\S+)")
@@ -57,138 +47,6 @@ _LONGEST_HEAD = 1000
 
 _LABVIEW_UNITS = "Y_Unit_Label"
 """First word of the line of its head with the units of all columns but that of the times."""
-
-_COMMA = (
-    "if these are decimal commas, export with a decimal point, or with a semicolon or tab between "
-    "the columns"
-)
-
-
-@dataclass(frozen=True)
-class Table:
-    """The rows of a CSV file as text.
-
-    Attributes
-    ----------
-    file : Path
-    separator : str
-        What stands between columns: ``;``, a tab or ``,``, whichever the header has first.
-    names : tuple of str
-        Columns, in lower case and with the unit at the end: ``fx_n`` of ``Fx [N]``.
-    header_line : int
-    lines : sequence of int
-        Line of each row in the file.
-    rows : sequence of sequences of str
-    """
-
-    file: Path
-    separator: str
-    names: tuple[str, ...]
-    header_line: int
-    lines: Sequence[int]
-    rows: Sequence[Sequence[str]]
-
-    def numbers(self, names: Iterable[str], gaps: Collection[str] = ()) -> list[Floats]:
-        """Columns as numbers, (N,) each, by their names; up to 1 % of those in `gaps` as NaN.
-
-        Raises
-        ------
-        InputError
-            Rows are longer or shorter than the header, a value is no finite number, or a comma in
-            it may be a decimal comma or not; it names the line of each.
-        """
-        self._refuse_uneven()
-        wanted = {name: [row[self.names.index(name)].strip() for row in self.rows]
-                  for name in names}  # fmt: skip
-        if self._decimal_commas(list(wanted.values())):
-            wanted = {
-                name: [cell if "." in cell else cell.replace(",", ".") for cell in cells]
-                for name, cells in wanted.items()
-            }
-        values, errors = [], []
-        for name, cells in wanted.items():
-            absent = {row for row, cell in enumerate(cells) if cell.lower() in _MISSING}
-            if name not in gaps or len(absent) > MOST_MISSING * len(cells):
-                absent = set()
-            texts = [row for row, cell in enumerate(cells)
-                     if row not in absent and not _NUMBER.fullmatch(cell)]  # fmt: skip
-            errors += [self._wrong(row, name, _said(cells[row])) for row in texts]
-            readable = ["nan" if row in absent else "0" if texts else cell
-                        for row, cell in enumerate(cells)]  # fmt: skip
-            column = np.array(readable, dtype=np.float64)
-            large = np.flatnonzero(np.isinf(column)).tolist()
-            errors += [self._wrong(row, name, _said(cells[row])) for row in large]
-            values.append(column)
-        if errors:
-            raise _first(sorted(errors, key=lambda error: error.line or 0))
-        return values
-
-    def refuse_gaps(self) -> None:
-        """Refuse lines between the header and the last row that are no rows: samples have no time.
-
-        Raises
-        ------
-        InputError
-            It names the first blank or commented line.
-        """
-        for line, other in zip(self.lines, range(self.header_line + 1, 10**9), strict=False):
-            if line != other:
-                problem = "a blank or commented line in a series without times"
-                remedy = "remove the line if no sample is missing there, or give a column of times"
-                raise InputError(problem, file=self.file, line=other, remedy=remedy)
-
-    def _refuse_uneven(self) -> None:
-        """Refuse rows that are longer or shorter than the header, or have a value without name."""
-        count, errors = len(self.names), []
-        unnamed = [column for column, name in enumerate(self.names) if not name]
-        for line, row in zip(self.lines, self.rows, strict=True):
-            if len(row) == count and not any(row[column].strip() for column in unnamed):
-                continue
-            problem = f"the row has {len(row)} values, but the header has {count} names"
-            if len(row) == count:
-                problem = "a value stands in a column without a name"
-            decimal = self.separator == "," and len(row) >= count
-            errors.append(
-                InputError(
-                    problem, file=self.file, line=line, value=self.separator.join(row)[:80],
-                    limit=self.separator.join(self.names)[:200],
-                    remedy=_COMMA if decimal else "correct the row, or the header",
-                )
-            )  # fmt: skip
-        if errors:
-            raise _first(errors)
-
-    def _decimal_commas(self, columns: Sequence[Sequence[str]]) -> bool:
-        """Whether commas in numbers are decimal commas."""
-        if self.separator == ",":
-            return False
-        points, commas = (
-            [(row, cell) for cells in columns for row, cell in enumerate(cells) if mark in cell]
-            for mark in ".,"
-        )
-        if not commas:
-            return False
-        row, cell = min(commas)
-        limit = "one decimal mark, point or comma, in the whole table, and no mark of thousands"
-        if points or all(_GROUPED.fullmatch(cell) for _, cell in commas):
-            problem = "a comma may be a decimal comma or a mark of thousands"
-            if points:
-                problem += f", while line {self.lines[min(points)[0]]} has a decimal point"
-            raise InputError(
-                problem, file=self.file, line=self.lines[row], value=cell, limit=limit,
-                remedy="export with a decimal point and without marks of thousands",
-            )  # fmt: skip
-        return True
-
-    def _wrong(self, row: int, name: str, problem: str) -> InputError:
-        file, line = self.file, self.lines[row]
-        return InputError(problem, file=file, line=line, field=name, limit="a finite number")
-
-
-def _said(cell: str) -> str:
-    if len(cell.split()) > 1 and all(map(_is_number, cell.split())):
-        return f"{cell[:60]!r} is several numbers, without a semicolon, tab or comma between them"
-    return f"{cell!r} is text, not a number" if cell else "the value is missing"
 
 
 def read_table(file: Path, most: int | None = None) -> Table:
@@ -207,41 +65,61 @@ def read_table(file: Path, most: int | None = None) -> Table:
     InputError
         The file cannot be read as text of at most 64 MB, or is no CSV file.
     """
-    texts = _text(file).split("\n")
-    used = [n for n, text in enumerate(texts) if text.strip(_BLANK) and text.lstrip()[0] != "#"]
+    text = _text(file)
+    texts = _beginning(text, file)
+    used = [n for n, line in enumerate(texts) if is_row(line)]
     if used and re.fullmatch("sep=.", texts[used[0]].strip(), re.IGNORECASE):  # of Excel
         del used[0]
     if not used:
-        raise InputError("the file is empty", file=file, limit="a header line, and rows of numbers")
+        comments = f"nothing but comments within {len(texts):,} lines"
+        problem = comments if any(texts) else "the file is empty"
+        raise InputError(problem, file=file, limit="a header line, and rows of numbers")
     before, has_units = _head(texts, used)
     head, used = used[:before], used[before:]
-    header = used[0] + 1
+    line, below = used[0] + 1, used[has_units] + 1
     separator = _separator(texts[used[0]])
-    units = _cells(texts[used.pop(1)], separator) if has_units else _labview_units(texts, head)
-    lines, rows = [], []
-    reader = csv.reader((texts[n] for n in used), delimiter=separator, skipinitialspace=True)
+    units = _cells(texts[used[1]], separator) if has_units else _labview_units(texts, head)
+    rows = [texts[n] for n in used[1 + has_units :]]
+    text = text[sum(len(line) + 1 for line in texts[:below]) :]
     try:
-        names, *_ = islice(reader, 1)
-        for row in islice(reader, None if most is None else most + 1):
-            lines.append(used[reader.line_num - 1] + 1)
-            rows.append(row)
-    except csv.Error as error:
-        line = used[reader.line_num - 1] + 1
-        raise InputError(f"not a CSV file: {error}", file=file, line=line) from None
-    if before and names[-1].lower() == _COMMENT and {*map(len, rows)} == {len(names) - 1}:
-        names.pop()
-    rows = [_without_ends(row, len(names)) for row in rows]
-    if names[0].lower() == _LABVIEW_TIME and not any(row[0].strip() for row in rows if row):
-        names[0] = ""  # its file has no times
-    units = _without_ends(units, len(names))
-    try:
+        names = cells_of(texts[used[0]], separator)
+        if before and names[-1].lower() == _COMMENT:
+            names, text = _without_comment(names, separator, rows, text)
+        first = _cells(rows[0], separator) if rows else names
+        if names[0].lower() == _LABVIEW_TIME and not first[0]:
+            names[0] = ""  # its file has no times
+        units = without_ends(units, len(names))
         named = tuple(column_name(*column) for column in zip_longest(names, units, fillvalue=""))
+    except csv.Error as error:
+        raise InputError(f"not a CSV file: {error}", file=file, line=line) from None
     except InputError as error:
-        error.file, error.line = file, header
+        error.file, error.line = file, line
         raise
-    if separator == "," and (joined := _joined(rows, len(names))):
-        separator, rows = ";", joined
-    return Table(file, separator, named, header, lines, rows)
+    twice = separator == "," and all(named) and len(first) == 2 * len(names)
+    joined = twice and _are_joined(rows, len(names))
+    return Table(file, separator, named, line, text, below + 1, joined=joined, most=most)
+
+
+def _without_comment(
+    names: list[str], separator: str, rows: Sequence[str], text: str
+) -> tuple[list[str], str]:
+    """Names and rows without LabVIEW's column of comments: its first row alone may have one."""
+    widths = [len(_cells(row, separator)) for row in rows[:2]]
+    if len(names) - 1 not in widths:
+        return names, text
+    if widths[0] == len(names):
+        text = text.replace(rows[0], separator.join(_cells(rows[0], separator)[:-1]), 1)
+    return names[:-1], text
+
+
+def _beginning(text: str, file: Path) -> list[str]:
+    """The first lines of a text, its head among them."""
+    try:
+        _, beginning = next(pieces(text, LINE, "a line"), (1, ""))
+    except InputError as error:
+        error.file = file
+        raise
+    return beginning.removesuffix("\n").split("\n")
 
 
 def column_name(name: str, unit: str = "") -> str:
@@ -278,48 +156,43 @@ def column_name(name: str, unit: str = "") -> str:
     return base if end in known else f"{base}_{known.pop()}"
 
 
-def _without_ends(row: list[str], count: int) -> list[str]:
-    """A row without empty cells beyond the header, which stand behind trailing separators."""
-    while len(row) > count and not row[-1].strip():
-        row = row[:-1]
-    return row
-
-
 def _labview_units(texts: Sequence[str], head: Sequence[int]) -> list[str]:
     lines = (_cells(texts[n]) for n in head)
     return next((["", *units] for key, *units in lines if key == _LABVIEW_UNITS), [])
 
 
-def _joined(rows: Sequence[Sequence[str]], count: int) -> list[list[str]]:
-    """Rows in which commas are decimal marks and separators; none where they are not surely so.
+def _are_joined(rows: Sequence[str], count: int) -> bool:
+    """Whether commas are surely decimal marks and separators in rows.
 
     A second part that begins with 0, such as 060, is no number of its own.
     """
-    if any(len(row) != 2 * count for row in rows):
-        return []
-    pairs = [[*zip(row[::2], row[1::2], strict=True)] for row in rows]
-    parts = [part for row in pairs for part in row]
-    fractions = [fraction for whole, fraction in parts if re.fullmatch(r"[-+]?\d+", whole.strip())]
-    surely = any(fraction[:1] == "0" and len(fraction) > 1 for fraction in fractions)
-    if not surely or len(fractions) < len(parts) or not all(map(str.isdecimal, fractions)):
-        return []
-    return [[f"{whole},{fraction}" for whole, fraction in row] for row in pairs]
+    cells = [[cell.strip() for cell in row.split(",")] for row in rows]
+    if any(len(row) != 2 * count for row in cells):
+        return False
+    wholes, fractions = ([cell for row in cells for cell in row[part::2]] for part in (0, 1))
+    whole = all(re.fullmatch(r"[-+]?\d+", cell) for cell in wholes)
+    surely = any(cell[:1] == "0" and len(cell) > 1 for cell in fractions)
+    return whole and surely and all(map(str.isdecimal, fractions))
 
 
 def _head(texts: Sequence[str], used: Sequence[int]) -> tuple[int, bool]:
     """How many used lines are before that of the names, and whether units are below it.
 
-    Names stand before the first two rows of numbers. Where what stands there cannot be names, the
-    first line has them, and the others are rows, of which `Table.numbers` says what is wrong.
+    Names stand before the first two rows of numbers, or are known as those of LabVIEW. Where what
+    stands there cannot be names, the first line has them, and the others are rows, of which
+    `Table.numbers` says what is wrong.
     """
     used = used[:_LONGEST_HEAD]
+    for before, n in enumerate(used):
+        if _cells(texts[n])[0].lower() == _LABVIEW_TIME:
+            return before, False
     widths = [_width(texts[n]) for n in used]
     usual = max(Counter(filter(None, widths)).items(), key=lambda item: item[1], default=(0, 0))[0]
     numeric = [bool(width) and width == usual for width in widths]
     first = next((k for k in range(len(used)) if all(numeric[k : k + 2])), 0)
     units = first > 1 and _is_units(texts[used[first - 1]])
     names = first - 1 - units
-    if names > 0 and any(map(_is_number, _cells(texts[used[names]]))):
+    if names > 0 and any(map(is_number, _cells(texts[used[names]]))):
         return 0, False
     return max(names, 0), units
 
@@ -332,19 +205,17 @@ def _cells(text: str, separator: str = "") -> list[str]:
     return [cell.strip() for cell in text.split(separator or _separator(text))]
 
 
-def _is_number(cell: str) -> bool:
-    return _NUMBER.fullmatch(cell.replace(",", ".", 1)) is not None
-
-
 def _width(text: str) -> int:
     """How many numbers are in a row of numbers alone, missing ones included; 0 of another line."""
-    cells = _cells(text.strip().rstrip(_BLANK))
-    return len(cells) if all(_is_number(cell) or not cell for cell in cells) else 0
+    cells = _cells(text.strip().rstrip(BLANK))
+    return len(cells) if all(is_number(cell) or not cell for cell in cells) else 0
 
 
 def _is_units(text: str) -> bool:
-    cells = [cell.strip("[]() ") for cell in _cells(text)]
-    return any(cells) and all(cell in _UNITS or cell in ("", "-") for cell in cells)
+    units = {cell.strip("[]() ") for cell in _cells(text)}
+    bracketed = all(re.fullmatch(r"[\[(].*[\])]|", cell) for cell in _cells(text))
+    known = units <= _UNITS.keys() | _OTHER_UNITS
+    return (known or bracketed) and not _UNITS.keys().isdisjoint(units)
 
 
 def _text(file: Path) -> str:
@@ -360,11 +231,3 @@ def _text(file: Path) -> str:
         line, remedy = before.count("\n") + 1, "export it as text in the encoding UTF-8"
         raise InputError("not a CSV file: a byte is 0", file=file, line=line, remedy=remedy)
     return text
-
-
-def _first(errors: Sequence[InputError]) -> InputError:
-    """The first errors as one, with the number of the others."""
-    shown, left = list(errors[:_MOST_NAMED]), len(errors) - _MOST_NAMED
-    if left > 0:
-        shown.append(InputError(f"{left} more such lines", file=shown[0].file))
-    return together(shown)
