@@ -43,7 +43,7 @@ _LARGEST_STD = 0.08
 _BY_CHANCE = 0.01
 """Probability of so many misses of scenes that are left out below which intervals do not cover."""
 
-_MOST_DEGREES = 10.0
+_FEWEST_DEGREES, _MOST_DEGREES = 0.5, 10.0
 """Windows' worth of evidence on a variance: never more, whatever the scenes agree on."""
 
 
@@ -463,7 +463,10 @@ def _degrees(excess: float) -> float:
     """Degrees of freedom of a variance whose logarithm has this variance."""
     if polygamma(1, _MOST_DEGREES / 2) >= excess:
         return _MOST_DEGREES
-    return float(brentq(lambda degrees: polygamma(1, degrees / 2) - excess, 0.5, _MOST_DEGREES))
+    if polygamma(1, _FEWEST_DEGREES / 2) <= excess:
+        return _FEWEST_DEGREES
+    between = _FEWEST_DEGREES, _MOST_DEGREES
+    return float(brentq(lambda degrees: polygamma(1, degrees / 2) - excess, *between))
 
 
 def _between_packings(measured: Sequence[Sequence[QuantityOfRun]]) -> float:
