@@ -288,6 +288,7 @@ def _of_windows(quantity: Quantity, pairs: Sequence[Pairs]) -> dict[str, float]:
     )
     if quantity.signed or slope < NORMAL_QUANTILE * error:  # it would add more than it removes
         slope = slope_std = 0.0
+    slope = min(slope, 1.0)  # a window repeats its bed, it does not exaggerate it
     logs = [
         math.log(of.about(slope) / of.variance) - _log_bias(of.windows) + _log_bias(of.stretches)
         for of in pairs
