@@ -56,7 +56,9 @@ from dragdeck.records.case import FillingCase
 from dragdeck.records.run import SettlingCriterion
 from dragdeck.scenes.scene import (
     SceneType,
+    acting_gravity,
     case_of_study,
+    check_submerged,
     liquid,
     liquid_leaves_out,
     liquid_models,
@@ -111,6 +113,7 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
     study = case.study
     _check_capacity(case)
     _check_cells(case)
+    check_submerged(case, expected_bed(study))
     fidelity = study.chosen_fidelity()
     rayleigh = bed_rayleigh_time(study)
     dt = bed_timestep(study, "filling_timestep_fraction")
@@ -126,7 +129,7 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
         source="particles.data",
         materials=material_table(study, types, fidelity.youngs_modulus_scale, case),
         limit_force=study.contact.limit_force,
-        gravity_m_s2=study.gravity_m_s2,
+        gravity_m_s2=acting_gravity(study),
         liquid=liquid(study),
         skin_m=skin(study),
         timestep_s=dt,

@@ -43,8 +43,10 @@ from dragdeck.scenes.motion import (
 )
 from dragdeck.scenes.scene import (
     SceneType,
+    acting_gravity,
     assumed,
     case_of_study,
+    check_submerged,
     liquid,
     liquid_leaves_out,
     liquid_models,
@@ -107,6 +109,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
     periods, meshes = output_periods(study, dt), _mesh_files(each)
     check_apart(each, bed)
     check_lid(whole, bed)
+    check_submerged(whole, bed)
     courses, moved = (
         [course(workpiece.study, bed, reference_height(workpiece)) for workpiece in each],
         [],
@@ -133,7 +136,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         source=_source(whole),
         materials=materials,
         limit_force=study.contact.limit_force,
-        gravity_m_s2=study.gravity_m_s2,
+        gravity_m_s2=acting_gravity(study),
         liquid=liquid(study),
         skin_m=skin(study),
         timestep_s=dt,

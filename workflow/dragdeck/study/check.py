@@ -149,13 +149,15 @@ def _compound(study: Study) -> _Found:
     compound, rim = study.compound, study.bowl.height_m
     if compound is None:
         return
-    if study.media.clumped:
-        problem = "LIGGGHTS would lift every sphere of a clump by its whole volume"
-        yield "compound", problem, "spherical particles, or no compound"
     if study.liquid_level_m > rim:
         problem = "the liquid stands above the rim of the bowl"
         yield "compound.level_m", problem, f"at most {rim:g} m"
-    for name in sorted({*study.media.materials} & {*study.materials}):
+    names = sorted({*study.media.materials} & {*study.materials})
+    densities = {study.materials[name].density_kg_m3 for name in names}
+    if study.media.clumped and len(densities) > 1:
+        problem = "clumps have their reduced weight by gravity, which is the same for all of them"
+        yield "compound", problem, "media of one density, spherical particles, or no compound"
+    for name in names:
         lightest = study.materials[name].density_kg_m3
         if compound.density_kg_m3 >= lightest:
             problem = f"particles of {name} float, so that there is no bed at the floor"
