@@ -101,6 +101,7 @@ RICH: dict[str, dict[str, Any]] = {
         "compound": {"density_kg_m3": 1000, "level_m": 0.08},
         "motion.path": {"kind": "circle", "radius_m": 0.01, "revolutions": 4, "direction": "cw"},
         "motion.oscillation": {"amplitude_m": 0.001, "frequency_hz": 2, "ramp_s": 0.1},
+        "motion.bowl": {"kind": "rotation", "rpm": 90}, "motion.bed_friction_deg": 5,
         "contact": {"rolling_model": "epsd"}, "pairs": DAMPED,
         "fidelity": {**SOFT, "filling_youngs_modulus_scale": 0.1, "windows": {"tolerance": 0.1}},
         "assumptions": [{"field": "media.mass_kg", "why": "any"}],
@@ -124,6 +125,8 @@ RICH: dict[str, dict[str, Any]] = {
                 "kind": "ellipsoid", "axes": [1.0, 1.2, 1.4], "spheres": 2}),
             "pyramids": grains("plastic", 0.5, shape={"kind": "tetrahedron", "spheres": 4})}},
         "motion.path": EIGHT, "motion.orientation": "fixed",
+        "motion.bowl": {"kind": "vibration", "amplitude_m": [0.001, 0.0005, 0.0007],
+                        "phase_deg": [0, 30, 90], "frequency_hz": 25, "ramp_s": 0.05},
         "bowl": {"kind": "trough", "length_m": 0.06, "width_m": 0.055, **BOWL},
     },
     "waypoints": {

@@ -137,7 +137,7 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
         outputs=(outputs.thermo(check_steps, None), outputs.settled_particles(study.media.clumped)),
         thermo_steps=check_steps,
         checkpoint_steps=5 * check_steps,
-        processors=rank_split(case).line,
+        processors=rank_split(case, skin(study)).line,
         bowl_type=types.index(study.bowl.material) + 1,
         bowl=study.bowl.container,
         energy_ratio=study.filling.energy_ratio,
@@ -145,7 +145,7 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
         check_steps=check_steps,
         most_checks=math.ceil(longest / (check_steps * dt)),
         max_time_s=longest,
-        neighbours=max(ENGINE_NEIGHBOURS, bowl_neighbours(study) if meshed else 0),
+        neighbours=max(ENGINE_NEIGHBOURS, bowl_neighbours(study, skin(study)) if meshed else 0),
         clumped=study.media.clumped,
         insertions=body_sizes(study),
         seeds=primes(study.seed, 3 * MOST_SIZES * len(study.media.parts)),
@@ -311,8 +311,8 @@ def box_top(study: Study) -> float:
     return math.ceil(100 * max(falling, above_bed, 2 * study.bowl.height_m) + 5) / 100
 
 
-def rank_split(case: Case) -> Split:
-    """How the box of a case is split among its ranks."""
+def rank_split(case: Case, skin_m: float) -> Split:
+    """How the box of a case is split among its ranks, with that neighbour skin."""
     study = case.study
     filled = FilledBowl(
         particles=study.sphere_count,
@@ -321,7 +321,7 @@ def rank_split(case: Case) -> Split:
         half_widths_m=box_half_widths(study),
         bottom_m=-study.media.typical_radius_m,
         top_m=box_top(study),
-        reach_m=(4 if study.media.clumped else 2) * farthest_point(study) + skin(study),
+        reach_m=(4 if study.media.clumped else 2) * farthest_point(study) + skin_m,
     )
     return split(case.ranks, filled)
 
@@ -339,7 +339,7 @@ def floor_overlap(study: Study) -> float:
 def filling_cautions(case: Case) -> Iterator[Caution]:
     """What a user should know of a filling before it runs."""
     study = case.study
-    yield from rank_warnings(rank_split(case))
+    yield from rank_warnings(rank_split(case, skin(study)))
     yield from _overlap_caution(study)
     yield from _cohesion_caution(study)
     yield from _class_cautions(study)
@@ -467,12 +467,12 @@ def _size_cautions(study: Study) -> Iterator[Caution]:
         )
 
 
-def bowl_neighbours(study: Study) -> int:
+def bowl_neighbours(study: Study, skin_m: float) -> int:
     """More facets of the bowl, at least 0.4 size^2 each, than a particle in a corner reaches."""
     size = study.bowl_facet_size_m
     if size is None:
         return 0
-    reach_m = farthest_point(study) + skin(study) + 2 * size
+    reach_m = farthest_point(study) + skin_m + 2 * size
     return math.ceil(3 * math.pi * reach_m**2 / (0.4 * size**2))
 
 

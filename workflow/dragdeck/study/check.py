@@ -197,7 +197,8 @@ def _motion(study: Study) -> _Found:
     """Statistics need a frame of the contact network after all that they leave out."""
     motion, problem = study.motion, "no path is left for the statistics"
     if motion.bowl_rad_s and not study.bowl.container.round:
-        yield "motion.path", f"a bowl of kind {study.bowl.kind} cannot rotate", "a round bowl"
+        field = "motion.bowl" if motion.bowl else "motion.path"
+        yield field, f"a bowl of kind {study.bowl.kind} cannot rotate", "a round bowl"
     length, speed = motion.path_length_m, motion.nominal_speed_m_s
     frame = speed / study.outputs.network_hz
     if length < frame * (1 - 1e-9):
