@@ -160,8 +160,8 @@ SUBMERGED = 1 - 1000 / 2656
 
 def test_a_submerged_clump_sinks_by_its_reduced_weight(fill: Fill) -> None:
     filled = fill(_one_class(1), **WATER)
-    filled.run(_free(filled.text, "vel constant 0.0 0.0 0.0 omega constant 90.0 50.0 70.0",
-                     4000, 500))  # fmt: skip
+    filled.run(_free(filled.text, "vel constant 0.0 0.0 0.3 omega constant 90.0 50.0 70.0",
+                     3500, 500))  # fmt: skip
     frames = [Bodies(filled.case).frame(one) for one in filled.frames() if one.rows]
     took = (frames[-1].step - frames[0].step) * filled.case.timestep_s
     speed = frames[-1].vectors(*VELOCITY)[0] - frames[0].vectors(*VELOCITY)[0]

@@ -53,7 +53,7 @@ def test_friction_keeps_a_bed_level_up_to_its_angle() -> None:
 def test_the_depth_is_measured_from_the_inclined_surface(moved: Made, project: Project) -> None:
     """For a path in a bowl that rotates, and for a workpiece at rest in it."""
     fast = {"kind": "rotation", "rpm": 150}
-    for motion in ({"bowl": fast}, {"path": REST | {"bowl_rpm": 150}, "speed_m_s": None}):
+    for motion in ({"bowl": fast}, {"path": REST | {"bowl_rpm": 150}, "bowl": None}):
         case = moved(bed_friction_deg=10, **motion)
         bed = bed_in_motion(case.study, BED)
         assert BED.surface_m - 0.005 < bed.surface_m < BED.surface_m - 1e-4
@@ -155,7 +155,7 @@ def test_a_vibration_rises_and_is_an_ellipse() -> None:
 
 
 def test_a_bowl_that_vibrates_is_a_mesh_that_moves(moved: Made, project: Project) -> None:
-    case, rest = moved(bowl=ELLIPSE), moved()
+    rest, case = moved(), moved(bowl=ELLIPSE)
     text, scene = script(case, project), process_scene(case, BED)
     move = "fix move_bowl all move/mesh mesh bowl linear/variable v_bowl_vx v_bowl_vy v_bowl_vz"
     assert text.count(move) == 1 and "surface_ang_vel" not in text

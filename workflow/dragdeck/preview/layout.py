@@ -20,11 +20,10 @@ from dragdeck.scenes.filling import expected_bed
 from dragdeck.scenes.motion import Course, course
 from dragdeck.scenes.moving_bowl import bed_in_motion
 from dragdeck.scenes.workpiece import reference_height, workpiece_mesh, workpiece_radius
+from dragdeck.study.model import Study
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
-
-    from dragdeck.study.model import Study
 
 
 Floats = NDArray[np.float64]

@@ -11,6 +11,7 @@ import numpy as np
 
 from dragdeck.cases.bed import (
     JUST_BEYOND,
+    MESHED_PART,
     BodySize,
     bed_classes,
     bed_density,
@@ -481,7 +482,8 @@ def bowl_files(study: Study, top_m: float) -> dict[str, Callable[[], str]]:
     size = study.bowl_facet_size_m
     if size is None:
         return {}
-    height = 0.99 * top_m if study.bowl.container.rim else min(study.bowl.height_m, 0.99 * top_m)
+    highest = MESHED_PART * top_m
+    height = highest if study.bowl.container.rim else min(study.bowl.height_m, highest)
     mesh = study.bowl.mesh(height, size)
     return {"bowl.stl": lambda: stl_text(mesh)}
 

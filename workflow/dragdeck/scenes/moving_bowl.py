@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from dragdeck.cases.bed import MESHED_PART
 from dragdeck.cases.case import Case
 from dragdeck.errors import Caution, InputError, together
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.turning_bed import surface_rise, surface_tilt
-from dragdeck.scenes.motion import driven
 from dragdeck.study.drive import Floats
 from dragdeck.study.model import Study
 from dragdeck.study.paths.path import as_rows
@@ -37,8 +37,13 @@ def path_tilt_deg(study: Study, rad_s: float) -> float:
     return math.degrees(surface_tilt(rad_s, *_resisting(study), _path_radii(study)).max())
 
 
+def _driven_rad_s(study: Study) -> float:
+    """Angular speed of the bowl as it is driven, rad/s."""
+    return study.motion.bowl_rad_s * study.chosen_fidelity().speed_factor
+
+
 def _driven_tilt(study: Study) -> float:
-    return path_tilt_deg(study, driven(study).bowl_rad_s)
+    return path_tilt_deg(study, _driven_rad_s(study))
 
 
 def _resisting(study: Study) -> tuple[float, float]:
@@ -49,17 +54,17 @@ def _resisting(study: Study) -> tuple[float, float]:
 def _path_radii(study: Study) -> Floats:
     """Distances of the path from the axis of the bowl, m."""
     places = as_rows(study.motion.path.place(np.linspace(0.0, 1.0, _PLACES)))
-    return np.hypot(*np.atleast_2d(places)[:, :2].T)
+    return np.asarray(np.hypot(*np.atleast_2d(places)[:, :2].T))
 
 
 def _rise(study: Study, bed: Bed) -> tuple[Floats, Floats]:
     """Distances from the axis, and heights of the bed in the drag above its mean, m."""
     radii = [float(outline[:, 0].max()) for outline in study.bowl.container.sections(bed.surface_m)]
     outer, inner = [*radii, 0.0][:2]
-    return surface_rise(driven(study).bowl_rad_s, *_resisting(study), inner, outer)
+    return surface_rise(_driven_rad_s(study), *_resisting(study), inner, outer)
 
 
-def check_bowl_motion(case: Case, settled: Bed) -> None:
+def check_bowl_motion(case: Case, settled: Bed, top_m: float) -> None:
     """Refuse a bowl that throws its bed out, leaves the box, or cannot go on where it was.
 
     Parameters
@@ -67,13 +72,15 @@ def check_bowl_motion(case: Case, settled: Bed) -> None:
     case : Case
     settled : Bed
         Before the bowl moves.
+    top_m : float
+        Of the simulation box.
 
     Raises
     ------
     InputError
         Names every field that has to change.
     """
-    problems = [*_spilled(case, settled), *_out_of_box(case), *_in_parts(case)]
+    problems = [*_spilled(case, settled), *_out_of_box(case, top_m), *_in_parts(case)]
     if problems:
         raise together(problems)
 
@@ -101,16 +108,19 @@ def _spilled(case: Case, settled: Bed) -> Iterator[InputError]:
             )
 
 
-def _out_of_box(case: Case) -> Iterator[InputError]:
+def _out_of_box(case: Case, top_m: float) -> Iterator[InputError]:
     """A bowl that moves by so much that its facets leave the box ends the run."""
-    bowl, radius = case.study.motion.bowl, case.study.media.typical_radius_m
-    if bowl is not None and max(bowl.reach_m) >= radius:
+    study, bowl = case.study, case.study.motion.bowl
+    room = study.media.typical_radius_m
+    if study.bowl.container.rim:  # its mesh ends near the top of the box
+        room = min(room, (1 - MESHED_PART) * top_m)
+    if bowl is not None and max(bowl.reach_m) >= room:
         yield InputError(
             "the bowl would leave the simulation box",
             file=case.file,
             field="motion.bowl",
             value=f"a displacement of {max(bowl.reach_m):.4g} m",
-            limit=f"below {radius:.4g} m, a mean particle radius",
+            limit=f"below {room:.4g} m, the room around it",
             remedy="use smaller amplitudes",
         )
 

@@ -107,9 +107,9 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
     study, counts = whole.study, [workpiece_facets(workpiece) for workpiece in each]
     fidelity, facets = study.chosen_fidelity(), study.bowl_facet_size_m is not None
     settled = bed or expected_bed(study)
-    check_bowl_motion(whole, settled)
-    bed = bed_in_motion(study, settled)
     dt, top = bed_timestep(study, "timestep_fraction"), box_top(study)
+    check_bowl_motion(whole, settled, top)
+    bed = bed_in_motion(study, settled)
     periods, meshes = output_periods(study, dt), _mesh_files(each)
     check_apart(each, bed)
     check_lid(whole, bed)

@@ -332,6 +332,9 @@ for which neighbour lists last at that speed."""
 _PLACES_PER_LEG = 500
 """At which the distance of two workpieces is compared."""
 
+_PLACES_AMONG_FACETS = 60
+"""Of a leg, at which the gap to facets is measured, which takes longer."""
+
 _SIDES, _HEIGHTS = 12, 9
 """Points around a workpiece, and heights, at which its gap to a sloping wall is measured."""
 
@@ -390,15 +393,16 @@ def _wall_gap(case: Case, surface_m: float | None = None) -> float:
         turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
         around = np.concatenate([outline @ turn + place for place in (begin, plunge)])
         return float(bowl.side_distance(around).min())
-    entry = np.linspace(plunge, begin, _PLACES_PER_LEG)
-    drag = np.atleast_2d(as_rows(motion.path.place(np.linspace(0.0, 1.0, _PLACES_PER_LEG))))
+    count = _PLACES_AMONG_FACETS if bowl.own_facets.size else _PLACES_PER_LEG
+    entry = np.linspace(plunge, begin, count)
+    drag = np.atleast_2d(as_rows(motion.path.place(np.linspace(0.0, 1.0, count))))
     places = np.concatenate([entry, motion.path.corners[:, :2], drag[:, :2]])
     reach, surface = workpiece_reach(case), surface_m or expected_surface(case.study)
     if not bowl.rim:
         return float(bowl.side_distance(places).min()) - reach
     ring = np.linspace(0.0, math.tau, _SIDES, endpoint=False)
     outline = reach * np.column_stack([np.cos(ring), np.sin(ring)])
-    points = (places[:, None] + outline).reshape(-1, 2)
+    points = (np.unique(places, axis=0)[:, None] + outline).reshape(-1, 2)
     return min(
         float(bowl.distance(np.insert(points, 2, height, axis=1)).min())
         for height in np.linspace(surface - deepest(motion), surface, _HEIGHTS).tolist()

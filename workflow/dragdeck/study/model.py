@@ -24,10 +24,10 @@ from dragdeck.study.base import (
     flat,
     without_fields,
 )
-from dragdeck.study.bowl_motions.rotation import Rotation
-from dragdeck.study.bowl_motions.vibration import Vibration
+from dragdeck.study.bowl_motions.registry import AnyBowlMotion
 from dragdeck.study.bowls.annulus import AnnulusBowl
 from dragdeck.study.bowls.cylinder import CylinderBowl
+from dragdeck.study.bowls.mesh import MeshBowl
 from dragdeck.study.bowls.revolved import RevolvedBowl
 from dragdeck.study.bowls.trough import TroughBowl
 from dragdeck.study.calibration import Calibration
@@ -62,6 +62,7 @@ AnyBowl = (
     | Annotated[AnnulusBowl, Tag("annulus")]
     | Annotated[TroughBowl, Tag("trough")]
     | Annotated[RevolvedBowl, Tag("revolved")]
+    | Annotated[MeshBowl, Tag("mesh")]
 )
 """The registry of bowls."""
 
@@ -108,10 +109,6 @@ class Superposed(Model):
 
 AnyPath = CirclePath | FigureEightPath | LinePath | RestPath | WaypointsPath
 """The registry of paths."""
-
-
-AnyBowlMotion = Annotated[Rotation | Vibration, Field(discriminator="kind")]
-"""The registry of motions of the bowl."""
 
 
 _PLACES = 1001
