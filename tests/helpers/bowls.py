@@ -2,7 +2,34 @@
 
 from typing import Any
 
+import numpy as np
+
 from dragdeck.physics.walls import round_container
+
+
+def hexagon(across_m: float, height_m: float) -> np.ndarray:
+    """Facets of a hexagonal bowl that widens from two thirds of its width, (F, 3, 3)."""
+    angle = np.arange(6) * np.pi / 3
+    ring = np.column_stack([np.cos(angle), np.sin(angle)]) * across_m / np.sqrt(3)
+    low, high = (
+        np.insert(share * ring, 2, z, axis=1) for share, z in ((2 / 3, 0), (1, height_m / 4))
+    )
+    top, middle = np.insert(ring, 2, height_m, axis=1), np.zeros(3)
+    facets = []
+    for here, after in ((side, (side + 1) % 6) for side in range(6)):
+        facets.append([middle, low[here], low[after]])
+        for below, above in ((low, high), (high, top)):
+            facets.append([below[here], above[here], above[after]])
+            facets.append([below[here], above[after], below[after]])
+    return np.array(facets)
+
+
+OWN_BOWL: dict[str, Any] = {
+    "bowl": {"kind": "mesh", "material": "steel", "height_m": 0.06,
+             "facets_m": hexagon(0.06, 0.06).reshape(-1, 9).round(9).tolist()},
+    "media.count": 420,
+}  # fmt: skip
+"""A hexagonal bowl as a mesh."""
 
 SMALL_BOWLS: dict[str, dict[str, Any]] = {
     "annulus": {

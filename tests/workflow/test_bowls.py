@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from bowls import SMALL_BOWLS
+from bowls import OWN_BOWL, SMALL_BOWLS
 from made_study import put
 from paths import ROOT, SMALL_STUDY
 from plate import engine
@@ -34,14 +34,17 @@ pytestmark = [pytest.mark.engine, pytest.mark.slow]
 FAST = {"motion.plunge_speed_m_s": 0.5, "motion.approach_speed_m_s": 0.5, "motion.speed_m_s": 0.1}
 
 
-@pytest.fixture(scope="module", params=SMALL_BOWLS)
+EVERY_BOWL = {**SMALL_BOWLS, "mesh": OWN_BOWL}
+
+
+@pytest.fixture(scope="module", params=EVERY_BOWL)
 def finished(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The process of a bowl, beside its filling."""
     folder = tmp_path_factory.mktemp("project")
     for name in ("templates", "meshes"):
         (folder / name).symlink_to(ROOT / name)
     study: dict[str, Any] = yaml.safe_load(SMALL_STUDY.read_text())
-    put(study, {**deepcopy(SMALL_BOWLS[request.param]), **FAST})
+    put(study, {**deepcopy(EVERY_BOWL[request.param]), **FAST})
     study["motion"]["immersion_depth_m"] = 0.010
     file = folder / "studies/small/study.yaml"
     file.parent.mkdir(parents=True)

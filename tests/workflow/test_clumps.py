@@ -154,8 +154,25 @@ def test_a_clump_of_one_sphere_is_the_sphere(fill: Fill) -> None:
                                        atol=1e-7 if names is CENTRE else 1e-4)  # fmt: skip
 
 
-def test_a_bed_at_rest_weighs_what_it_should(fill: Fill) -> None:
-    filled = fill(_one_class(45))
+WATER = {"compound": {"density_kg_m3": 1000.0}}
+SUBMERGED = 1 - 1000 / 2656
+
+
+def test_a_submerged_clump_sinks_by_its_reduced_weight(fill: Fill) -> None:
+    filled = fill(_one_class(1), **WATER)
+    filled.run(_free(filled.text, "vel constant 0.0 0.0 0.3 omega constant 90.0 50.0 70.0",
+                     3500, 500))  # fmt: skip
+    frames = [Bodies(filled.case).frame(one) for one in filled.frames() if one.rows]
+    took = (frames[-1].step - frames[0].step) * filled.case.timestep_s
+    speed = frames[-1].vectors(*VELOCITY)[0] - frames[0].vectors(*VELOCITY)[0]
+    np.testing.assert_allclose(speed, [0, 0, -SUBMERGED * 9.81 * took], rtol=1e-6, atol=1e-12)
+
+
+@pytest.mark.parametrize(("more", "weight"), [({}, 1.0), (WATER, SUBMERGED)], ids=["dry", "wet"])
+def test_a_bed_at_rest_weighs_what_it_should(
+    more: dict[str, Any], weight: float, fill: Fill
+) -> None:
+    filled = fill(_one_class(45), **more)
     filled.columns = ("floor_n", "side_n")
     script = filled.text.replace(
         " id_multisphere", " id_multisphere f_force_floor[3] f_force_side[3]"
@@ -167,7 +184,7 @@ def test_a_bed_at_rest_weighs_what_it_should(fill: Fill) -> None:
     assert len(frames) > 300
     assert {one.rows for one in frames} == {45 * len(of_run.radii_m)}
     carried = np.mean([one.vectors("floor_n", "side_n").sum() for one in frames])
-    assert carried == pytest.approx(45 * of_run.mass_kg * 9.81, rel=1e-3)
+    assert carried == pytest.approx(weight * 45 * of_run.mass_kg * 9.81, rel=1e-3)
     assert np.abs(Bodies(filled.case).frame(frames[-1]).vectors(*VELOCITY)).max() < 1e-3
 
 

@@ -184,6 +184,7 @@ CautionCode = Literal[
     "size_ratio",
     "stable_timestep",
     "steps_per_contact",
+    "tilt",
     "trials",
 ]
 """What a `Caution` is about."""

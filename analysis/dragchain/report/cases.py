@@ -166,6 +166,8 @@ def _class(kind: ClassOfRun, case: CaseOfRun, findings: Sequence[ProcessFindings
 def _bowl(case: CaseOfRun, filling: FillingFindings | None) -> Iterator[str]:
     study = study_of(case)
     yield f"{study.bowl.material} {study.bowl.words(_mm)}"
+    if study.motion.bowl is not None:
+        yield f"{study.motion.bowl.kind}: {study.motion.bowl.words()}"
     if filling is not None and "bed_height_m" in filling.bed:
         fraction = filling.bed.get("solid_fraction")
         solid = f", solid fraction {number(fraction)}" if fraction is not None else ""

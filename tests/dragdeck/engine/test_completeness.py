@@ -159,7 +159,8 @@ def test_frames_in_a_tilted_box_are_whole(tmp_path: Path) -> None:
     ]
     (tmp_path / "a.bin").write_bytes(b"".join(tilted))
     agrees_with_the_reader(tmp_path / "a.bin")
-    first, last = some_frames(tmp_path, dump("a.bin"), parts(0), 20)
+    (start, first), (end, last) = some_frames(tmp_path, dump("a.bin"), parts(0), 20)
+    assert (start, end) == (0, 14)
     assert sorted(first.tolist()) == sorted(ROWS[0])
     np.testing.assert_array_equal(last, ROWS[14])
 

@@ -10,9 +10,14 @@ from made_study import Made
 from pydantic import TypeAdapter
 
 from dragdeck.cases.bed import bed_classes, bed_rayleigh_time, bed_volume, body_sizes
+from dragdeck.cases.case import Case
+from dragdeck.decks.render import deck_text
+from dragdeck.decks.templates import environment
 from dragdeck.errors import InputError
 from dragdeck.mesh.clump import SPHERE, body, fit_clump
+from dragdeck.physics.packing import Bed
 from dragdeck.scenes.filling import filling_scene
+from dragdeck.scenes.process import process_scene
 from dragdeck.study.shapes import AnyShape
 
 SHAPE: TypeAdapter[Any] = TypeAdapter(AnyShape)
@@ -158,9 +163,43 @@ BAD: list[tuple[dict[str, Any], str]] = [
 ]
 
 
-def test_no_compound_with_clumps(made: Made) -> None:
-    with pytest.raises(InputError, match="lift every sphere of a clump"):
-        made({"media": {"shape": ROD}, "compound": {"density_kg_m3": 1000, "level_m": 0.05}})
+def _in_water(made: Made, level_m: float) -> Case:
+    water = {"density_kg_m3": 1000, "level_m": level_m}
+    return made({"media": {"shape": ROD}, "compound": water})
+
+
+def test_submerged_clumps_weigh_less_by_gravity(made: Made, project: Any) -> None:
+    """Filling and process; LIGGGHTS would lift every sphere of a clump."""
+    case, bed = _in_water(made, 0.08), Bed(0.038, 0.045)
+    for scene in (filling_scene(case), process_scene(case, bed)):
+        assert scene.deck.gravity_m_s2 == pytest.approx(9.81 * (1 - 1000 / 2656))
+        text = deck_text(scene, environment(project.templates))
+        assert "wholly submerged" in text and "fix buoyancy all" not in text
+        assert scene.case.gravity_m_s2 == 9.81
+        assert "a smaller gravity" in scene.models["buoyancy of particles"]
+    assert filling_scene(case).case.media.weight_kg_m3 == pytest.approx(1656)
+
+
+def test_partly_submerged_clumps_are_refused(made: Made) -> None:
+    """Before the filling by the expected bed, before the process by the settled one."""
+    with pytest.raises(InputError, match=r"compound.level_m: .* not wholly submerged[\s\S]*0.03"):
+        filling_scene(_in_water(made, 0.03))
+    case = _in_water(made, 0.08)
+    process_scene(case, Bed(0.06, 0.0799))
+    with pytest.raises(InputError, match=r"not wholly submerged[\s\S]*at least 0.0801 m"):
+        process_scene(case, Bed(0.06, 0.0801))
+
+
+def test_clumps_of_two_densities_are_not_submerged(made: Made) -> None:
+    rod = {"material": "ceramic", "radius_mean_m": 3e-3, "fraction": 0.5, "shape": ROD}
+    classes = {"rods": rod, "balls": {**rod, "material": "steel", "shape": None}}
+    media = {"count": 60, "fractions_of": "number", "classes": classes, "material": None,
+             "radius_mean_m": None, "radius_std_m": 0}  # fmt: skip
+    pair = {"restitution": 0.6, "friction": 0.3}
+    mixed = {"media": media, "pairs.steel-steel": pair}
+    made(mixed)
+    with pytest.raises(InputError, match="the same for all of them"):
+        made({**mixed, "compound": {"density_kg_m3": 1000, "level_m": 0.08}})
 
 
 @pytest.mark.parametrize(("media", "problem"), BAD, ids=[problem for _, problem in BAD])

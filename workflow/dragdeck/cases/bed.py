@@ -26,6 +26,9 @@ from dragdeck.study.workpiece import Material
 JUST_BEYOND = 1 + 1e-6
 """A limit counts as passed from this multiple of it on: a rounded remedy may meet it exactly."""
 
+MESHED_PART = 0.99
+"""Part of the height of the simulation box up to which a mesh of the bowl reaches at most."""
+
 
 @dataclass(frozen=True)
 class BedClass:

@@ -107,8 +107,8 @@ class Case:
 
     @property
     def axis_speed_m_s(self) -> float:
-        """Speed at which the workpiece's axis is driven along its path, m/s."""
-        return self.study.motion.nominal_speed_m_s * self.study.chosen_fidelity().speed_factor
+        """Speed at which the workpiece's axis is driven relative to the bowl, m/s."""
+        return self.study.motion.speed_in_bowl_m_s * self.study.chosen_fidelity().speed_factor
 
     @property
     def study_name(self) -> str:

@@ -132,7 +132,8 @@ def _through_the_top(
     if top is None or "particles" not in outputs or not (folder / CASE_FILE).is_file():
         return ""
     particles = outputs["particles"]
-    *_, rows = [np.empty((0, len(particles.columns))), *some_frames(folder, particles, parts, 2)]
+    none = np.empty((0, len(particles.columns)))
+    *_, (_, rows) = [(0, none), *some_frames(folder, particles, parts, 2)]
     names = "z_m", "vz_m_s", "radius_m"
     z, speed, radius = rows[:, [particles.columns.index(name) for name in names]].T
     gravity = CaseOfBed.read(folder / CASE_FILE).gravity_m_s2
@@ -173,7 +174,7 @@ def _in_bowl(
     folder: Path, particles: OutputOfRun, parts: Sequence[RunPart], highest_m: float
 ) -> list[AcceptanceCheck]:
     """Whether the settled packing lies between the walls, below the rim; none without a frame."""
-    *_, rows = [np.empty((0, 0)), *some_frames(folder, particles, parts, 2)]
+    *_, (_, rows) = [(0, np.empty((0, 0))), *some_frames(folder, particles, parts, 2)]
     if not rows.size:
         return []
     z, radius = (particles.columns.index(name) for name in ("z_m", "radius_m"))
@@ -257,7 +258,7 @@ def _stable_timestep(
     names = ("x_m", "y_m", "z_m", "radius_m", "particle_id")
     wanted = [particles.columns.index(name) for name in names]
     frames = some_frames(folder, particles, parts, _FRAMES)
-    numbers = [_stability_number(case, rows[:, wanted]) for rows in frames]
+    numbers = [_stability_number(case, step, rows[:, wanted]) for step, rows in frames]
     number, reason, limit = float(np.median(numbers or [0.0])), case.unsafe_timestep, "1"
     if number > 1:
         stable = f"{number**-2:.2g} times the time step is stable"
@@ -267,10 +268,13 @@ def _stable_timestep(
     return _check("stable_timestep", "stable time step", passed, seen, limit, number=median)
 
 
-def _stability_number(case: CaseOfBed, rows: Floats) -> float:
+def _stability_number(case: CaseOfBed, step: int, rows: Floats) -> float:
     """That of centres, radii and ids; infinite for those of no packing."""
     if not (rows.size and np.isfinite(rows).all()):
         return math.inf
+    if case.bowl.motion is not None:
+        shift = case.bowl.motion.shift(np.array([step]), case.timestep_s)
+        rows = rows - np.pad(shift, ((0, 0), (0, 2)))
     rows = rows[np.argsort(rows[:, 4])] if case.bodies else rows
     ids = rows[:, 4].astype(np.int64)
     ids = case.body_of(ids) if case.bodies else ids

@@ -63,16 +63,16 @@ def coverage(folder: Path, output: OutputOfRun, parts: Sequence[RunPart]) -> Cov
 
 def some_frames(
     folder: Path, output: OutputOfRun, parts: Sequence[RunPart], most: int
-) -> Iterator[Floats]:
-    """The rows of so many frames of a binary dump at most, spread evenly, the last one included."""
+) -> Iterator[tuple[int, Floats]]:
+    """Step and rows of so many frames of a dump at most, spread evenly, the last one included."""
     files = [file for file in part_files(folder, {"": output}, parts) if file.is_file()]
     ends = [(file, (0, *(end for _, end in whole_frames(file, output).ends))) for file in files]
     begins = [(file, begin) for file, places in ends for begin in places[:-1]]
     for number in np.linspace(0, len(begins) - 1, min(most, len(begins))).astype(int):
         file, begin = begins[number]
         with Cursor(file, output, begin) as at:
-            _, cells = frame_cells(at)
-        yield cells.T
+            step, cells = frame_cells(at)
+        yield step, cells.T
 
 
 def _gap(steps: set[int], output: OutputOfRun) -> int | None:

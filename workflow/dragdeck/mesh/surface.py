@@ -112,6 +112,15 @@ def facing_out(mesh: Trimesh) -> Trimesh | None:
     return surface(mesh.vertices, mesh.faces[:, ::-1])
 
 
+def facing_up(mesh: Trimesh) -> Trimesh | None:
+    """The same open surface with its facets facing the side of its opening; None with one side."""
+    if not mesh.is_winding_consistent:
+        one_side = _one_side(mesh)
+        return None if one_side is None else facing_up(one_side)
+    upwards = float(mesh.triangles_cross[:, 2].sum()) > 0.0
+    return mesh if upwards else surface(mesh.vertices, mesh.faces[:, ::-1])
+
+
 def _one_side(mesh: Trimesh) -> Trimesh | None:
     """The same body with all facets facing out, or all in.
 
@@ -204,3 +213,24 @@ def place(mesh: Trimesh, axis_m: tuple[float, float] | None = None) -> Trimesh:
     low, high = mesh.bounds
     x, y = axis_m or ((low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0)
     return surface(mesh.vertices - np.array([x, y, low[2]]), mesh.faces)
+
+
+def open_edges(faces: Integers) -> Integers:
+    """Edges of one facet alone, (E, 2), in the sense of this facet."""
+    edges = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    _, place, count = np.unique(
+        np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True
+    )
+    return np.asarray(edges[count[place.ravel()] == 1])
+
+
+def raised(bowl: Trimesh, height_m: float) -> Trimesh:
+    """A bowl with upright walls above its rim, up to a height."""
+    low = open_edges(bowl.faces)
+    nodes, place = np.unique(low, return_inverse=True)
+    begin, end = (len(bowl.vertices) + place.reshape(-1, 2)).T
+    first, second = low.T
+    top = bowl.vertices[nodes] * [1, 1, 0] + [0, 0, height_m]
+    sides = [[second, first, begin], [second, begin, end]]
+    walls = np.hstack([np.array(side) for side in sides]).T
+    return surface(np.vstack([bowl.vertices, top]), np.vstack([bowl.faces, walls]))

@@ -2,11 +2,12 @@
 
 import math
 
-from dragdeck.cases.bed import particle_material
+from dragdeck.cases.bed import particle_material, skin
 from dragdeck.cases.case import Case, of_each_workpiece
 from dragdeck.cases.ranks import cores_here
 from dragdeck.physics.contact_mechanics import effective_modulus, impact_overlap
 from dragdeck.scenes.filling import MOST_OVERLAP, expected_bed, floor_overlap, rank_split
+from dragdeck.scenes.moving_bowl import bed_in_motion
 from dragdeck.scenes.workpiece import clearances, closest, describe, fastest_surface, in_diameters
 from dragdeck.study.contact_law import compared_labels
 
@@ -17,13 +18,14 @@ _RATIOS = {
     "superposed_speed": "(highest surface speed - speed along the path) / speed along the path",
     "bowl_froude_number": "Froude number of the bowl's rotation",
     "submerged_weight_ratio": "weight of the particles minus buoyancy / weight",
+    "surface_tilt_deg": "inclination of the bed's surface below the path (degrees)",
     "tilt_deg": "tilt of the workpiece (degrees)",
 }
 
 
 def workpiece_notes(case: Case) -> list[tuple[str, str]]:
     """What ``check`` says of a process: a heading and a text each."""
-    bed = expected_bed(case.study)
+    bed = bed_in_motion(case.study, expected_bed(case.study))
     gaps = clearances(case, bed.surface_m)
     return [
         ("gap between workpiece and wall", _gap(case, gaps.wall_m)),
@@ -58,7 +60,10 @@ def _between(case: Case) -> list[tuple[str, str]]:
 
 def _rotation(case: Case) -> list[tuple[str, str]]:
     """How the bowl rotates, if it does."""
-    rpm = case.study.motion.bowl_rad_s * 60 / math.tau
+    motion = case.study.motion
+    if motion.bowl is not None:
+        return [("motion of the bowl", motion.bowl.words())]
+    rpm = motion.bowl_rad_s * 60 / math.tau
     sense = "counter-clockwise" if rpm > 0 else "clockwise"
     text = f"{abs(rpm):.4g} 1/min, {sense} seen from above; the workpiece stands still"
     return [("rotation of the bowl", text)] if rpm else []
@@ -105,7 +110,7 @@ def _overlap(case: Case) -> str:
 
 
 def _ranks(case: Case) -> str:
-    parts = rank_split(case)
+    parts = rank_split(case, skin(case.study))
     if case.study.chosen_fidelity().ranks != "auto":
         return f"{case.ranks}, {parts}"
     cases = f"{case.beside} case{'s' if case.beside > 1 else ''}"

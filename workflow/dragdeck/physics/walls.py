@@ -13,20 +13,24 @@ from pydantic import PositiveFloat
 
 from dragdeck.arrays import Floats
 from dragdeck.parts import Part, omitted
+from dragdeck.physics import facets
 
-_SIDES = 120
-"""Corners of a drawn circle."""
+_BELOW_RIM = 1 - 1e-6
+"""Height of a section at the rim of facets, over that of the rim; 1 minus it: at the floor."""
+
+_SIDES, _SECTIONS = 120, 6
+"""Corners of a drawn circle; drawn sections of facets."""
 
 
 class Wall(Part):
-    """A plane, or an upright cylinder about the z axis, without end; or a part of a cone.
+    """A plane, or an upright cylinder about the z axis, without end; a part of a cone; or facets.
 
     Attributes
     ----------
     name : str
         In the input script.
     shape : str
-        Its name in LIGGGHTS, which has no ``cone``: there, the wall is a part of the mesh.
+        Its name in LIGGGHTS, which has no ``cone`` and no ``facets``: these are parts of the mesh.
     at_m : float
         Coordinate of the plane, or radius of the cylinder.
     inwards : int
@@ -35,25 +39,36 @@ class Wall(Part):
         Of a cone: radius and height of one end, then of the other.
     sides : int
         Of a cone, which is a polygon around the circle: the number of its sides.
+    corners_m : tuple of 9 floats each
+        Of facets that face inwards: x, y and z of their corners.
     """
 
     name: str
-    shape: Literal["xplane", "yplane", "zplane", "zcylinder", "cone"]
+    shape: Literal["xplane", "yplane", "zplane", "zcylinder", "cone", "facets"]
     at_m: float = omitted(0.0)
     inwards: Literal[1, -1] = 1
     ends_m: tuple[float, float, float, float] | None = omitted(None)
     sides: int = omitted(0)
+    corners_m: tuple[facets.Triangle, ...] = omitted(())
 
     @property
     def upright(self) -> bool:
         """Whether it is neither floor nor lid."""
-        return self.shape not in ("zplane", "cone")
+        return self.shape not in ("zplane", "cone", "facets")
+
+    @property
+    def triangles(self) -> Floats:
+        """The facets, (F, 3, 3)."""
+        return facets.corners(self.corners_m)
 
     def contacts(self, centre_m: Floats) -> tuple[Floats, Floats]:
         """Distances, (N,), and normals into the bowl, (N, 3), of (N, 3) points.
 
-        Distances are negative beyond the wall, but for a cone.
+        Distances are negative beyond the wall, but for a cone and for facets, of which the nearest
+        counts.
         """
+        if self.corners_m:
+            return facets.nearest(centre_m, self.triangles)
         if self.ends_m is not None:
             return _from_cone(centre_m, np.array(self.ends_m), self.sides)
         distance, normal = from_primitive(self.shape, (self.at_m, 0.0, 0.0), centre_m)
@@ -137,7 +152,13 @@ class Container(Part):
     @property
     def round(self) -> bool:
         """Whether it looks alike from all sides."""
-        return all(wall.shape == "zcylinder" for wall in self.upright)
+        return not self.own_facets.size and all(wall.shape == "zcylinder" for wall in self.upright)
+
+    @property
+    def own_facets(self) -> Floats:
+        """The facets of a bowl that has no other walls, (F, 3, 3)."""
+        every = [wall.triangles for wall in self.walls if wall.corners_m]
+        return every[0] if every else np.empty((0, 3, 3))
 
     @property
     def words(self) -> str:
@@ -173,6 +194,9 @@ class Container(Part):
                 at = r + (height - z) / (end_z - z or 1.0) * (end_r - r)
                 farther += (height >= min(z, end_z)) & (height < max(z, end_z)) & (at > radius)
                 nearest = np.minimum(nearest, wall.contacts(place_m)[0])
+        if self.own_facets.size:
+            nearest = np.minimum(nearest, facets.nearest(place_m, self.own_facets)[0])
+            farther += facets.is_inside(place_m, self.own_facets)
         outside = (height < self.rim_m) & (farther % 2 == 0)
         return np.asarray(np.where(outside, -np.abs(nearest), nearest))
 
@@ -195,6 +219,9 @@ class Container(Part):
 
     def chord(self, x_m: Floats, low_m: float, high_m: float) -> Floats:
         """Length along y, from `low_m` to `high_m`, that is inside at (N,) x, m."""
+        if self.own_facets.size:
+            rim = facets.cut(self.own_facets, self.rim_m * _BELOW_RIM)
+            return np.array([facets.chord(rim, x, low_m, high_m) for x in x_m.tolist()])
         low, high = np.full_like(x_m, low_m), np.full_like(x_m, high_m)
         hole = np.zeros_like(x_m)
         for wall in self.upright:
@@ -215,6 +242,9 @@ class Container(Part):
 
     def sections(self, height_m: float) -> list[Floats]:
         """Closed lines around the section at a height, (N, 2), m: the outermost first."""
+        if self.own_facets.size:
+            height_m = min(max(height_m, self.rim_m * (1 - _BELOW_RIM)), self.rim_m * _BELOW_RIM)
+            return facets.outlines(facets.cut(self.own_facets, height_m), _SIDES + 1)
         if not self.round:
             corners = [[1, 1], [-1, 1], [-1, -1], [1, -1], [1, 1]]
             return [np.array(corners) * self.half_widths_m]
@@ -231,7 +261,11 @@ class Container(Part):
         return [radius * circle for radius in sorted(radii, reverse=True)]
 
     def lines(self, height_m: float) -> Iterator[Floats]:
-        """Its edges up to a height, and lines up its walls, (N, 3), m."""
+        """Its edges up to a height, and lines up its walls, (N, 3), m; of facets, sections."""
+        if self.own_facets.size:
+            for z in np.linspace(0.0, height_m, _SECTIONS).tolist():
+                yield from (np.insert(outline, 2, z, axis=1) for outline in self.sections(z))
+            return
         ends = [wall.ends_m for wall in self.walls if wall.ends_m is not None]
         heights = {0.0, height_m, *(end[3] for end in ends if end[3] < height_m)}
         for z in sorted(heights):

@@ -15,9 +15,12 @@ from numpy.typing import NDArray
 
 from dragdeck.cases.case import Case, of_each_workpiece
 from dragdeck.mesh.surface import surface
+from dragdeck.physics.packing import Bed
 from dragdeck.scenes.filling import expected_bed
 from dragdeck.scenes.motion import Course, course
+from dragdeck.scenes.moving_bowl import bed_in_motion
 from dragdeck.scenes.workpiece import reference_height, workpiece_mesh, workpiece_radius
+from dragdeck.study.model import Study
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
@@ -115,7 +118,7 @@ def layout(case: Case) -> CaseLayout:
         The mesh of the workpiece is missing or cannot be used.
     """
     study = case.study
-    inside, level = study.bowl.container, expected_bed(study).surface_m
+    inside, level = study.bowl.container, _bed(study).surface_m
     return CaseLayout(
         bowl=study.bowl.mesh(study.bowl.height_m, inside.clear_m / 10),
         bed=_section(inside.sections(level), level),
@@ -128,8 +131,12 @@ def layout(case: Case) -> CaseLayout:
     )
 
 
+def _bed(study: Study) -> Bed:
+    return bed_in_motion(study, expected_bed(study))
+
+
 def _moving(case: Case) -> MovingWorkpiece:
-    way = course(case.study, expected_bed(case.study), reference_height(case))
+    way = course(case.study, _bed(case.study), reference_height(case))
     moving = way.driven.superposed.values()
     turn = sum(float(motion.turn(way.drag, np.ones(1))[0]) for motion in moving)
     return MovingWorkpiece(

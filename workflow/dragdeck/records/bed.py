@@ -10,6 +10,7 @@ from dragdeck.parts import Part, omitted
 from dragdeck.physics.contact_mechanics import ContactConstants
 from dragdeck.physics.walls import Container
 from dragdeck.records.run import CaseFile, CountOfRun
+from dragdeck.study.bowl_motions.registry import AnyBowlMotion
 
 
 class MediaOfRun(CountOfRun):
@@ -119,9 +120,12 @@ class BowlOfRun(Container):
     ----------
     meshed : bool
         Whether the particles touch a mesh in place of its walls.
+    motion : BowlMotion or None
+        How it moves during the process, as driven.
     """
 
     meshed: bool = omitted(False)
+    motion: AnyBowlMotion | None = omitted(None)
 
 
 class CaseOfBed(CaseFile):

@@ -11,6 +11,7 @@ import numpy as np
 
 from dragdeck.cases.bed import (
     JUST_BEYOND,
+    MESHED_PART,
     BodySize,
     bed_classes,
     bed_density,
@@ -56,7 +57,9 @@ from dragdeck.records.case import FillingCase
 from dragdeck.records.run import SettlingCriterion
 from dragdeck.scenes.scene import (
     SceneType,
+    acting_gravity,
     case_of_study,
+    check_submerged,
     liquid,
     liquid_leaves_out,
     liquid_models,
@@ -111,6 +114,7 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
     study = case.study
     _check_capacity(case)
     _check_cells(case)
+    check_submerged(case, expected_bed(study))
     fidelity = study.chosen_fidelity()
     rayleigh = bed_rayleigh_time(study)
     dt = bed_timestep(study, "filling_timestep_fraction")
@@ -126,7 +130,7 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
         source="particles.data",
         materials=material_table(study, types, fidelity.youngs_modulus_scale, case),
         limit_force=study.contact.limit_force,
-        gravity_m_s2=study.gravity_m_s2,
+        gravity_m_s2=acting_gravity(study),
         liquid=liquid(study),
         skin_m=skin(study),
         timestep_s=dt,
@@ -134,7 +138,7 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
         outputs=(outputs.thermo(check_steps, None), outputs.settled_particles(study.media.clumped)),
         thermo_steps=check_steps,
         checkpoint_steps=5 * check_steps,
-        processors=rank_split(case).line,
+        processors=rank_split(case, skin(study)).line,
         bowl_type=types.index(study.bowl.material) + 1,
         bowl=study.bowl.container,
         energy_ratio=study.filling.energy_ratio,
@@ -142,7 +146,7 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
         check_steps=check_steps,
         most_checks=math.ceil(longest / (check_steps * dt)),
         max_time_s=longest,
-        neighbours=max(ENGINE_NEIGHBOURS, bowl_neighbours(study) if meshed else 0),
+        neighbours=max(ENGINE_NEIGHBOURS, bowl_neighbours(study, skin(study)) if meshed else 0),
         clumped=study.media.clumped,
         insertions=body_sizes(study),
         seeds=primes(study.seed, 3 * MOST_SIZES * len(study.media.parts)),
@@ -308,8 +312,8 @@ def box_top(study: Study) -> float:
     return math.ceil(100 * max(falling, above_bed, 2 * study.bowl.height_m) + 5) / 100
 
 
-def rank_split(case: Case) -> Split:
-    """How the box of a case is split among its ranks."""
+def rank_split(case: Case, skin_m: float) -> Split:
+    """How the box of a case is split among its ranks, with that neighbour skin."""
     study = case.study
     filled = FilledBowl(
         particles=study.sphere_count,
@@ -318,7 +322,7 @@ def rank_split(case: Case) -> Split:
         half_widths_m=box_half_widths(study),
         bottom_m=-study.media.typical_radius_m,
         top_m=box_top(study),
-        reach_m=(4 if study.media.clumped else 2) * farthest_point(study) + skin(study),
+        reach_m=(4 if study.media.clumped else 2) * farthest_point(study) + skin_m,
     )
     return split(case.ranks, filled)
 
@@ -336,7 +340,7 @@ def floor_overlap(study: Study) -> float:
 def filling_cautions(case: Case) -> Iterator[Caution]:
     """What a user should know of a filling before it runs."""
     study = case.study
-    yield from rank_warnings(rank_split(case))
+    yield from rank_warnings(rank_split(case, skin(study)))
     yield from _overlap_caution(study)
     yield from _cohesion_caution(study)
     yield from _class_cautions(study)
@@ -464,12 +468,12 @@ def _size_cautions(study: Study) -> Iterator[Caution]:
         )
 
 
-def bowl_neighbours(study: Study) -> int:
+def bowl_neighbours(study: Study, skin_m: float) -> int:
     """More facets of the bowl, at least 0.4 size^2 each, than a particle in a corner reaches."""
     size = study.bowl_facet_size_m
     if size is None:
         return 0
-    reach_m = farthest_point(study) + skin(study) + 2 * size
+    reach_m = farthest_point(study) + skin_m + 2 * size
     return math.ceil(3 * math.pi * reach_m**2 / (0.4 * size**2))
 
 
@@ -478,7 +482,8 @@ def bowl_files(study: Study, top_m: float) -> dict[str, Callable[[], str]]:
     size = study.bowl_facet_size_m
     if size is None:
         return {}
-    height = 0.99 * top_m if study.bowl.container.rim else min(study.bowl.height_m, 0.99 * top_m)
+    highest = MESHED_PART * top_m
+    height = highest if study.bowl.container.rim else min(study.bowl.height_m, highest)
     mesh = study.bowl.mesh(height, size)
     return {"bowl.stl": lambda: stl_text(mesh)}
 

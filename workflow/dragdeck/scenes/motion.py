@@ -114,7 +114,7 @@ def surface_speed(motion: Motion, radius_m: float) -> float:
         Of the workpiece.
     """
     axis = motion.nominal_speed_m_s * motion.path.peak_speed_ratio
-    return axis + added_speed(motion, radius_m, 1.0)
+    return max(axis, motion.speed_in_bowl_m_s) + added_speed(motion, radius_m, 1.0)
 
 
 def added_speed(motion: Motion, radius_m: float, factor: float) -> float:
@@ -350,6 +350,7 @@ class ProcessDeck(Deck):
     bowl: Container
     bowl_facets: bool
     bowl_rad_s: float
+    bowl_motion: EngineMotion
     workpiece_type: int
     workpieces: Sequence[MovedWorkpiece]
     stops: Sequence[Stop]

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from functools import partial
 
-from dragdeck.cases.bed import bed_rayleigh_time, bed_timestep, buoyancy_density, skin
+from dragdeck.cases.bed import bed_rayleigh_time, bed_timestep, buoyancy_density
 from dragdeck.cases.case import Case, Stretch, mesh_file, of_each_workpiece
 from dragdeck.decks import PACKING_FILE, WORKPIECE_MESH, outputs
 from dragdeck.decks.deck import NOT_OF_LIQUID, LeftOut, Scene
@@ -41,10 +41,13 @@ from dragdeck.scenes.motion import (
     moved_workpiece,
     output_periods,
 )
+from dragdeck.scenes.moving_bowl import bed_in_motion, bowl_cautions, check_bowl_motion
 from dragdeck.scenes.scene import (
     SceneType,
+    acting_gravity,
     assumed,
     case_of_study,
+    check_submerged,
     liquid,
     liquid_leaves_out,
     liquid_models,
@@ -62,6 +65,7 @@ from dragdeck.scenes.workpiece import (
     fastest_motion,
     may_jam,
     process_cautions,
+    process_skin,
     reference_height,
     remeshing,
     simulated_mesh,
@@ -74,8 +78,8 @@ from dragdeck.scenes.workpiece import (
 from dragdeck.study.base import Json, without_fields
 from dragdeck.study.bowls.bowl import LID
 from dragdeck.study.contact_law import coefficient_words
-from dragdeck.study.drive import Drive
-from dragdeck.study.model import Study
+from dragdeck.study.drive import Drive, EngineMotion
+from dragdeck.study.model import Motion, Study
 from dragdeck.study.workpiece import CylinderShape, MeshShape, Shape
 
 _ENERGY_DRIFT = 0.1
@@ -102,16 +106,19 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
     each = of_each_workpiece(whole)
     study, counts = whole.study, [workpiece_facets(workpiece) for workpiece in each]
     fidelity, facets = study.chosen_fidelity(), study.bowl_facet_size_m is not None
-    bed = bed or expected_bed(study)
+    settled = bed or expected_bed(study)
     dt, top = bed_timestep(study, "timestep_fraction"), box_top(study)
+    check_bowl_motion(whole, settled, top)
+    bed = bed_in_motion(study, settled)
     periods, meshes = output_periods(study, dt), _mesh_files(each)
     check_apart(each, bed)
     check_lid(whole, bed)
+    check_submerged(whole, bed)
     courses, moved = (
         [course(workpiece.study, bed, reference_height(workpiece)) for workpiece in each],
         [],
     )
-    drag = courses[0].drag
+    drag, bowl_motion = courses[0].drag, courses[0].driven.bowl
     steps = covered(whole, drag)
     for workpiece, way in zip(each, courses, strict=True):
         check_fit(workpiece, bed.lowest_m, dt)
@@ -119,7 +126,8 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
             moved_workpiece(workpiece, way, meshes[workpiece.study.workpiece.shape], steps.entry)
         )
         check_headroom(workpiece, way.start_m[2] + bed.margin_m - reference_height(workpiece), top)
-    types, parts = study.type_names(), rank_split(whole)
+    skin = max(map(process_skin, each))
+    types, parts = study.type_names(), rank_split(whole, skin)
     materials = material_table(study, types, fidelity.youngs_modulus_scale, whole)
     bowl = study.bowl.closed
     primitive = tuple(wall for wall in bowl.walls if not facets or wall.name == LID)
@@ -133,12 +141,12 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         source=_source(whole),
         materials=materials,
         limit_force=study.contact.limit_force,
-        gravity_m_s2=study.gravity_m_s2,
+        gravity_m_s2=acting_gravity(study),
         liquid=liquid(study),
-        skin_m=skin(study),
+        skin_m=skin,
         timestep_s=dt,
         rayleigh_time_s=bed_rayleigh_time(study),
-        neighbours=max(ENGINE_NEIGHBOURS, bowl_neighbours(study), *counts),
+        neighbours=max(ENGINE_NEIGHBOURS, bowl_neighbours(study, skin), *counts),
         outputs=_outputs(
             periods,
             drag,
@@ -156,6 +164,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         bowl=bowl.model_copy(update={"walls": primitive}),
         bowl_facets=facets,
         bowl_rad_s=courses[0].driven.bowl_rad_s,
+        bowl_motion=bowl_motion.on_engine(dt) if bowl_motion else EngineMotion({}),
         clumped=study.media.clumped,
         workpiece_type=types.index(study.workpiece.material) + 1,
         workpieces=moved,
@@ -179,6 +188,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
             courses[number],
             limits,
             steps,
+            skin,
             None if jam else thrown_speed(study.gravity_m_s2, top, fastest),
         ),
         steps=steps.end - steps.entry,
@@ -194,7 +204,7 @@ def _cautions(each: Sequence[Case]) -> Iterator[Caution]:
     """What a user should know of each workpiece; it is named where not all of them are meant."""
     by_text: dict[str, tuple[Caution, list[str]]] = {}
     for number, workpiece in enumerate(each, 1):
-        for caution in process_cautions(workpiece):
+        for caution in (*process_cautions(workpiece), *bowl_cautions(workpiece)):
             by_text.setdefault(str(caution), (caution, []))[1].append(str(number))
     for caution, numbers in by_text.values():
         owners = f"workpiece {', '.join(numbers)}: " if len(numbers) < len(each) else ""
@@ -265,6 +275,7 @@ def _process_case(
     way: Course,
     limits: RunLimits,
     steps: Covered,
+    skin_m: float,
     thrown_m_s: float | None,
 ) -> ProcessCase:
     case, drag = each[number], way.drag
@@ -278,9 +289,16 @@ def _process_case(
         PROCESS.run_id(case),
         drag.timestep_s,
         bed_rayleigh_time(study),
-        settings=study.chosen_fidelity().model_dump(include={"timestep_fraction", "speed_factor"}),
+        settings={
+            **study.chosen_fidelity().model_dump(include={"timestep_fraction", "speed_factor"}),
+            "skin_m": skin_m,
+        },
         media=media_of_run(study, buoyancy_density(study)),
-        bowl=BowlOfRun(**dict(study.bowl.closed), meshed=study.bowl_facet_size_m is not None),
+        bowl=BowlOfRun(
+            **dict(study.bowl.closed),
+            meshed=study.bowl_facet_size_m is not None,
+            motion=way.driven.bowl,
+        ),
         assumptions=[*assumed(study), *_of_liquid(case, surface_m)],
         asked=case.advised,
         study=said_study(study),
@@ -340,15 +358,30 @@ def _wake_from(each: Sequence[Case], number: int) -> float | None:
     if around is None or ahead is None:
         return None
     others = (workpiece.study.motion.path.ahead_deg or 0.0 for workpiece in each)
-    gap = min((other - ahead - 1e-6) % 360 + 1e-6 for other in others)
-    distance = around * gap / 360
+    against = _against_bed(each[number].study.motion)
+    if not against:
+        return None
+    sense = math.copysign(1.0, against)
+    gap = min((sense * (other - ahead) - 1e-6) % 360 + 1e-6 for other in others)
+    distance = around * gap / 360 / abs(against)
     return round_to(distance, 9) if distance < path.path_length_m * (1 - 1e-6) else None
+
+
+def _against_bed(motion: Motion) -> float:
+    """Angular speed of a workpiece on a circle against a bed that turns, over that of its path."""
+    path = motion.path
+    if motion.bowl is None:
+        return 1.0
+    rate = motion.nominal_speed_m_s / math.hypot(*path.start_point)
+    sense = math.sin(path.direction_rad - math.atan2(*reversed(path.start_point)))
+    return 1.0 - motion.bowl.rad_s / math.copysign(rate, sense)
 
 
 def _fastest(case: Case, way: Course) -> float:
     """Speed of the fastest leg, or of a surface or the bowl if one can be faster, m/s."""
     speeds, motion = [leg.speed_m_s for leg in way.legs], case.study.motion
-    if motion.superposed() or motion.bowl_rad_s or motion.path.peak_speed_ratio > 1:
+    moved = motion.bowl or motion.bowl_rad_s
+    if motion.superposed() or moved or motion.path.peak_speed_ratio > 1:
         speeds.append(fastest_motion(case))
     return max(speeds)
 
@@ -356,6 +389,8 @@ def _fastest(case: Case, way: Course) -> float:
 def _models(study: Study) -> dict[str, str]:
     optional, superposed = coefficient_words(study.pairs.values())[0], study.motion.superposed()
     exact, why = study.bowl_facet_size_m is None, "facets, as requested"
+    if study.motion.bowl:
+        why = "facets, because it moves"
     if study.motion.bowl_rad_s:
         why = "facets, whose surface moves with the rotation"
     if study.bowl.container.rim:

@@ -149,13 +149,15 @@ def _compound(study: Study) -> _Found:
     compound, rim = study.compound, study.bowl.height_m
     if compound is None:
         return
-    if study.media.clumped:
-        problem = "LIGGGHTS would lift every sphere of a clump by its whole volume"
-        yield "compound", problem, "spherical particles, or no compound"
     if study.liquid_level_m > rim:
         problem = "the liquid stands above the rim of the bowl"
         yield "compound.level_m", problem, f"at most {rim:g} m"
-    for name in sorted({*study.media.materials} & {*study.materials}):
+    names = sorted({*study.media.materials} & {*study.materials})
+    densities = {study.materials[name].density_kg_m3 for name in names}
+    if study.media.clumped and len(densities) > 1:
+        problem = "clumps have their reduced weight by gravity, which is the same for all of them"
+        yield "compound", problem, "media of one density, spherical particles, or no compound"
+    for name in names:
         lightest = study.materials[name].density_kg_m3
         if compound.density_kg_m3 >= lightest:
             problem = f"particles of {name} float, so that there is no bed at the floor"
@@ -195,7 +197,8 @@ def _motion(study: Study) -> _Found:
     """Statistics need a frame of the contact network after all that they leave out."""
     motion, problem = study.motion, "no path is left for the statistics"
     if motion.bowl_rad_s and not study.bowl.container.round:
-        yield "motion.path", f"a bowl of kind {study.bowl.kind} cannot rotate", "a round bowl"
+        field = "motion.bowl" if motion.bowl else "motion.path"
+        yield field, f"a bowl of kind {study.bowl.kind} cannot rotate", "a round bowl"
     length, speed = motion.path_length_m, motion.nominal_speed_m_s
     frame = speed / study.outputs.network_hz
     if length < frame * (1 - 1e-9):

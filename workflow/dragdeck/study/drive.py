@@ -49,6 +49,12 @@ class SmoothStart:
         x = np.minimum(since / max(self.steps, 1), 1.0) if self.steps else np.ones(1)
         return np.broadcast_to(x**2 * (3.0 - 2.0 * x), since.shape)
 
+    def pace_formula(self, start_step: int) -> str:
+        """`pace` of a start that takes time, at the engine's ``step``."""
+        share = f"((step-{start_step})/{self.steps}.0)"
+        started = f"(step-{start_step}>={self.steps})"
+        return f"({share}^2*(3.0-2.0*{share})*(1-{started})+{started})"
+
     def formula(self, start_step: int) -> str:
         """`advance` at the engine's ``step``."""
         since, ramp = f"(step-{start_step})", self.steps

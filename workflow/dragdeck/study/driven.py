@@ -6,6 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
+from dragdeck.study.bowl_motions.bowl_motion import BowlMotion
 from dragdeck.study.drive import (
     Drive,
     EngineMotion,
@@ -22,10 +23,19 @@ from dragdeck.study.superposed.motion import SuperposedMotion
 
 @dataclass(frozen=True)
 class DrivenMotion:
-    """A motion in whole steps, counted from the start of the drag."""
+    """A motion in whole steps, counted from the start of the drag.
+
+    Attributes
+    ----------
+    motion : Motion
+    drive : Drive
+    bowl : BowlMotion or None
+        Motion of the bowl, as driven.
+    """
 
     motion: Motion
     drive: Drive
+    bowl: BowlMotion | None = None
 
     @classmethod
     def of(
@@ -57,6 +67,7 @@ class DrivenMotion:
                 tilt_deg=motion.tilt_deg or 0.0,
                 begin=begin,
             ),
+            motion.bowl and motion.bowl.faster(speed_factor),
         )
 
     @property
@@ -129,7 +140,8 @@ class DrivenMotion:
     @property
     def bowl_rad_s(self) -> float:
         """Angular speed of the bowl about +z."""
-        return self.motion.path.bowl_rad_s(self.drive.speed_m_s)
+        by_path = self.motion.path.bowl_rad_s(self.drive.speed_m_s)
+        return self.bowl.rad_s if self.bowl else by_path
 
     def superposed_on_engine(self) -> Mapping[str, EngineMotion]:
         """How the engine makes what is superposed, by name."""

@@ -8,6 +8,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
+import numpy as np
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from dragdeck.study.base import (
@@ -23,17 +24,20 @@ from dragdeck.study.base import (
     flat,
     without_fields,
 )
+from dragdeck.study.bowl_motions.registry import AnyBowlMotion
 from dragdeck.study.bowls.annulus import AnnulusBowl
 from dragdeck.study.bowls.cylinder import CylinderBowl
+from dragdeck.study.bowls.mesh import MeshBowl
 from dragdeck.study.bowls.revolved import RevolvedBowl
 from dragdeck.study.bowls.trough import TroughBowl
 from dragdeck.study.calibration import Calibration
 from dragdeck.study.contact_law import Contact, Pair
+from dragdeck.study.drive import about_vertical
 from dragdeck.study.media import MOST_CLASSES, Media, class_counts
 from dragdeck.study.paths.circle import CirclePath
 from dragdeck.study.paths.figure_eight import FigureEightPath
 from dragdeck.study.paths.line import LinePath
-from dragdeck.study.paths.path import turned
+from dragdeck.study.paths.path import as_rows, turned
 from dragdeck.study.paths.rest import RestPath
 from dragdeck.study.paths.waypoints import WaypointsPath
 from dragdeck.study.quantities import QUANTITIES
@@ -58,6 +62,7 @@ AnyBowl = (
     | Annotated[AnnulusBowl, Tag("annulus")]
     | Annotated[TroughBowl, Tag("trough")]
     | Annotated[RevolvedBowl, Tag("revolved")]
+    | Annotated[MeshBowl, Tag("mesh")]
 )
 """The registry of bowls."""
 
@@ -106,6 +111,14 @@ AnyPath = CirclePath | FigureEightPath | LinePath | RestPath | WaypointsPath
 """The registry of paths."""
 
 
+_PLACES = 1001
+"""Of a path, at which speeds are compared."""
+
+BED_FRICTION_DEG = 26.0
+"""Angle of friction of a bed of spheres, from the tilt of the surface in a turning bowl (friction
+0.34 between particles)."""
+
+
 _MOST_TURNED_DEG = 180
 """From one waypoint to the next: beyond, the shortest rotation is another one."""
 
@@ -135,6 +148,15 @@ class Motion(Superposed):
         description="inclination of the workpiece, degrees; positive: its upper end leans in the "
         "direction of motion, with orientation fixed in the first one; `spin` is then about the "
         "inclined axis",
+    )
+    bowl: AnyBowlMotion | None = Field(
+        default=None, description="motion of the bowl during the whole process; none: it rests"
+    )
+    bed_friction_deg: Annotated[Number, Field(ge=0, lt=90)] = Field(
+        default=BED_FRICTION_DEG,
+        exclude_if=lambda value: value == BED_FRICTION_DEG,
+        description="angle of friction of the bed, degrees, by which its surface in a rotating "
+        "bowl is less inclined than that of a liquid",
     )
     plunge_at_m: tuple[Number, Number] | None = Field(
         default=None,
@@ -168,6 +190,10 @@ class Motion(Superposed):
             raise ValueError(
                 f"an inclined workpiece turns by {self.path.most_turned_deg:g} degrees from one "
                 f"waypoint to the next, not by less than {_MOST_TURNED_DEG}: add waypoints"
+            )
+        if self.bowl is not None and self.path.bowl_rad_s(1.0):
+            raise ValueError(
+                f"motion.bowl cannot be used: the path `{self.path.kind}` rotates the bowl itself"
             )
         if self.ramp_s and self.path.own_speed_m_s is not None:
             raise ValueError("ramp_s cannot be used: the path itself gives the speed")
@@ -206,13 +232,28 @@ class Motion(Superposed):
 
     @property
     def nominal_speed_m_s(self) -> float:
-        """Speed of the workpiece's axis relative to the bowl, m/s."""
+        """Speed of the workpiece's axis along its path, m/s.
+
+        It is that relative to the bowl unless `bowl` moves it.
+        """
         return self.path.own_speed_m_s or self.speed_m_s or math.nan
+
+    @property
+    def speed_in_bowl_m_s(self) -> float:
+        """Speed of the workpiece's axis relative to the bowl, m/s: the highest, if that rotates."""
+        rate = self.bowl.rad_s if self.bowl else 0.0
+        if not rate:
+            return self.nominal_speed_m_s
+        share = np.linspace(0.0, 1.0, _PLACES)
+        place, along = (as_rows(part(share)) for part in (self.path.place, self.path.tangent))
+        speed = along * self.nominal_speed_m_s / self.path_length_m
+        return float(np.linalg.norm(speed - about_vertical(rate, place), axis=1).max())
 
     @property
     def bowl_rad_s(self) -> float:
         """Angular speed of the bowl about +z, rad/s."""
-        return self.path.bowl_rad_s(self.nominal_speed_m_s)
+        by_path = self.path.bowl_rad_s(self.nominal_speed_m_s)
+        return self.bowl.rad_s if self.bowl else by_path
 
     @property
     def path_length_m(self) -> float:
@@ -391,7 +432,9 @@ class Fidelity(Model):
         default=1.0, description="multiplier of the speed of the workpiece"
     )
     skin_m: Positive | None = Field(
-        default=None, description="neighbour skin, m; none: 10 % of the mean particle radius"
+        default=None,
+        description="neighbour skin, m; none: 10 % of the mean particle radius, in a fast process "
+        "up to 30 %",
     )
     ranks: Ranks = Field(
         default=2,
@@ -698,9 +741,9 @@ class Study(Model):
 
     @property
     def bowl_facet_size_m(self) -> float | None:
-        """Edge length of the bowl's facets, m; None for exact walls, which cannot rotate."""
+        """Edge length of the bowl's facets, m; None for exact walls, which cannot move."""
         size = self.bowl.own_facet_size_m
-        if size is None and self.motion.bowl_rad_s:
+        if size is None and (self.motion.bowl_rad_s or self.motion.bowl):
             return 2 * self.media.typical_radius_m
         return size
 

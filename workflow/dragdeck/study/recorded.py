@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import JsonValue, ValidationError
 
 from dragdeck.errors import InputError
+from dragdeck.mesh.bowl_file import bowl_facets
 from dragdeck.mesh.checks import check
 from dragdeck.mesh.clump import convex_corners
 from dragdeck.mesh.files import STEP, read
@@ -57,6 +58,9 @@ def with_recording(data: Json, study: Path) -> tuple[Json, Places, Mapping[str, 
             k: filled(value[k], f"{field}.{k}", recorded) for k, recorded in known.items()
         }
 
+    bowl = data.get("bowl")
+    if isinstance(bowl, dict) and bowl.get("kind") == "mesh":
+        data = {**data, "bowl": filled(bowl, "bowl", _meshed_bowl)}
     roughness = data.get("roughness")
     if isinstance(roughness, dict) and "profile" in roughness:
         profile = filled(roughness["profile"], "roughness.profile", _profiled)
@@ -85,6 +89,15 @@ def _waypoints(path: Any, field: str, study: Path, places: dict[str | None, _Pla
     file = recorded_file(name, study, f"{field}.file")
     points = _read(file, Waypoint, MOST_POINTS, f"{field}.points", places)
     return {**path, "file": None, "points": points}
+
+
+def _meshed_bowl(bowl: Any, field: str, study: Path, _: dict[str | None, _Place]) -> Any:
+    """A bowl with its facets, if it names a mesh."""
+    if bowl.get("facets_m") or not isinstance(bowl.get("file"), str):
+        return bowl
+    file = recorded_file(bowl["file"], study, f"{field}.file")
+    corners = bowl_facets(file, bowl.get("unit")).reshape(-1, 9)
+    return {**bowl, "file": None, "unit": None, "facets_m": corners.tolist()}
 
 
 def _shaped(shape: Any, field: str, study: Path, _: dict[str | None, _Place]) -> Any:

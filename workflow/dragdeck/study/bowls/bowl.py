@@ -33,7 +33,7 @@ class Bowl(Model):
     facet_size_m: Positive | None = Field(
         default=None,
         description="edge length of the bowl's mesh elements, m; none: analytical walls, or a "
-        "particle diameter if the bowl rotates",
+        "particle diameter if the bowl moves",
     )
 
     @property

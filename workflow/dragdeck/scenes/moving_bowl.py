@@ -1,0 +1,153 @@
+"""A bowl that moves: the surface of a bed that turns with it, and what it may not do."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from dragdeck.cases.bed import MESHED_PART
+from dragdeck.cases.case import Case
+from dragdeck.errors import Caution, InputError, together
+from dragdeck.physics.packing import Bed
+from dragdeck.physics.turning_bed import surface_rise, surface_tilt
+from dragdeck.study.drive import Floats
+from dragdeck.study.model import Study
+from dragdeck.study.paths.path import as_rows
+
+_PLACES = 200
+"""Of a path, at which the surface below it is computed."""
+
+
+def bed_in_motion(study: Study, bed: Bed) -> Bed:
+    """A settled bed as it is in the drag.
+
+    That in a rotating bowl is inclined: its surface is that below the path, in the mean, and its
+    top the highest point at the wall.
+    """
+    radius, rise = _rise(study, bed)
+    if not rise.any():
+        return bed
+    below = float(np.interp(_path_radii(study), radius, rise).mean())
+    return replace(bed, surface_m=bed.surface_m + below, top_m=bed.top_m + float(rise.max()))
+
+
+def path_tilt_deg(study: Study, rad_s: float) -> float:
+    """Inclination of the bed's surface below the path in a bowl that rotates, at most, degrees."""
+    return math.degrees(surface_tilt(rad_s, *_resisting(study), _path_radii(study)).max())
+
+
+def _driven_rad_s(study: Study) -> float:
+    """Angular speed of the bowl as it is driven, rad/s."""
+    return study.motion.bowl_rad_s * study.chosen_fidelity().speed_factor
+
+
+def _driven_tilt(study: Study) -> float:
+    return path_tilt_deg(study, _driven_rad_s(study))
+
+
+def _resisting(study: Study) -> tuple[float, float]:
+    """Gravity, m/s2, and angle of friction, rad."""
+    return study.gravity_m_s2, math.radians(study.motion.bed_friction_deg)
+
+
+def _path_radii(study: Study) -> Floats:
+    """Distances of the path from the axis of the bowl, m."""
+    places = as_rows(study.motion.path.place(np.linspace(0.0, 1.0, _PLACES)))
+    return np.asarray(np.hypot(*np.atleast_2d(places)[:, :2].T))
+
+
+def _rise(study: Study, bed: Bed) -> tuple[Floats, Floats]:
+    """Distances from the axis, and heights of the bed in the drag above its mean, m."""
+    radii = [float(outline[:, 0].max()) for outline in study.bowl.container.sections(bed.surface_m)]
+    outer, inner = [*radii, 0.0][:2]
+    return surface_rise(_driven_rad_s(study), *_resisting(study), inner, outer)
+
+
+def check_bowl_motion(case: Case, settled: Bed, top_m: float) -> None:
+    """Refuse a bowl that throws its bed out, leaves the box, or cannot go on where it was.
+
+    Parameters
+    ----------
+    case : Case
+    settled : Bed
+        Before the bowl moves.
+    top_m : float
+        Of the simulation box.
+
+    Raises
+    ------
+    InputError
+        Names every field that has to change.
+    """
+    problems = [*_spilled(case, settled), *_out_of_box(case, top_m), *_in_parts(case)]
+    if problems:
+        raise together(problems)
+
+
+def _spilled(case: Case, settled: Bed) -> Iterator[InputError]:
+    study = case.study
+    _, rise = _rise(study, settled)
+    if not rise.any():
+        return
+    rim, top = study.bowl.height_m, settled.top_m + settled.margin_m + float(rise.max())
+    floor = settled.surface_m - settled.margin_m + float(rise.min())
+    tilt = f"the bed turns with the bowl, and its surface is inclined by {_driven_tilt(study):.3g}"
+    remedy = "rotate the bowl more slowly, or use fewer particles or a higher bowl"
+    for wrong, what, limit in (
+        (top > rim, f"it stands up to {top:.4g} m high at the wall", f"the rim, {rim:g} m"),
+        (floor <= 0, "no particles are left on the floor near the axis", "a covered floor"),
+    ):
+        if wrong:
+            yield InputError(
+                f"{tilt} degrees below the workpiece: {what}",
+                file=case.file,
+                field="motion.path" if study.motion.bowl is None else "motion.bowl",
+                limit=limit,
+                remedy=remedy,
+            )
+
+
+def _out_of_box(case: Case, top_m: float) -> Iterator[InputError]:
+    """A bowl that moves by so much that its facets leave the box ends the run."""
+    study, bowl = case.study, case.study.motion.bowl
+    room = study.media.typical_radius_m
+    if study.bowl.container.rim:  # its mesh ends near the top of the box
+        room = min(room, (1 - MESHED_PART) * top_m)
+    if bowl is not None and max(bowl.reach_m) >= room:
+        yield InputError(
+            "the bowl would leave the simulation box",
+            file=case.file,
+            field="motion.bowl",
+            value=f"a displacement of {max(bowl.reach_m):.4g} m",
+            limit=f"below {room:.4g} m, the room around it",
+            remedy="use smaller amplitudes",
+        )
+
+
+def _in_parts(case: Case) -> Iterator[InputError]:
+    """A displaced bowl is where its step says; runs with other steps disagree on it."""
+    bowl, fidelity = case.study.motion.bowl, case.study.chosen_fidelity()
+    if bowl is None or not any(bowl.reach_m):
+        return
+    for name in ("windows", "soft_start"):
+        if getattr(fidelity, name) is not None:
+            yield InputError(
+                "runs with other time steps do not go on with a bowl that is displaced",
+                file=case.file,
+                field=f"fidelity.{name}",
+                remedy=f"leave {name} out, or motion.bowl",
+            )
+
+
+def bowl_cautions(case: Case) -> Iterator[Caution]:
+    """What a user should know of a bed that turns."""
+    tilt = _driven_tilt(case.study)
+    if tilt:
+        yield Caution(
+            "tilt",
+            f"the bed turns with the bowl, and its surface is expected to be inclined by "
+            f"{tilt:.3g} degrees below the workpiece (that of a liquid minus "
+            f"{case.study.motion.bed_friction_deg:g} degrees of friction, motion.bed_friction_deg):"
+            " the immersion depth is measured from this surface, which forms during the transient",
+        )

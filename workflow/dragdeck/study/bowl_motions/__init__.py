@@ -1,0 +1,1 @@
+"""Motions of the bowl: one module for each kind."""
