@@ -268,10 +268,13 @@ def _known(quantity: Quantity, scenes: Scenes, windowed: Sequence[Windowed]) -> 
         return None
     else:
         said = whole
+    of_blocks = [of.of_block for of in pairs]
+    of_blocks += [_mean(soft, "variance") for runs in measured if (soft := _soft(runs))]
     softened = [softened for runs in measured if (softened := Softened.of(runs))]
     per_softness, std, covered = _ratio([] if quantity.signed else softened)
     return Known(
         **{name: round(value, 4) for name, value in said.items()},
+        block_std=round(math.sqrt(float(np.mean(of_blocks))), 4),
         per_softness=round(per_softness, 4),
         per_softness_std=round(std, 4),
         scenes=len(softened),
@@ -306,8 +309,11 @@ def _of_windows(quantity: Quantity, pairs: Sequence[Pairs]) -> dict[str, float]:
         "slope_std": slope_std,
         "variance_ratio": math.exp(float(np.mean(logs))),
         "degrees": _degrees(float(np.var(logs, ddof=1)) - by_chance),
-        "block_std": math.sqrt(float(np.mean([of.of_block for of in pairs]))),
     }
+
+
+def _soft(runs: Sequence[QuantityOfRun]) -> list[QuantityOfRun]:
+    return [run for run in runs if _is_soft(run.run)]
 
 
 def _of_whole_runs(scenes: Sequence[Sequence[QuantityOfRun]]) -> dict[str, float] | None:
@@ -316,7 +322,7 @@ def _of_whole_runs(scenes: Sequence[Sequence[QuantityOfRun]]) -> dict[str, float
         (stiff, soft)
         for runs in scenes
         if (stiff := [run for run in runs if run.run.fidelity.youngs_modulus_scale == 1.0])
-        and (soft := [run for run in runs if _is_soft(run.run)])
+        and (soft := _soft(runs))
     ]
     if len(pairs) < _FEWEST_SCENES:
         return None
@@ -327,7 +333,6 @@ def _of_whole_runs(scenes: Sequence[Sequence[QuantityOfRun]]) -> dict[str, float
         "slope_std": 0.0,
         "variance_ratio": math.exp(float(np.mean(logs))),
         "degrees": _degrees(float(np.var(logs, ddof=1)) - by_chance),
-        "block_std": math.sqrt(float(np.mean([_mean(soft, "variance") for _, soft in pairs]))),
     }
 
 

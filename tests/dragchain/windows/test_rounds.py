@@ -1,5 +1,6 @@
 """Rounds of windows: when they stop, how many more they ask for, what they refuse."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -12,9 +13,13 @@ from dragchain.quantities.document import Extrapolated, PathQuantities, RunQuant
 from dragchain.statistics.estimate import Estimate
 from dragchain.windows.estimate import Round, WindowOfRun
 from dragchain.windows.rounds import Asked, judged, unsettled, with_drag
-from dragdeck.records.windows import WindowsRecord
+from dragdeck.records.windows import Known, WindowsRecord
 
-RECORD = WindowsRecord.shipped()
+CONTACTS = Known(
+    per_softness=0.0, per_softness_std=math.inf, scenes=0, covered=0.0, slope=0.0, slope_std=0.0,
+    variance_ratio=1.2, degrees=10.0, packing_std=0.03, correlation=0.2, block_std=0.07,
+)  # fmt: skip
+RECORD = WindowsRecord(measured="", source="", quantities={"workpiece_contacts": CONTACTS})
 SOFT = PathQuantities(
     arc_m=0.1, block_m=0.01, blocks={"workpiece_contacts": (19.0, 20.0, 21.0, 20.0) * 3}
 )

@@ -86,11 +86,11 @@ def moved(case: Case, **motion: float) -> Case:
 def test_a_soft_run_with_windows_costs_less_than_the_plain_run(
     paper: Case, tradeoff: TradeoffRecord
 ) -> None:
-    found = advised_settings(paper, asked(0.1, quantity=SEVERAL), tradeoff)
+    found = advised_settings(paper, asked(0.2, quantity=SEVERAL), tradeoff)
     chosen = found.chosen.fidelity
     assert chosen.youngs_modulus_scale < 0.01 and chosen.soft_start is None
     assert chosen.windows is not None
-    assert (chosen.windows.tolerance, chosen.windows.quantities) == (0.1, SEVERAL)
+    assert (chosen.windows.tolerance, chosen.windows.quantities) == (0.2, SEVERAL)
     assert chosen.windows.timestep_fraction > 0.64
     assert found.chosen.relative_cost < found.chosen.largest_cost < 1
     assert found.reference == plain_option(paper)
@@ -134,7 +134,7 @@ def test_stiffer_and_lighter_particles_are_softened_more(
         [{"density_kg_m3": one} for one in (8000, 2656, 1000)],
     ):
         cases = [changed(paper, **one) for one in values]
-        chosen = [advised_settings(case, asked(), tradeoff).chosen.fidelity for case in cases]
+        chosen = [advised_settings(case, asked(0.2), tradeoff).chosen.fidelity for case in cases]
         scales = [one.youngs_modulus_scale for one in chosen]
         assert all(after < before for before, after in pairwise(scales))
         softened = [
