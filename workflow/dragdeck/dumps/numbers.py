@@ -114,8 +114,9 @@ def refuse_unlike(name: str, first: NDArray[Any], second: NDArray[Any]) -> None:
 def _whole_if_it_is(column: Cells, name: str) -> Any:
     if not is_integer_column(name):
         return column
-    if (np.abs(column) >= _INEXACT).any():
-        row = int(np.argmax(np.abs(column) >= _INEXACT))
+    inexact = np.isfinite(column) & (np.abs(column) >= _INEXACT)
+    if inexact.any():
+        row = int(np.argmax(inexact))
         raise WrongRow(row, f"{name} is {column[row]:.0f}", f"a number below {_INEXACT}")
     try:
         return whole_numbers(column, name)
