@@ -18,13 +18,7 @@ from dragchain import load_case, write_tables
 from dragchain.loading.samples import TOUCHED, sample
 from dragchain.loading.wear import first_touches
 from dragchain.loading.write import compute_loading
-from dragchain.run.kinematics import (
-    axis_speed,
-    directions,
-    drag_phase,
-    motion_of,
-    workpiece_rotation,
-)
+from dragchain.run.kinematics import axis_speed, headings, drag_phase, motion_of, workpiece_rotation
 from dragchain.run.workpiece import read_surface
 from dragdeck.decks import outputs
 from dragdeck.decks.render import write_run
@@ -188,7 +182,7 @@ def farthest_corner(folder: Path, steps: np.ndarray, ref_m: np.ndarray) -> float
         if file.is_file():
             mesh, frames = meshio.stl.read(file), frames + 1
             at = np.array([step])
-            heading = directions(at, place[None, :2], case)
+            heading = headings(at, place[None, :2], case)
             turn = workpiece_rotation(at, heading, case).matrices[0]
             corners = mesh.points[mesh.cells_dict["triangle"]]
             off = max(off, float(np.abs(corners - surface.corners @ turn.T - place).max()))

@@ -44,7 +44,17 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     costs = folder / "costs.json"
     costs.write_text(json.dumps({"schema": 2, "costs": COSTS}))
     arguments = ["step", "tradeoff", "--out", folder / "out", "--reference", files[0].parents[1]]
-    arguments += ["--costs", costs, "--plan", "long", "--drops", *drops(folder / "drops"), "--"]
+    arguments += [
+        "--costs",
+        costs,
+        "--plan",
+        "long",
+        "--command",
+        "made",
+        "--drops",
+        *drops(folder / "drops"),
+        "--",
+    ]
     assert dragchain([str(one) for one in [*arguments, *files]]) == 0
     return folder / "out"
 
@@ -110,5 +120,6 @@ def test_a_page_of_a_single_setting(tmp_path: Path) -> None:
     rng = np.random.default_rng(1)
     files = write(tmp_path / "runs", [measures((1.0, 0.2, 1.0), n, rng) for n in (1, 2, 3)])
     words = ["step", "tradeoff", "--out", tmp_path / "out", "--reference", files[0].parents[1]]
-    assert dragchain([str(one) for one in [*words, *files]]) == 0
+    words += ["--command", "made", "--"]
+    assert dragchain([str(word) for word in [*words, *files]]) == 0
     assert "no setting has two complete runs" in words_of(tmp_path / "out/report.html")

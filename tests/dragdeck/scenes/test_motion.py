@@ -12,7 +12,7 @@ from made_study import Made
 from dragchain.run.kinematics import (
     axis_speed,
     counted_mask,
-    directions,
+    headings,
     drag_phase,
     workpiece_rotation,
     workpiece_velocity,
@@ -127,7 +127,7 @@ def test_both_packages_describe_the_same_motion(
         speed = np.linalg.norm(velocity[1:], axis=1).max()
         went = places[:1] + np.cumsum(velocity[1:], axis=0) * case.timestep_s
         np.testing.assert_allclose(went, places[1:], atol=2 * speed * case.timestep_s)
-    heading = directions(steps, places[:, :2], case)
+    heading = headings(steps, places[:, :2], case)
     seen = (
         workpiece_rotation(steps, heading, case).front_rad - study.study.motion.path.direction_rad
     )

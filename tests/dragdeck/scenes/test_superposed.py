@@ -10,7 +10,7 @@ from made_scenes import BED
 from made_study import Made
 from pydantic import ValidationError
 
-from dragdeck.cases.bed import bed_timestep, skin
+from dragdeck.cases.bed import bed_timestep, widest_skin
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
 from dragdeck.scenes.motion import surface_speed
@@ -129,8 +129,8 @@ def test_a_workpiece_that_oscillates_is_as_much_longer(moved: Made) -> None:
          "motion.oscillation", "too deep"),
         ({"oscillation": {"amplitude_m": 0.005, "frequency_hz": 1}, "immersion_depth_m": 0.005},
          "motion.oscillation", "out of the packing"),
-        ({"spin": {"rpm": 30000}}, "motion.spin", "neighbour skin per step"),
-        ({"spin": {"schedule": [{"until_s": 1, "rpm": 1}, {"until_s": 2, "rpm": -30000}]}},
+        ({"spin": {"rpm": 60000}}, "motion.spin", "neighbour skin per step"),
+        ({"spin": {"schedule": [{"until_s": 1, "rpm": 1}, {"until_s": 2, "rpm": -60000}]}},
          "motion.spin", "neighbour skin per step"),
         ({"oscillation": {"amplitude_m": 1e-3, "frequency_hz": 3000}},
          "motion.oscillation", "neighbour skin per step"),
@@ -152,7 +152,7 @@ def test_the_limit_of_a_drag_is_the_skin_and_the_remedy_names_one_that_does(
 ) -> None:
     small["fidelities"]["quick"]["speed_factor"] = 100
     case = made({"motion.plunge_speed_m_s": 0.1})
-    has, step = skin(case.study), bed_timestep(case.study, "timestep_fraction")
+    has, step = widest_skin(case.study), bed_timestep(case.study, "timestep_fraction")
     limit = has / step / 100
     process_scene(made({"motion.plunge_speed_m_s": 0.999 * limit}), BED)
     with pytest.raises(InputError, match="neighbour skin per step") as caught:
@@ -165,7 +165,7 @@ def test_the_limit_of_a_drag_is_the_skin_and_the_remedy_names_one_that_does(
 def test_the_limit_of_a_spin_is_the_skin(moved: Made) -> None:
     case = moved()
     step, radius = bed_timestep(case.study, "timestep_fraction"), 0.004
-    most = (skin(case.study) / step - 0.02) / radius * 60 / (2 * math.pi)
+    most = (widest_skin(case.study) / step - 0.02) / radius * 60 / (2 * math.pi)
     process_scene(moved(spin={"rpm": 0.99 * most}), BED)
     with pytest.raises(InputError, match="skin"):
         process_scene(moved(spin={"rpm": 1.01 * most}), BED)

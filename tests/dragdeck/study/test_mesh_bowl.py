@@ -125,7 +125,7 @@ def test_contacts_are_with_the_nearest_facet() -> None:
     bodies, normal, overlap = touching(
         np.array([[0.0, 0.0, 0.0029], [0.0, 0.0272, 0.03], [0, 0, 0.03]]),
         np.full(3, 0.003),
-        container(),
+        container().walls,
     )
     assert bodies.tolist() == [[0, 1], [3, 3]]
     assert overlap == pytest.approx([1e-4, 2e-4], abs=1e-9)

@@ -12,10 +12,13 @@ from dragdeck.arrays import Floats
 from dragdeck.mesh.surface import raised, surface, weld
 from dragdeck.physics import facets
 from dragdeck.physics.walls import Container, Wall
+from dragdeck.study.base import Number
 from dragdeck.study.bowls.bowl import Bowl
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
+
+_Facet = tuple[Number, Number, Number, Number, Number, Number, Number, Number, Number]
 
 _LEVELS = 60
 """Heights at which the area of the section is computed."""
@@ -107,7 +110,7 @@ class MeshBowl(Bowl):
     unit: Literal["m", "cm", "mm", "um", "in"] | None = Field(
         default=None, description="length unit of the file"
     )
-    facets_m: tuple[facets.Triangle, ...] = Field(
+    facets_m: tuple[_Facet, ...] = Field(
         default=(), description="in place of a file: x, y and z of the corners of facets"
     )
 
