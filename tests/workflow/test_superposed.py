@@ -18,7 +18,7 @@ from dragchain import load_case, write_tables
 from dragchain.loading.samples import TOUCHED, sample
 from dragchain.loading.wear import first_touches
 from dragchain.loading.write import compute_loading
-from dragchain.run.kinematics import axis_speed, headings, drag_phase, motion_of, workpiece_rotation
+from dragchain.run.kinematics import axis_speed, drag_phase, headings, motion_of, workpiece_rotation
 from dragchain.run.workpiece import read_surface
 from dragdeck.decks import outputs
 from dragdeck.decks.render import write_run

@@ -12,8 +12,8 @@ from made_study import Made
 from dragchain.run.kinematics import (
     axis_speed,
     counted_mask,
-    headings,
     drag_phase,
+    headings,
     workpiece_rotation,
     workpiece_velocity,
 )
