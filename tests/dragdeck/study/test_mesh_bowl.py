@@ -93,6 +93,18 @@ def test_sections_are_hexagons(height: float) -> None:
     assert facets.chord(lines, 0.0, 0.0, 0.01) == pytest.approx(0.01)
 
 
+@pytest.mark.parametrize("turned", [False, True])
+def test_sections_go_one_way_from_the_x_axis(turned: bool) -> None:
+    """Whatever the sense of the facets; the surface of the bed in the preview looks upwards."""
+    corners = ring()[:, ::-1] if turned else ring()
+    bowl = {**OWN_BOWL["bowl"], "height_m": 0.05, "facets_m": corners.reshape(-1, 9).tolist()}
+    sections = container({"bowl": bowl}).sections(0.02)
+    for (x, y), half in zip((line.T for line in sections), (0.04, 0.01), strict=True):
+        area = float((x[:-1] * y[1:] - x[1:] * y[:-1]).sum()) / 2
+        assert area == pytest.approx((2 * half) ** 2, rel=0.02)
+        assert x[0] == pytest.approx(half) and abs(y[0]) < half / 15
+
+
 def test_the_volume_is_that_of_the_body() -> None:
     inside, whole = container(), AREA * 0.06
     frustum = AREA * 0.015 / 3 * (1 + 2 / 3 + 4 / 9)

@@ -102,7 +102,10 @@ def area(lines_m: Floats) -> float:
 
 
 def outlines(lines_m: Floats, count: int) -> list[Floats]:
-    """Closed lines of segments, (S, 2, 2), each as so many points, (count, 2); longest first."""
+    """Closed lines of segments, (S, 2, 2), each as so many points, (count, 2); longest first.
+
+    Each begins near the x axis and goes counter-clockwise, so that points of two lines correspond.
+    """
     keys = [(_key(begin), _key(end)) for begin, end in lines_m]
     begins = {begin: number for number, (begin, end) in enumerate(keys) if begin != end}
     closed: list[tuple[float, Floats]] = []
@@ -117,8 +120,19 @@ def outlines(lines_m: Floats, count: int) -> list[Floats]:
         passed = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
         places = np.linspace(0.0, passed[-1], count)
         even = np.column_stack([np.interp(places, passed, column) for column in line.T])
-        closed.append((passed[-1], even))
+        closed.append((passed[-1], _from_x_axis(even)))
     return [line for _, line in sorted(closed, key=lambda entry: -entry[0])]
+
+
+def _from_x_axis(line: Floats) -> Floats:
+    """The same closed line, counter-clockwise from its point nearest to the direction of x."""
+    corners = line[:-1]
+    (x, y), (next_x, next_y) = corners.T, np.roll(corners, -1, axis=0).T
+    if (x * next_y - next_x * y).sum() < 0:
+        x, y = x[::-1], y[::-1]
+    first = int(np.abs(np.arctan2(y, x)).argmin())
+    turned = np.roll(np.column_stack([x, y]), -first, axis=0)
+    return np.vstack([turned, turned[:1]])
 
 
 def _key(point: Floats) -> tuple[int, int]:
