@@ -10,6 +10,7 @@ import numpy as np
 
 from dragdeck.arrays import Floats
 from dragdeck.errors import InputError
+from dragdeck.physics.facets import nearest_of
 from dragdeck.physics.walls import from_primitive
 from dragdeck.script.facts import Facts, Fix, as_number, as_numbers
 from dragdeck.study.drive import by_vector
@@ -101,20 +102,13 @@ def _moved(triangles: Floats, place: Place, step: float, reach_m: float) -> Dist
 def _from_facets(corners_m: Floats, reach_m: float, centre_m: Floats) -> tuple[Floats, Floats]:
     """Distances of points from the nearest of (F, 3, 3) facets; infinite beyond the reach."""
     from scipy.spatial import KDTree
-    from trimesh.triangles import closest_point
 
     middle = corners_m.mean(axis=1)
     size = np.linalg.norm(corners_m - middle[:, None], axis=2).max(axis=1)
     near = KDTree(centre_m).query_ball_point(middle, size + reach_m)
-    facets = np.repeat(np.arange(len(near)), [len(rows) for rows in near])
-    rows = np.concatenate([np.empty(0, np.int64), *map(np.int64, filter(None, near))])
-    away = centre_m[rows] - closest_point(corners_m[facets], centre_m[rows])
-    lengths = np.linalg.norm(away, axis=1)
-    farthest_first = np.argsort(-lengths)
-    distance, normal = np.full(len(centre_m), np.inf), np.zeros_like(centre_m)
-    distance[rows[farthest_first]] = lengths[farthest_first]
-    normal[rows[farthest_first]] = (away / np.maximum(lengths, 1e-300)[:, None])[farthest_first]
-    return distance, normal
+    triangles = np.repeat(np.arange(len(near)), [len(points) for points in near])
+    points = np.concatenate([np.empty(0, np.int64), *map(np.int64, filter(None, near))])
+    return nearest_of(centre_m, corners_m, points, triangles)
 
 
 def _triangles(facts: Facts, mesh: Fix) -> Floats | None:

@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from dragdeck.arrays import Floats, Ints
 
 Triangle = tuple[float, float, float, float, float, float, float, float, float]
 """x, y and z of three corners, m."""
@@ -41,13 +41,32 @@ def nearest(place_m: Floats, corners_m: Floats) -> tuple[Floats, Floats]:
     first = corners_m[tree.query(place_m)[1]]
     most = np.linalg.norm(closest_point(first, place_m) - place_m, axis=1)
     near = tree.query_ball_point(place_m, most + size * (1 + 1e-9))
-    rows = np.repeat(np.arange(len(place_m)), [len(each) for each in near])
-    triangles = np.concatenate([np.array(each, dtype=np.int64) for each in near])
-    away = place_m[rows] - closest_point(corners_m[triangles], place_m[rows])
-    distance = np.linalg.norm(away, axis=1)
-    order = np.lexsort((distance, rows))
-    best = order[np.unique(rows[order], return_index=True)[1]]
-    return distance[best], away[best] / np.maximum(distance[best], 1e-300)[:, None]
+    points = np.repeat(np.arange(len(place_m)), [len(triangles) for triangles in near])
+    return nearest_of(place_m, corners_m, points, np.concatenate([*map(np.int64, near)]))
+
+
+def nearest_of(
+    place_m: Floats, corners_m: Floats, points: Ints, triangles: Ints
+) -> tuple[Floats, Floats]:
+    """Distances and directions of `nearest` among pairs of a point and a triangle.
+
+    Parameters
+    ----------
+    place_m, corners_m : (N, 3) and (F, 3, 3) ndarray
+    points, triangles : (P,) ndarray
+        Numbers of the pairs. A point without one is infinitely far away, in no direction.
+    """
+    from trimesh.triangles import closest_point
+
+    away = place_m[points] - closest_point(corners_m[triangles], place_m[points])
+    lengths = np.linalg.norm(away, axis=1)
+    order = np.lexsort((lengths, points))
+    there, first = np.unique(points[order], return_index=True)
+    best = order[first]
+    distance, direction = np.full(len(place_m), np.inf), np.zeros_like(place_m)
+    distance[there] = lengths[best]
+    direction[there] = away[best] / np.maximum(lengths[best], 1e-300)[:, None]
+    return distance, direction
 
 
 def is_inside(place_m: Floats, corners_m: Floats) -> NDArray[np.bool_]:
