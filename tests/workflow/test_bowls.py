@@ -8,26 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from bowl_runs import accepted, process_of
 from bowls import OWN_BOWL, SMALL_BOWLS
 from made_study import put
-from paths import ROOT, SMALL_STUDY
+from paths import SMALL_STUDY
 from plate import engine
 
 from dragchain import read_dump, write_tables
 from dragchain.tables.by_step import read_table
 from dragchain.tables.run_folder import Run
-from dragdeck.decks.outputs import load_outputs
-from dragdeck.decks.render import write_run
-from dragdeck.decks.templates import environment
-from dragdeck.engine.acceptance import check_run
-from dragdeck.engine.reports import silent
-from dragdeck.engine.run_folder import run
-from dragdeck.project import Project
-from dragdeck.records.run import CaseFile, RunPart
-from dragdeck.scenes.filling import FILLING
-from dragdeck.scenes.process import PROCESS
-from dragdeck.scenes.scene import read_bed
-from dragdeck.sweep.cases import load_cases
 
 pytestmark = [pytest.mark.engine, pytest.mark.slow]
 
@@ -41,34 +30,17 @@ EVERY_BOWL = {**SMALL_BOWLS, "mesh": OWN_BOWL}
 def finished(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The process of a bowl, beside its filling."""
     folder = tmp_path_factory.mktemp("project")
-    for name in ("templates", "meshes"):
-        (folder / name).symlink_to(ROOT / name)
     study: dict[str, Any] = yaml.safe_load(SMALL_STUDY.read_text())
     put(study, {**deepcopy(EVERY_BOWL[request.param]), **FAST})
     study["motion"]["immersion_depth_m"] = 0.010
-    file = folder / "studies/small/study.yaml"
-    file.parent.mkdir(parents=True)
-    file.write_text(yaml.safe_dump(study))
-    project, (case,) = Project(folder), load_cases(file)
-    templates = environment(project.templates)
-    filling, process = (project.run_folder(case, scene) for scene in (FILLING, PROCESS))
-    write_run(FILLING.build(case, None), filling, templates)
-    run(filling, silent)
-    write_tables(filling)
-    write_run(PROCESS.build(case, read_bed(filling / "tables/packing.json")), process, templates)
+    process = process_of(folder, study)
     engine(process)  # which keeps the checkpoints
     write_tables(process)
     return process
 
 
 def test_the_run_is_accepted(finished: Path) -> None:
-    """Of what its files say; there is no screen output."""
-    whole = RunPart(part=1, checkpoint=None, from_step=0)
-    inputs, outputs = CaseFile.read(finished / "case.json"), load_outputs(finished)
-    checks = {check.code: check for check in check_run(finished, inputs, outputs, 0, [whole], 1)}
-    failed = {code: check.seen for code, check in checks.items() if not check.passed}
-    assert not {*failed} - {"ended", "ranks"}, failed
-    assert {"particles_kept", "stable_timestep", "within_limits"} <= {*checks}
+    accepted(finished)
 
 
 def test_particles_rest_between_the_walls(finished: Path) -> None:

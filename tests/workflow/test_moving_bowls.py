@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from paths import ROOT, SMALL_STUDY
+from bowl_runs import accepted, process_of
+from paths import SMALL_STUDY
 from plate import engine
 
 from dragchain import load_case, read_dump, write_tables
@@ -15,18 +16,6 @@ from dragchain.run.kinematics import drag_phase, motion_of
 from dragchain.tables.by_step import read_table
 from dragchain.tables.run_folder import Run
 from dragdeck.decks.deck import Body, data_file
-from dragdeck.decks.outputs import load_outputs
-from dragdeck.decks.render import write_run
-from dragdeck.decks.templates import environment
-from dragdeck.engine.acceptance import check_run
-from dragdeck.engine.reports import silent
-from dragdeck.engine.run_folder import run
-from dragdeck.project import Project
-from dragdeck.records.run import CaseFile, RunPart
-from dragdeck.scenes.filling import FILLING
-from dragdeck.scenes.process import PROCESS
-from dragdeck.scenes.scene import read_bed
-from dragdeck.sweep.cases import load_cases
 
 pytestmark = [pytest.mark.engine, pytest.mark.slow]
 
@@ -49,29 +38,14 @@ CIRCLE = {"kind": "circle", "radius_m": 0.01, "revolutions": 0.1}
 RPM = 60.0
 
 
-def process_of(folder: Path, **motion: Any) -> Path:
+def moving(folder: Path, **motion: Any) -> Path:
     """The folder of a process of the small study, beside its finished filling."""
-    for name in ("templates", "meshes"):
-        (folder / name).symlink_to(ROOT / name)
     study: dict[str, Any] = yaml.safe_load(SMALL_STUDY.read_text())
     study["media"]["count"] = 150
     study["motion"] |= {"immersion_depth_m": 0.006, "transient_m": 0.0, "speed_m_s": 0.04, **motion}
     study["motion"] |= {"plunge_speed_m_s": 0.5, "approach_speed_m_s": 0.5}
     study["outputs"] = {"n_checkpoints": 3}
-    file = folder / "studies/small/study.yaml"
-    file.parent.mkdir(parents=True)
-    file.write_text(yaml.safe_dump(study))
-    project, (case,) = Project(folder), load_cases(file)
-    filling, process = (project.run_folder(case, scene) for scene in (FILLING, PROCESS))
-    write_run(FILLING.build(case, None), filling, environment(project.templates))
-    run(filling, silent)
-    write_tables(filling)
-    (file.parent / "templates").mkdir()
-    watched = WATCHED if motion.get("bowl") == ELLIPSE else '{% extends "base/process.in.j2" %}'
-    (file.parent / "templates/process.in.j2").write_text(watched)
-    templates = environment(project.templates, file.parent / "templates")
-    write_run(PROCESS.build(case, read_bed(filling / "tables/packing.json")), process, templates)
-    return process
+    return process_of(folder, study, WATCHED if motion.get("bowl") == ELLIPSE else "")
 
 
 def with_reference(process: Path, *, alone: bool = False) -> None:
@@ -114,15 +88,6 @@ def off_path(process: Path) -> float:
     return float(np.abs(place - moved.places(steps, begun))[dragged].max())
 
 
-def accepted(process: Path) -> None:
-    whole = RunPart(part=1, checkpoint=None, from_step=0)
-    inputs, outputs = CaseFile.read(process / "case.json"), load_outputs(process)
-    checks = {check.code: check for check in check_run(process, inputs, outputs, 0, [whole], 1)}
-    failed = {code: check.seen for code, check in checks.items() if not check.passed}
-    assert not {*failed} - {"ended", "ranks"}, failed
-    assert {"particles_kept", "stable_timestep", "within_limits"} <= {*checks}
-
-
 def resumed(process: Path) -> int:
     """Go on from the last checkpoint but one, on two ranks; the step of the checkpoint."""
     written = sorted(int(file.name.split(".")[1]) for file in process.glob("checkpoint.*.restart"))
@@ -135,7 +100,7 @@ def resumed(process: Path) -> int:
 
 @pytest.fixture(scope="module")
 def shaken(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    process = process_of(tmp_path_factory.mktemp("shaken"), bowl=ELLIPSE, path=LINE)
+    process = moving(tmp_path_factory.mktemp("shaken"), bowl=ELLIPSE, path=LINE)
     with_reference(process)
     engine(process)
     write_tables(process)
@@ -173,7 +138,7 @@ def test_a_resumed_bowl_vibrates_on(shaken: Path) -> None:
 
 
 def test_an_empty_bowl_vibrates_exactly(tmp_path: Path) -> None:
-    process = process_of(tmp_path, bowl=ELLIPSE, path=LINE)
+    process = moving(tmp_path, bowl=ELLIPSE, path=LINE)
     with_reference(process, alone=True)
     engine(process)
     assert off_motion(process) < 1e-8
@@ -185,7 +150,7 @@ def test_an_empty_bowl_vibrates_exactly(tmp_path: Path) -> None:
 @pytest.fixture(scope="module")
 def turning(tmp_path_factory: pytest.TempPathFactory) -> Path:
     bowl = {"kind": "rotation", "rpm": RPM}
-    process = process_of(tmp_path_factory.mktemp("turning"), bowl=bowl, path=CIRCLE)
+    process = moving(tmp_path_factory.mktemp("turning"), bowl=bowl, path=CIRCLE)
     engine(process)
     write_tables(process)
     return process
