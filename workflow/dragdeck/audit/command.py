@@ -218,7 +218,7 @@ class Report:
         findings, unused = self.judged
         measured = [f"{name} {value:.4g}" if isinstance(value, float) else f"{name} {value}"
                     for name, value in self.known.items()]  # fmt: skip
-        counts = {each: sum(f.graded == each for f in findings) for each in _SEVERITIES}
+        counts = {grade: sum(f.graded == grade for f in findings) for grade in _SEVERITIES}
         counted = [f"{count} {severity}(s)" for severity, count in counts.items() if count]
         return "\n".join([
             *(f"{finding}\n    {rules()[finding.rule].remedy}" for finding in findings),

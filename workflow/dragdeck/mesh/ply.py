@@ -57,7 +57,7 @@ class _Element(NamedTuple):
 
     def wrong_row(self, value: object, **place: Any) -> InputError:
         """A row that is not what the header announces."""
-        names = (f"list {each.name}" if each.length else each.name for each in self.properties)
+        names = (f"list {field.name}" if field.length else field.name for field in self.properties)
         return InputError(
             f"not a row of the element {self.name!a}", value=value, limit=" ".join(names), **place
         )
@@ -118,7 +118,7 @@ def _header(text: str) -> tuple[str, list[_Element]]:
             case _:
                 raise InputError("not a line of a PLY header", line=number, value=line[:60])
     named = [[element.name for element in elements]]
-    named += [[each.name for each in element.properties] for element in elements]
+    named += [[field.name for field in element.properties] for element in elements]
     twice = next((name for names in named for name in names if names.count(name) > 1), None)
     if order is None or twice is not None:
         problem = "the header has no format" if twice is None else "the header has a name twice"
@@ -129,11 +129,11 @@ def _header(text: str) -> tuple[str, list[_Element]]:
 
 def _polygons(parts: Mapping[str, list[_Values]], elements: Mapping[str, _Element]) -> Polygons:
     nodes, faces = elements.get("vertex"), elements.get("face")
-    plain = {each.name for each in nodes.properties if not each.length} if nodes else set()
+    plain = {field.name for field in nodes.properties if not field.length} if nodes else set()
     if not {"x", "y", "z"} <= plain:
         limit = 'an element "vertex" with x, y and z'
         raise InputError("no nodes", value=", ".join(elements), limit=limit)
-    lists = [each.name for each in faces.properties if each.length] if faces else []
+    lists = [field.name for field in faces.properties if field.length] if faces else []
     named = [name for name in _INDICES if name in lists]
     if len(named) != 1:
         limit = f'an element "face" with one list {" or ".join(_INDICES)}'
@@ -195,8 +195,8 @@ class _Bytes:
             raise self._short(element)
         rows = np.frombuffer(self._body, kind, min(most, room, self._likely), self._place)
         alike = np.ones(len(rows), dtype=bool)
-        for place, each in enumerate(element.properties):
-            if each.length:
+        for place, field in enumerate(element.properties):
+            if field.length:
                 alike &= rows[f"{place} count"] == rows[f"{place} count"][0]
         count, self._likely = _alike(alike, self._likely)
         if count < min(_FEW, len(alike)):
@@ -204,16 +204,22 @@ class _Bytes:
         self._place += count * kind.itemsize
         columns = [rows[str(place)][:count] for place in range(len(element.properties))]
         return count, {
-            each.name: (column.ravel(), np.full(count, column.shape[1])) if each.length else column
-            for each, column in zip(element.properties, columns, strict=True)
+            field.name: (column.ravel(), np.full(count, column.shape[1]))
+            if field.length
+            else column
+            for field, column in zip(element.properties, columns, strict=True)
         }
 
     def _walk(self, element: _Element, rows: int) -> tuple[int, _Values]:
         """The next rows, whose lists differ in length."""
         byte_order: Any = "big" if self._order == ">" else "little"
         sizes = [
-            (np.dtype(each.kind).itemsize, int(each.length[1:] or 0), each.length.startswith("i"))
-            for each in element.properties
+            (
+                np.dtype(field.kind).itemsize,
+                int(field.length[1:] or 0),
+                field.length.startswith("i"),
+            )
+            for field in element.properties
         ]
         begins, counts, body, place = list[int](), list[int](), self._body, self._place
         for _ in range(rows):
@@ -229,28 +235,28 @@ class _Bytes:
                 raise self._short(element)
             self._place = place
         values = dict[str, Any]()
-        for number, (each, (size, *_)) in enumerate(zip(element.properties, sizes, strict=True)):
+        for number, (field, (size, *_)) in enumerate(zip(element.properties, sizes, strict=True)):
             first, length = (np.array(part[number :: len(sizes)]) for part in (begins, counts))
             starts = np.repeat(first - size * (np.cumsum(length) - length), length)
             items = (starts + size * np.arange(len(starts)))[:, None] + np.arange(size)
-            numbers_of = np.frombuffer(body, np.uint8)[items].view(self._order + each.kind).ravel()
-            values[each.name] = (numbers_of, length) if each.length else numbers_of
+            numbers_of = np.frombuffer(body, np.uint8)[items].view(self._order + field.kind).ravel()
+            values[field.name] = (numbers_of, length) if field.length else numbers_of
         return rows, values
 
     def _kind(self, element: _Element) -> np.dtype[Any]:
         """The row that stands here."""
         fields: list[Any] = []
         end = self._place
-        for place, each in enumerate(element.properties):
+        for place, field in enumerate(element.properties):
             length: tuple[int, ...] = ()
-            if each.length:
-                count = np.dtype(self._order + each.length)
+            if field.length:
+                count = np.dtype(self._order + field.length)
                 if end + count.itemsize > len(self._body):
                     raise self._short(element)
                 length = (int(np.frombuffer(self._body, count, 1, end)[0]),)
                 fields.append((f"{place} count", count))
                 end += count.itemsize
-            kind = np.dtype(self._order + each.kind)
+            kind = np.dtype(self._order + field.kind)
             end += kind.itemsize * (length[0] if length else 1)
             if (length and length[0] < 0) or end > len(self._body):
                 raise self._short(element)
@@ -286,16 +292,16 @@ class _Lines:
             raise self._damage or element.wrong_row("the end of the file")
         place, ends = self._starts[:-1][:most].copy(), self._starts[1:][:most]
         good, values = np.ones(len(place), dtype=bool), dict[str, Any]()
-        for each in element.properties:
+        for field in element.properties:
             good &= place < ends
-            values[each.name] = self._words[np.where(good, place, 0)]
+            values[field.name] = self._words[np.where(good, place, 0)]
             place += 1
-            if each.length:
-                numbers_of = values[each.name]
+            if field.length:
+                numbers_of = values[field.name]
                 good &= (numbers_of >= 0) & (numbers_of <= ends - place) & (numbers_of % 1 == 0)
                 counts = np.where(good, numbers_of, 0).astype(np.int64)
                 first = np.repeat(place - np.cumsum(counts) + counts, counts)
-                values[each.name] = self._words[first + np.arange(len(first))], counts
+                values[field.name] = self._words[first + np.arange(len(first))], counts
                 place += counts
         good &= place == ends
         if not good.all():

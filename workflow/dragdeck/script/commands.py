@@ -142,12 +142,14 @@ def names_read(words: list[str]) -> list[str]:
 def endless(deck: str) -> Iterator[tuple[str, str]]:
     """Jumps back of a deck between whose label and itself nothing can end the loop."""
     every = list(commands(deck))
-    labels = {each.words[1]: at for at, each in reversed([*enumerate(every)]) if _is_label(each)}
+    labels = {
+        command.words[1]: at for at, command in reversed([*enumerate(every)]) if _is_label(command)
+    }
     for at, command in enumerate(every):
         if command.words[:2] != ["jump", "SELF"] or command.within == "if":
             continue
         start = labels.get(command.words[2], at) if command.words[2:] else 0
-        if start < at and not any(_ends_loop(each) for each in every[start:at]):
+        if start < at and not any(map(_ends_loop, every[start:at])):
             yield command.text, "run for ever: no `next` and no `if` ends this loop"
 
 
