@@ -207,12 +207,14 @@ class Container(Part):
 
     def height_m(self, volume_m3: float) -> float:
         """Height up to which a volume fills it."""
-        (*_, (top, area)) = self.levels
-        if volume_m3 >= (below := self.volume_m3(top)):
-            return top + (volume_m3 - below) / area
-        heights = np.linspace(0.0, top, 1001)
-        volumes = [self.volume_m3(height) for height in heights.tolist()]
-        return float(np.interp(volume_m3, volumes, heights))
+        heights, areas = np.array(self.levels).T
+        steps = np.diff(heights)
+        below = np.append(0.0, np.cumsum(steps * (areas[1:] + areas[:-1]) / 2))
+        at = int(np.searchsorted(below, volume_m3, "right")) - 1
+        slope = (np.diff(areas)[at] / steps[at]) if at < len(steps) else 0.0
+        rest = volume_m3 - below[at]  # area * x + slope * x**2 / 2
+        wide = areas[at] + math.sqrt(areas[at] ** 2 + 2 * slope * rest)
+        return float(heights[at] + 2 * rest / wide) if rest else float(heights[at])
 
     def _areas(self, heights_m: Floats) -> Floats:
         return np.asarray(np.interp(heights_m, *np.array(self.levels).T))
