@@ -33,7 +33,14 @@ from dragchain.windows.rounds import beside, of_windows, stretches, window_of
 from dragdeck.physics.contact_mechanics import damping_ratio
 from dragdeck.records.stability import StableStepLaw, StableStepRecord
 from dragdeck.records.tradeoff import SixDigits
-from dragdeck.records.windows import UNKNOWN, Known, WindowsRecord, softening
+from dragdeck.records.windows import (
+    TYPICAL_FRONT,
+    UNKNOWN,
+    Known,
+    WindowsRecord,
+    front_of,
+    softening,
+)
 
 _SOFT = 1e-3
 _FEWEST_SCENES = 5
@@ -155,7 +162,10 @@ class Windowed:
             windows / windows.mean() - 1.0,
             soft / soft.mean() - 1.0,
             along / along.mean() - 1.0,
-            float(np.var(known / known.mean(), ddof=1)) / (1 + quantity.squared) ** 2,
+            (
+                front_of(self.soft.numbers),
+                float(np.var(known / known.mean(), ddof=1)) / (1 + quantity.squared) ** 2,
+            ),
         )
 
 
@@ -169,14 +179,15 @@ class Pairs:
         Relative to the means.
     stretches : (B,) ndarray
         The soft run's stretches, relative to the mean of it.
-    of_block : float
-        Relative variance of a block of the soft run; of the root of a mean square.
+    of_block : tuple of float
+        Particles that fit on the front of the workpiece, and relative variance of a block of the
+        soft run; of the root of a mean square.
     """
 
     windows: Floats
     beside: Floats
     stretches: Floats
-    of_block: float
+    of_block: tuple[float, float]
 
     @property
     def variance(self) -> float:
@@ -269,12 +280,18 @@ def _known(quantity: Quantity, scenes: Scenes, windowed: Sequence[Windowed]) -> 
     else:
         said = whole
     of_blocks = [of.of_block for of in pairs]
-    of_blocks += [_mean(soft, "variance") for runs in measured if (soft := _soft(runs))]
+    of_blocks += [
+        (front_of(soft[0].run.numbers), _mean(soft, "variance"))
+        for runs in measured
+        if (soft := _soft(runs))
+    ]
+    block_std, front_power = _of_blocks(of_blocks)
     softened = [softened for runs in measured if (softened := Softened.of(runs))]
     per_softness, std, covered = _ratio([] if quantity.signed else softened)
     return Known(
         **{name: round(value, 4) for name, value in said.items()},
-        block_std=round(math.sqrt(float(np.mean(of_blocks))), 4),
+        block_std=round(block_std, 4),
+        front_power=round(front_power, 2),
         per_softness=round(per_softness, 4),
         per_softness_std=round(std, 4),
         scenes=len(softened),
@@ -282,6 +299,20 @@ def _known(quantity: Quantity, scenes: Scenes, windowed: Sequence[Windowed]) -> 
         packing_std=round(_between_packings(measured), 4),
         correlation=round(_correlation(measured), 2),
     )
+
+
+def _of_blocks(scenes: Sequence[tuple[float, float]]) -> tuple[float, float]:
+    """Standard deviation of a block at the typical front, and the power of its square with it.
+
+    The power is that of a line through the logarithms, of no more independent contacts than there
+    are, and of no more scatter with more of them: 0 to 1.
+    """
+    fronts, variances = np.array(scenes).T
+    wider = np.log(fronts / TYPICAL_FRONT)
+    about = wider - wider.mean()
+    power = -float(about @ np.log(np.maximum(variances, 1e-12)) / (about @ about or 1.0))
+    power = min(max(power, 0.0), 1.0)
+    return math.sqrt(float(np.mean(variances * np.exp(power * wider)))), power
 
 
 def _of_windows(quantity: Quantity, pairs: Sequence[Pairs]) -> dict[str, float]:

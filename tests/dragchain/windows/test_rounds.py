@@ -18,6 +18,7 @@ from dragdeck.records.windows import Known, WindowsRecord
 CONTACTS = Known(
     per_softness=0.0, per_softness_std=math.inf, scenes=0, covered=0.0, slope=0.0, slope_std=0.0,
     variance_ratio=1.2, degrees=10.0, packing_std=0.03, correlation=0.2, block_std=0.07,
+    front_power=0.0,
 )  # fmt: skip
 RECORD = WindowsRecord(measured="", source="", quantities={"workpiece_contacts": CONTACTS})
 SOFT = PathQuantities(

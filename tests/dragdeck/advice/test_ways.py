@@ -17,6 +17,7 @@ from dragdeck.study.model import Tolerance
 KNOWN = Known(
     per_softness=0.1, per_softness_std=0.05, scenes=20, covered=0.95, slope=0.6, slope_std=0.1,
     variance_ratio=0.5, degrees=10.0, packing_std=0.02, correlation=0.1, block_std=0.2,
+    front_power=0.0,
 )  # fmt: skip
 
 
@@ -39,6 +40,15 @@ def test_each_way_has_its_own_sources_of_error() -> None:
     assert KNOWN.soft_half_width(blocks, 0.5) == pytest.approx(1.96 * soft)
     assert KNOWN.windows_half_width(3, sample, blocks) == pytest.approx(1.96 * windows)
     assert KNOWN.whole_half_width(blocks) == pytest.approx(1.96 * whole)
+
+
+def test_a_wider_front_averages_over_more_contacts() -> None:
+    wide, narrow = (KNOWN.model_copy(update={"front_power": power}) for power in (1.0, 0.0))
+    assert wide.at_front(40.0).block_std == pytest.approx(0.1)
+    assert wide.at_front(10.0) == wide
+    assert narrow.at_front(40.0) == narrow
+    some = ways(0.1, front_power=1.0)
+    assert replace(some, front=4 * some.front).whole.half_width < some.whole.half_width
 
 
 def test_as_many_windows_as_are_expected_to_do() -> None:

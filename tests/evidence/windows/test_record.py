@@ -58,7 +58,8 @@ def made_run(
             "media.radius_mean_m": 1.0, "media.radius_std_m": spread})),
         fidelity=FidelityOfRun(name="made", youngs_modulus_scale=scale, timestep_fraction=fraction,
                                speed_factor=speed, skin_m=1e-4, ranks=1),
-        numbers={"stiffness_number": kappa, "particles": 300.0 + seed},
+        numbers={"stiffness_number": kappa, "particles": 300.0 + seed,
+                 "workpiece_to_particle": 1.0 + scene, "depth_to_particle": 4.0},
         arc_m=1.0, block_m=0.1,
         blocks={"drag_mean": tuple(-mean * (1 + 0.05 * rng.normal(size=40))),
                 "workpiece_contacts": (3.0, None)},
@@ -142,6 +143,7 @@ def test_the_command_makes_records_that_the_product_reads(tmp_path: Path) -> Non
     assert drag.slope == pytest.approx(SLOPE, abs=2 * drag.slope_std)
     assert 0 < drag.slope_std < 0.25
     assert drag.variance_ratio == pytest.approx(ABOUT, rel=0.4) and drag.degrees > 5
+    assert drag.front_power == pytest.approx(0.0, abs=0.3)  # of whatever width of the front
     assert drag.correlation == pytest.approx(0.0, abs=0.1)  # blocks are drawn independently
     law = StableStepRecord.read(tmp_path / "stable_step.json").stable_step
     assert {name: getattr(law, name) for name in LAW} == pytest.approx(LAW, rel=1e-3)

@@ -18,7 +18,7 @@ from dragdeck.outlook.timestep import largest_fraction, stable_fraction, stable_
 from dragdeck.physics.rounding import rounded
 from dragdeck.records.advised import AdvisedSettings
 from dragdeck.records.tradeoff import DropEntry, TradeoffRecord, measured_tradeoff
-from dragdeck.records.windows import WindowsRecord
+from dragdeck.records.windows import WindowsRecord, front_of
 from dragdeck.scenes.filling import filling_cautions
 from dragdeck.scenes.lead import FIRST_WINDOWS
 from dragdeck.scenes.workpiece import JAMMING_GAP, describe, may_jam, process_cautions
@@ -182,7 +182,8 @@ def ways_of(case: Case, requested: Tolerance, tradeoff: TradeoffRecord) -> Ways 
     soft = soft_settings(case).model_copy(update={"windows": windows})
     work = Work.of(case, tradeoff)
     plain = work.cpu_time(plain_option(case).fidelity)
-    ways = Ways(work, soft, stiff, requested, plain, WindowsRecord.shipped())
+    front = front_of(describe(case))
+    ways = Ways(work, soft, stiff, requested, plain, WindowsRecord.shipped(), front)
     return ways if ways.most >= FIRST_WINDOWS else None
 
 

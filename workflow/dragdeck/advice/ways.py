@@ -158,6 +158,8 @@ class Ways:
         CPU time of the plain run, as `Work.cpu_time`.
     record : WindowsRecord
         Of other scenes.
+    front : float
+        Particles that fit on the front of the workpiece.
     """
 
     work: Work
@@ -166,6 +168,7 @@ class Ways:
     asked: Tolerance
     plain: float
     record: WindowsRecord
+    front: float
 
     @cached_property
     def most(self) -> int:
@@ -240,4 +243,4 @@ class Ways:
     def _largest(self, half_width: Callable[[Known], float]) -> float:
         """The largest half-width of the quantities."""
         known = [self.record.quantities.get(name) for name in self.asked.quantities]
-        return max(half_width(of) if of else math.inf for of in known)
+        return max(half_width(of.at_front(self.front)) if of else math.inf for of in known)

@@ -33,6 +33,23 @@ def softening(stiffness_number: float, youngs_modulus_scale: float) -> float:
     return softness(soft) - softness(stiffness_number)
 
 
+TYPICAL_FRONT = 10.0
+"""Particles on the front of a workpiece, of which the record gives the scatter."""
+
+
+def front_of(numbers: Mapping[str, float]) -> float:
+    """How many particles fit side by side on the front of a workpiece.
+
+    Soft runs of 30 scenes have 1.6 times as many contacts, with a standard deviation of 14 %.
+
+    Parameters
+    ----------
+    numbers : mapping
+        The dimensionless numbers of a case.
+    """
+    return (numbers["workpiece_to_particle"] + 1.0) * numbers["depth_to_particle"]
+
+
 def _infinite(number: object) -> object:
     return math.inf if number is None else number
 
@@ -61,8 +78,9 @@ class Known(Part):
         Relative standard deviation of the mean from packing to packing.
     correlation : float
         Correlation of neighbouring blocks of one particle diameter.
-    block_std : float
-        Relative standard deviation of such a block of a soft run.
+    block_std, front_power : float
+        Relative standard deviation of such a block of a soft run if `TYPICAL_FRONT` particles fit
+        on the front of the workpiece; its square falls with this power of their number.
     """
 
     per_softness: float
@@ -76,6 +94,12 @@ class Known(Part):
     packing_std: float
     correlation: float
     block_std: Annotated[float, AllowInfNan(True)]
+    front_power: float
+
+    def at_front(self, particles: float) -> "Known":
+        """The same where so many particles fit on the front of the workpiece."""
+        wider = (TYPICAL_FRONT / particles) ** (self.front_power / 2)
+        return self.model_copy(update={"block_std": self.block_std * wider})
 
     def soft_half_width(self, blocks: float, difference: float) -> float:
         """Expected relative half-width of the soft run of so many blocks, times the ratio.
@@ -101,6 +125,7 @@ class Known(Part):
 UNKNOWN = Known(
     per_softness=0.0, per_softness_std=math.inf, scenes=0, covered=0.0, slope=0.0, slope_std=0.0,
     variance_ratio=0.0, degrees=0.0, packing_std=0.0, correlation=0.3, block_std=math.inf,
+    front_power=0.0,
 )  # fmt: skip
 """Of a quantity of which nothing is known; few quantities have a larger correlation."""
 
