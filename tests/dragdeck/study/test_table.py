@@ -106,6 +106,18 @@ EXPORTS: dict[str, tuple[str | bytes, str]] = {
     ), "fx_n"),
     "padded, with signs": (
         "time_s ;fx_n\n" + ROWS.replace("\t", " ; ").replace("0.42", "+0.42"), "fx_n"),
+    "numpy.savetxt": ("# run 3\n# time_s fx_n\n" + ROWS.replace("\t", " "), "fx_n"),
+    "aligned": (
+        "Rig 3 7\n\n  Time [s]     Fx [N]\n  "
+        + ROWS.replace("\t", "     ").replace("\n", "\n  ").rstrip(" "), "Fx",
+    ),
+    "aligned, decimal commas, units below": (
+        "t Fx\n[s] [N]\n" + ROWS.replace(".", ",").replace("\t", "  "), "Fx",
+    ),
+    "names in a comment": ("# time_s,fx_n\n" + ROWS.replace("\t", ","), "fx_n"),
+    "no unit asked for": (
+        "Time;Fx;Fy\ns;N;N\n" + ROWS.replace("\t", ";").replace("\n", ";1\n"), "Fx",
+    ),
     "UTF-16": (("time_s\tfx_n\n" + ROWS).encode("utf-16"), "fx_n"),
     "Latin-1": (("Prüfstand 3\ntime_s\tfx_n\n" + ROWS).encode("latin-1"), "fx_n"),
     "old line ends": (("time_s\tfx_n\n" + ROWS).replace("\n", "\r"), "fx_n"),
@@ -189,7 +201,7 @@ REFUSED: dict[str, tuple[str | bytes, dict[str, Any], int | None, str]] = {
     "a longer row": (HEAD + "0,1\n0.005,2,3\n", {}, 3, "3 values, but the header has 2 names"),
     "a shorter row": (HEAD + "0,1\n0.005\n", {}, 3, "1 values, but the header has 2 names"),
     "a missing value": (HEAD + "0,1\n0.005,\n", {}, 3, "fx_n: the value is missing"),
-    "spaces between": ("time_s fx_n\n0 1\n1 2\n", {}, 1, "no column(s)"),
+    "blanks of thousands": ("fx_n\n1 000\n2 000\n", {"rate_hz": 200}, 2, "is several numbers"),
     "not finite": (HEAD + "0,inf\n", {}, 2, "'inf' is text"),
     "too large": (HEAD + "0,1e999\n", {}, 2, "a finite number"),
     "underscore": (HEAD + "0,1_000\n", {}, 2, "'1_000' is text"),

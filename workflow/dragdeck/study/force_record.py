@@ -101,9 +101,8 @@ def _series(
     InputError
         As `Table.numbers`.
     """
-    units = {name: _unit(name, FORCE_UNITS) for name in map(column_name, columns)}
-    if angle is not None:
-        units[column_name(angle)] = _unit(column_name(angle), ANGLE_UNITS)
+    units = dict(_unit(table, name, FORCE_UNITS) for name in columns)
+    units |= dict(_unit(table, name, ANGLE_UNITS) for name in [angle] if name is not None)
     names = [_column(table, {name: unit}) for name, unit in units.items()]
     missing = names if gaps else ()
     if rate_hz is None or {*table.names} & {*TIME_COLUMNS}:
@@ -132,7 +131,9 @@ def in_words(file: Path, signal: Signal | None = None) -> str:
         + f" (line {lines[row]})"
         for row in (0, -1)
     )
-    names = ", ".join([column_name(name) for name in [*columns, *([angle] if angle else [])]])
+    wanted = [(name, FORCE_UNITS) for name in columns]
+    wanted += [(name, ANGLE_UNITS) for name in [angle] if name]
+    names = ", ".join(_unit(table, *column)[0] for column in wanted)
     _, filled = _with_holes(time, values) if gaps else (time, values)
     missing = np.count_nonzero(~np.isfinite(filled).all(axis=0))
     left_out = f"; {missing} of {filled.shape[1]:,} samples missing, left out" if missing else ""
@@ -140,13 +141,23 @@ def in_words(file: Path, signal: Signal | None = None) -> str:
     return where + left_out
 
 
-def _unit(column: str, units: Mapping[str, float]) -> float:
-    """The unit of a column in N or rad, by the end of its name."""
+def _unit(table: Table, column: str, units: Mapping[str, float]) -> tuple[str, float]:
+    """Name of a column with its unit at the end, and the unit in N or rad.
+
+    A column may be asked for without the unit that it has in the file.
+    """
+    name = column_name(column)
     for end, unit in units.items():
-        if column.endswith(end):
-            return unit
-    problem, limit = "the column has no unit", f"a name that ends in {', '.join(units)}"
-    raise RecordError("columns", problem, value=column, limit=limit, remedy="rename the column")
+        if name.endswith(end):
+            return name, unit
+    known = [(f"{name}{end}", unit) for end, unit in units.items() if f"{name}{end}" in table.names]
+    if len(known) == 1:
+        return known[0]
+    limit = f"a name that ends in {', '.join(units)}"
+    if known:
+        limit = f"one of {', '.join(with_unit for with_unit, _ in known)}"
+    remedy = "give the column its unit in the file, as in Fx [N]"
+    raise RecordError("columns", "the column has no unit", value=column, limit=limit, remedy=remedy)
 
 
 def _column(table: Table, known: Mapping[str, float]) -> str:

@@ -8,7 +8,7 @@ import csv
 import re
 from collections import Counter
 from collections.abc import Sequence
-from itertools import zip_longest
+from itertools import pairwise, zip_longest
 from pathlib import Path
 
 from dragdeck.errors import InputError
@@ -45,6 +45,9 @@ _COMMENT = "comment"
 _LONGEST_HEAD = 1000
 """Lines within which the names of columns stand."""
 
+_WORDS = re.compile(r"\S+(?: *[\[(][^\])]*[\])])?")
+"""Words, each with a unit in brackets behind it."""
+
 _LABVIEW_UNITS = "Y_Unit_Label"
 """First word of the line of its head with the units of all columns but that of the times."""
 
@@ -52,7 +55,8 @@ _LABVIEW_UNITS = "Y_Unit_Label"
 def read_table(file: Path, most: int | None = None) -> Table:
     """Read a CSV file: a header line, then one row per line.
 
-    Lines that begin with ``#`` are comments; they and blank lines are passed over.
+    Lines that begin with ``#`` are comments; they and blank lines are passed over. Blanks may align
+    the columns, and their names may stand in a comment just above the first row.
 
     Parameters
     ----------
@@ -65,7 +69,7 @@ def read_table(file: Path, most: int | None = None) -> Table:
     InputError
         The file cannot be read as text of at most 64 MB, or is no CSV file.
     """
-    text = _text(file)
+    text = _with_columns(_text(file))
     texts = _beginning(text, file)
     used = [n for n, line in enumerate(texts) if is_row(line)]
     if used and re.fullmatch("sep=.", texts[used[0]].strip(), re.IGNORECASE):  # of Excel
@@ -98,6 +102,44 @@ def read_table(file: Path, most: int | None = None) -> Table:
     twice = separator == "," and all(named) and len(first) == 2 * len(names)
     joined = twice and _are_joined(rows, len(names))
     return Table(file, separator, named, line, text, below + 1, joined=joined, most=most)
+
+
+def _with_columns(text: str) -> str:
+    """A text with tabs for the blanks that align columns, and without a mark before their names."""
+    lines = text.split("\n", _LONGEST_HEAD)
+    lines, rest = lines[:_LONGEST_HEAD], lines[_LONGEST_HEAD:]
+    rows = [_numbers_between_blanks(line) for line in lines]
+    aligned = 2 * sum(map(bool, rows)) > sum(map(is_row, lines))
+    widths = [len(row) for row in rows] if aligned else [*map(_width, lines)]
+    pairs = enumerate(pairwise(widths))
+    first = next((k for k, (width, below) in pairs if 1 < width == below), 0)
+    if not first:
+        return text
+    named = lines[first - 1]
+    if named.startswith("#") and not any(map(is_row, lines[:first])):
+        named = named.lstrip("# ")
+    cells = _between_blanks(named, widths[first]) if aligned else _cells(named)
+    if len(cells) != widths[first]:
+        return text
+    lines[first - 1] = named
+    if aligned:
+        lines[:first] = ["\t".join(_between_blanks(line, widths[first])) for line in lines[:first]]
+        below = "\n".join([*lines[first:], *rest])
+        rest = [re.sub(" +", "\t", re.sub("^ +| +$", "", below, flags=re.MULTILINE))]
+        del lines[first:]
+    return "\n".join([*lines, *rest])
+
+
+def _numbers_between_blanks(text: str) -> list[str]:
+    """The cells of a line of several numbers with nothing but blanks between them."""
+    words = [] if "\t" in text else text.split()
+    return words if len(words) > 1 and all(map(is_number, words)) else []
+
+
+def _between_blanks(text: str, count: int) -> list[str]:
+    """The cells of a line, if it has so many; else the line."""
+    ways = re.split(r"\s{2,}", text.strip()), text.split(), _WORDS.findall(text)
+    return next((cells for cells in ways if len(cells) == count), [text])
 
 
 def _without_comment(
