@@ -41,7 +41,9 @@ html_css_files = ["site.css"]
 html_show_sourcelink = False
 html_theme_options = {
     "navigation_with_keys": False,
+    "navbar_persistent": ["search-button"],  # its name is what it shows
     "show_nav_level": 1,
+    "navigation_depth": 2,
     "show_toc_level": 2,
     "secondary_sidebar_items": ["page-toc"],
 }

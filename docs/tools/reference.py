@@ -5,7 +5,7 @@ import math
 import re
 import types
 from collections.abc import Callable, Iterator, Sequence
-from functools import partial
+from functools import cache, partial
 from itertools import takewhile
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
@@ -141,20 +141,21 @@ def _common(names: Sequence[str]) -> int:
 # --- study file --------------------------------------------------------------------------
 
 
-def fields() -> str:
-    """One row per field, in one table per top-level key that has fields of its own."""
+@cache
+def fields() -> dict[str, str]:
+    """Fields of each top-level block as a table with their names in it; of none: ``study``."""
     merged: dict[tuple[str, ...], list[str]] = {}
     for name, *cells in _fields(Study, "", {}):
         head = re.match(r"(\w+)[.\[]", name)
-        leaf = name if cells[1:] == ["", ""] else name.rpartition(".")[2]
-        merged.setdefault((head[1] if head else "", leaf, *cells), []).append(name)
+        leaf = name.rpartition(".")[2]
+        block = head[1] if head else "study"
+        shown = name.removeprefix(block).removeprefix(".") if head else name
+        merged.setdefault((block, leaf, *cells), []).append(shown)
     groups: dict[str, list[list[str]]] = {}
     for (head, _, *cells), names in merged.items():
         groups.setdefault(head, []).append([_named(names), *cells])
-    heads = ["field", "limits", "usual", "default", "meaning"]
-    parts = [markdown_table(heads, groups.pop("", []))]
-    parts += [f"### `{name}`\n\n{markdown_table(heads, rows)}" for name, rows in groups.items()]
-    return "\n\n".join(parts)
+    heads = ["field", "limits (usual)", "default", "meaning"]
+    return {name: markdown_table(heads, rows) for name, rows in groups.items()}
 
 
 def _named(names: Sequence[str]) -> str:
@@ -171,20 +172,20 @@ def _named(names: Sequence[str]) -> str:
 
 def _fields(
     model: type[BaseModel], prefix: str, seen: dict[type[BaseModel], str]
-) -> Iterator[tuple[str, str, str, str, str]]:
-    """Name, limits, usual values, default and meaning of every field, depth first."""
+) -> Iterator[tuple[str, str, str, str]]:
+    """Name, limits with usual values, default and meaning of every field, depth first."""
     for name, field in model.model_fields.items():
         path = f"{prefix}{name}"
         inner = list(_models(field.annotation))
         if not inner or any(get_args(part)[:1] == (str,) for part in _parts(field.annotation)):
             numbers = path if not _is_row(field.annotation) else f"{path}.0"
             usual = "" if isinstance(field.default, str) else numbers
-            yield path, *_usual(usual, _limits(field)), _default(field), field.description or ""
+            yield path, _usual(usual, _limits(field)), _default(field), field.description or ""
         known = [seen[part] for part, _ in inner if part in seen]
         if known:
             place = f"{path}.*" if inner[0][1] else path
             same = known[0] if len(inner) == 1 else known[0].partition("[")[0]
-            yield place, "", "", "", f"as `{same}`"
+            yield place, "", "", f"as `{same}`"
             continue
         for part, many in inner:
             kind = f"[{_kind(part)}]" if len(inner) > 1 else ""
@@ -253,15 +254,15 @@ def _limits(field: FieldInfo) -> str:
 _BOUND = re.compile(r"(above|at least|below|at most) ([^ ,]+),? ?")
 
 
-def _usual(path: str, limits: str) -> tuple[str, str]:
-    """Limits within which a value is accepted, and those within which it gives no warning."""
+def _usual(path: str, limits: str) -> str:
+    """Limits within which a value is accepted; in brackets those without a warning."""
     name, rest = re.sub(r"\[\w+\]", "", path), _BOUND.sub("", limits)
     bounds = {word: float(value) for word, value in _BOUND.findall(limits)}
     places = ((name, f"{name}.0"), [f"{name}.0.{index}" for index in range(7)])
     single, listed = ([*dict.fromkeys(filter(None, map(plausible_range, of)))] for of in places)
     first = single[:1] or listed
     if not first or ("`" in rest and not bounds):
-        return limits, ""
+        return limits
     accepted, usual = [], []
     for limit in first:
         low = max(
@@ -272,12 +273,12 @@ def _usual(path: str, limits: str) -> tuple[str, str]:
         )
         above = "above " if low == bounds.get("above") else ""
         below = "below " if high == bounds.get("below") else ""
-        accepted.append(f"{above}{low:.10g} to {below}{high:.10g}")
-        usual.append(f"{max(low, limit.warned_below):.10g} to {min(high, limit.warned_above):.10g}")
+        accepted.append(f"{above}{low:.7g} to {below}{high:.7g}")
+        usual.append(f"{max(low, limit.warned_below):.7g} to {min(high, limit.warned_above):.7g}")
     if usual == [re.sub("above |below ", "", text) for text in accepted]:
         usual = []
-    text = "; ".join([*filter(None, [rest.strip()]), *accepted])
-    return text.replace("or; ", "or "), "; ".join(usual)
+    text = "; ".join([*filter(None, [rest.strip()]), *accepted]).replace("or; ", "or ")
+    return f"{text} ({'; '.join(usual)})" if usual else text
 
 
 def _default(field: FieldInfo) -> str:
@@ -318,7 +319,7 @@ def audit_rules() -> str:
 
 
 TEXTS: dict[str, Callable[[], str]] = {
-    "fields": fields,
+    **{f"fields_{name}": partial(fields().__getitem__, name) for name in fields()},
     "fidelities": fidelities,
     "dragdeck": lambda: command_sections(DRAGDECK.parser()),
     "dragchain": lambda: command_sections(DRAGCHAIN.parser()),

@@ -205,6 +205,22 @@ class ReportedRun(Run, Generic[F]):
     record: RunRecord
 
 
+def in_words(case: CaseOfRun, packings: int) -> str:
+    """A case by its stiffness, the values that a sweep gives it and its packings."""
+    name, own = case.case or case.run, case.fidelity
+    if not name.startswith(own.name):
+        return name
+    swept = dict(re.findall(r"_([a-z_]+?)-([^_]+)", name.removeprefix(own.name)))
+    seed = swept.pop(_SEED, "")
+    stiffness = "physical stiffness" if own.youngs_modulus_scale == 1.0 else "soft"
+    settings = [f"E {TIMES} {own.youngs_modulus_scale:g}", f"step {own.timestep_fraction:g}"]
+    settings += [f"speed {TIMES} {own.speed_factor:g}"] if own.speed_factor != 1.0 else []
+    how = ", ".join(settings) if own.name.startswith("E") else own.name.replace("-", " ")
+    one = f"packing {seed}" if seed else "one packing"
+    values = [f"{field.replace('_', ' ')} {value}" for field, value in swept.items()]
+    return ", ".join([f"{stiffness} ({how})", *values, one if packings == 1 else f"{packings} packings"])
+
+
 @dataclass(frozen=True)
 class StudyRuns:
     """A process run with the filling and the drop test it belongs to, None where it names none.
@@ -221,6 +237,16 @@ class StudyRuns:
     loading: Loading | None = None
     extrapolated: Extrapolated | None = None
     wear: Wear | None = None
+
+    @property
+    def name(self) -> str:
+        """Name of the case."""
+        return self.process.case.case or self.process.case.run
+
+    @property
+    def title(self) -> str:
+        """The case in words."""
+        return in_words(self.process.case, 1)
 
     @cached_property
     def values(self) -> Values:
@@ -303,9 +329,13 @@ class ReportedCase:
     @property
     def name(self) -> str:
         """Name of the case, without the seed if it is a mean over packings."""
-        case = self.first.process.case
-        name = case.case or case.run
+        name = self.first.name
         return _IN_NAME.sub("", name).lstrip("_") if len(self.studies) > 1 else name
+
+    @property
+    def title(self) -> str:
+        """The case in words."""
+        return in_words(self.first.process.case, len(self.studies))
 
     @cached_property
     def values(self) -> Values:

@@ -15,6 +15,7 @@ from dragdeck.cases.bed import expected_surface, full_stiffness_number, softest_
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
 from dragdeck.outlook.timestep import largest_fraction, stable_fraction, stable_step_cautions
+from dragdeck.physics.contact_mechanics import FAST
 from dragdeck.physics.rounding import rounded
 from dragdeck.records.advised import AdvisedSettings
 from dragdeck.records.tradeoff import DropEntry, TradeoffRecord, measured_tradeoff
@@ -46,10 +47,9 @@ _FILLING_FRACTION = 0.5
 """Time step of a filling over the Rayleigh time, where it is stable: the bed and its drag are those
 of smaller steps (docs/evidence/simplifications.md)."""
 
-_STABILITY_NUMBER, _FAST = 0.72, 0.1
-"""Stability number that steps at the physical modulus are forecast to have, and inertial number
-above which they are no larger than those of the plain run: there, impacts decide, and a sliding
-distance was 12 % too small at the larger step (docs/evidence/windows.md)."""
+_STABILITY_NUMBER = 0.72
+"""Stability number that steps at the physical modulus are forecast to have (docs/evidence/windows.md).
+In fast drags they are no larger than those of the plain run: a sliding distance was 12 % too small."""
 
 _PLAIN_FRACTION = 0.64
 """Time step over the Rayleigh time of the plain run that costs are compared with."""
@@ -152,7 +152,7 @@ def soft_settings(case: Case) -> Fidelity:
 def stiff_settings(case: Case) -> Fidelity:
     """Those of a run at the physical modulus, begun softer if that saves anything."""
     stable = _step(stable_fraction(_with(case), math.log(_STABILITY_NUMBER)))
-    if describe(case)["inertial_number"] > _FAST:
+    if describe(case)["inertial_number"] > FAST:
         stable = min(stable, _PLAIN_FRACTION)
     chosen = consistent(_with(case, timestep_fraction=stable))
     soft = soft_settings(case)

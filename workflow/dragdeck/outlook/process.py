@@ -5,7 +5,7 @@ import math
 from dragdeck.cases.bed import particle_material, skin
 from dragdeck.cases.case import Case, of_each_workpiece
 from dragdeck.cases.ranks import cores_here
-from dragdeck.physics.contact_mechanics import effective_modulus, impact_overlap
+from dragdeck.physics.contact_mechanics import FAST, effective_modulus, impact_overlap
 from dragdeck.scenes.filling import MOST_OVERLAP, expected_bed, floor_overlap, rank_split
 from dragdeck.scenes.moving_bowl import bed_in_motion
 from dragdeck.scenes.workpiece import clearances, closest, describe, fastest_surface, in_diameters
@@ -39,11 +39,18 @@ def workpiece_notes(case: Case) -> list[tuple[str, str]]:
 
 
 def dimensionless(case: Case) -> list[tuple[str, str]]:
-    """The dimensionless numbers of a process and their values."""
-    words = {**compared_labels(), **_RATIOS}
+    """The dimensionless numbers of a process, their values and what two of them mean."""
+    words, numbers = {**compared_labels(), **_RATIOS}, describe(case)
+    soft = numbers["stiffness_number"] * case.study.chosen_fidelity().youngs_modulus_scale ** (2 / 3)
+    means = {
+        "stiffness_number": f"; {soft:.4g} in the run: overlaps are inversely proportional to it",
+        "inertial_number": ": fast; contacts differ from those of slow drags"
+        if numbers["inertial_number"] > FAST
+        else ": slow; the drag hardly depends on the speed",
+    }
     return [
-        (words.get(name, name.replace("_", " ")), f"{value:.4g}")
-        for name, value in describe(case).items()
+        (words.get(name, name.replace("_", " ")), f"{value:.4g}{means.get(name, '')}")
+        for name, value in numbers.items()
         if name != "particles"
     ]
 

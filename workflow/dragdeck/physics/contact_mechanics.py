@@ -190,6 +190,10 @@ def stiffness_number(material: Solid, pressure_pa: float) -> float:
     return float((modulus / pressure_pa) ** (2 / 3))
 
 
+FAST = 0.1
+"""Inertial number above which impacts decide (docs/evidence/windows.md)."""
+
+
 def inertial_number(
     shear_rate_per_s: float, diameter_m: float, density_kg_m3: float, pressure_pa: float
 ) -> float:
