@@ -4,11 +4,14 @@ import re
 import sys
 from importlib.metadata import version as version_of
 from pathlib import Path
+from typing import Any
 
 from docutils import nodes
 from sphinx.application import Sphinx
 
-sys.path.insert(0, str(Path(__file__).with_name("tools")))
+sys.path[:0] = [str(Path(__file__).with_name("tools")), str(Path(__file__).parents[1])]
+
+from figures import FIGURES, svg  # noqa: E402
 
 project = "dragdeck"
 author = "The developers of dragdeck"
@@ -43,7 +46,7 @@ html_theme_options = {
     "navigation_with_keys": False,
     "navbar_persistent": ["search-button"],  # its name is what it shows
     "show_nav_level": 1,
-    "navigation_depth": 2,
+    "collapse_navigation": True,  # its toggles have no name
     "show_toc_level": 2,
     "secondary_sidebar_items": ["page-toc"],
 }
@@ -60,6 +63,25 @@ def _keep_together(app: Sphinx, doctree: nodes.document, docname: str) -> None:
             text.parent.replace(text, nodes.Text(_TOGETHER.sub("\u00a0", text)))
 
 
+_FIGURE = re.compile(r'<img [^>]*src="([^"]*_images/\w+)\.svg"[^>]*>')
+
+
+def _for_phones(app: Sphinx, page: str, template: str, context: dict[str, Any], _: object) -> None:
+    """Name the narrow figure beside each figure."""
+    source = r'<picture><source media="(max-width: 760px)" srcset="\1-narrow.svg">\g<0></picture>'
+    if "body" in context:
+        context["body"] = _FIGURE.sub(source, context["body"])
+
+
+def _draw_narrow(app: Sphinx, error: Exception | None) -> None:
+    """Draw the figures again for phones."""
+    if error is None and app.builder.format == "html":
+        for name in FIGURES:
+            (app.outdir / f"_images/{name}-narrow.svg").write_text(svg(name, phone=True))
+
+
 def setup(app: Sphinx) -> None:
     """Called by Sphinx."""
+    app.connect("html-page-context", _for_phones)
+    app.connect("build-finished", _draw_narrow)
     app.connect("doctree-resolved", _keep_together)

@@ -12,13 +12,13 @@ const NEAR = 4; // pixels: a shorter drag is a click
 const axis = (label, space) => ({
   label,
   space,
-  stroke: "#3d4955",
+  stroke: () => getComputedStyle(document.body).color,
   font: "11px system-ui, sans-serif",
   labelFont: "12px system-ui, sans-serif",
   lineGap: 1.1,
   size: (plot, _, number) => (plot.axes[number].side % 2 ? 30 : 20),
   labelSize: 15,
-  grid: { stroke: "#e3e6ea", width: 0.7 },
+  grid: { stroke: "#8a94a040", width: 0.7 },
   ticks: { show: false },
   values: (_, splits) => splits.map((value) => minus(String(Number(value.toPrecision(6))))),
 });

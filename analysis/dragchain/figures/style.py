@@ -7,7 +7,6 @@ from contextlib import AbstractContextManager
 from functools import cache
 from importlib import resources
 from io import BytesIO
-from pathlib import Path
 from typing import Any
 
 import matplotlib
@@ -21,7 +20,6 @@ from matplotlib.typing import RcKeyType
 from PIL import Image
 
 from dragchain.arrays import Floats
-from dragdeck.files import write_bytes
 
 COLOURS: Mapping[str, str] = json.loads(
     resources.files("dragdeck").joinpath("data/colours.json").read_text(encoding="utf-8")
@@ -53,8 +51,8 @@ STYLE: dict[RcKeyType, Any] = {
     "legend.fontsize": 8,
 }
 WIDTH_IN = 7.6
-HALF_IN, WIDE_IN = 5.6, 9.5
-"""Widths of figures: `HALF_IN` where two stand side by side on a page."""
+NARROW_IN, HALF_IN, WIDE_IN = 4.0, 5.6, 9.5
+"""Widths of figures: `NARROW_IN` on a phone, `HALF_IN` where two stand side by side on a page."""
 
 _DPI = 150
 
@@ -112,9 +110,3 @@ def png(figure: Figure) -> bytes:
     picture = BytesIO()
     Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB").save(picture, format="png")
     return picture.getvalue()
-
-
-def save(figure: Figure, file: Path) -> Path:
-    """Write a figure as PNG; it appears under its name only once it is whole."""
-    write_bytes(file, png(figure))
-    return file

@@ -67,7 +67,7 @@ class ContactType(Part):
 
 
 class Profile(Part):
-    """Normal force times sliding distance per metre of path in bins of depth.
+    """Sliding load per metre of path in bins of depth.
 
     Attributes
     ----------

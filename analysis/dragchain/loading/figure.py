@@ -25,7 +25,7 @@ from dragchain.run.workpiece import Surface
 from dragdeck.records.case import CaseOfRun
 
 _QUANTITY = "force_slide_pa"
-_LABEL = "normal force times sliding distance, per area of the workpiece\nand path length (N/m²)"
+_LABEL = "sliding load, per area of the workpiece and path length (N/m²)"
 
 
 _VIEWS = {
@@ -46,7 +46,7 @@ _BESIDE_IN, _AROUND_IN, _TALLEST_IN = 1.3, 2.3, 3.5
 def workpiece_figure(
     case: CaseOfRun, sampled: Sampled, surface: Surface, facets: pd.DataFrame, loading: Loading
 ) -> Figure:
-    """The workpiece by force times sliding distance, averaged over areas of a particle's size.
+    """The workpiece by sliding load, averaged over areas of a particle's size.
 
     A cylinder is shown from ahead, from behind and unrolled; any other workpiece
     from its four sides. Beside it stands the profile over depth.
@@ -227,10 +227,10 @@ def _unrolled(axes: Axes, bins: _Bins, scale: Normalize, case: CaseOfRun) -> Non
 
 
 def _profile(axes: Axes, profile: Profile) -> None:
-    """Draw force times sliding distance against depth with its interval."""
+    """Draw the sliding load against depth with its interval."""
     depth_bars(axes, profile.edges_m, profile.force_slide, 1e-3)
     axes.set(xlim=(0.0, None), title="by depth, incl. end face\n(bars: 95 % CI)")
-    axes.set_xlabel("force times sliding\ndistance per path and\ndepth (N m/(m mm))")
+    axes.set_xlabel("sliding load per\ndepth (N/mm)")
 
 
 def _title(loading: Loading, case: CaseOfRun) -> str:
@@ -239,9 +239,9 @@ def _title(loading: Loading, case: CaseOfRun) -> str:
     front = loading.front_fraction["force_slide_n_m"]
     fraction = loading.friction_fraction_of_work.value
     return (
-        f"{case.case or case.run}: sliding load on the workpiece, "
+        "sliding load (normal force times sliding distance) on the workpiece, "
         f"{loading.path_m * 1e3:.0f} mm of path in {loading.time_s:.1f} s\n"
         f"friction work {work_j_m:.3g} J/m, {100 * fraction:.1f} % of the work of the workpiece\n"
-        f"front half: {100 * front.value:.0f} % of force times sliding distance"
+        f"front half: {100 * front.value:.0f} % of the sliding load"
         f" (95 % CI {100 * front.ci95_low:.0f} to {100 * front.ci95_high:.0f})"
     )

@@ -145,7 +145,7 @@ def event_quantiles(values: pd.Series) -> Quantiles:
 
 
 def _profile(sampled: Sampled) -> Profile:
-    """Force times sliding distance by depth, per metre of path."""
+    """Sliding load by depth, per metre of path."""
     rows = sampled.rows
     depth = rows["depth_m"].to_numpy()
     levels = np.linspace(depth.min(), depth.max(), LOAD_DEPTH_BINS + 1)

@@ -7,7 +7,8 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from dragchain.errors import TableError
-from dragchain.figures.style import drawing, save
+from dragchain.figures.narrow import save
+from dragchain.figures.style import drawing
 from dragchain.loading.contact_events import event_types, find_events
 from dragchain.loading.document import Loading
 from dragchain.loading.figure import workpiece_figure

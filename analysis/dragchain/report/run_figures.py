@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from dragchain.arrays import Floats
 from dragchain.figures import network_picture
 from dragchain.figures.network_picture import force_bar, show_network
+from dragchain.figures.narrow import save
 from dragchain.figures.panels import (
     compass,
     compass_bars,
@@ -25,7 +26,7 @@ from dragchain.figures.panels import (
     row_mark,
     row_names,
 )
-from dragchain.figures.style import BLUE, COLOURS, HALF_IN, RED, drawing, save
+from dragchain.figures.style import BLUE, COLOURS, HALF_IN, RED, drawing
 from dragchain.report.findings import DropFindings, FillingFindings, ProcessFindings
 from dragchain.report.run_data import RunData, write_findings
 from dragchain.run.kinematics import process_time

@@ -12,6 +12,7 @@ import pandas as pd
 
 from dragchain.arrays import Floats
 from dragchain.errors import MissingRunsError, TableError
+from dragchain.figures.narrow import NARROW
 from dragchain.report.cases import (
     ReportedCase,
     ReportedRun,
@@ -169,13 +170,14 @@ _FROM_LOADING = "workpiece"
 class RunSection:
     """What the page shows of one process run.
 
-    `pictures`: data URIs by the names of the figures, of which the page has the captions;
-    `network`: page on the contact network.
+    `pictures`: data URIs by the names of the figures, of which the page has the captions, and
+    `narrow` those for a phone; `network`: page on the contact network.
     """
 
     study: StudyRuns
     assumptions: list[AssumptionOfRun]
     pictures: dict[str, str]
+    narrow: dict[str, str]
     network: Path | None
 
 
@@ -273,6 +275,12 @@ def _section(study: StudyRuns) -> RunSection:
         study=study,
         assumptions=_assumptions(study),
         pictures=dict(picture for run in study.runs for picture in _pictures(run)),
+        narrow={
+            name: uri
+            for run in study.runs
+            for name in (_FROM_LOADING, *figures_of(run.case.scene))
+            if (uri := file_uri(run.folder / "figures" / f"{name}{NARROW}.png"))
+        },
         network=network if network.is_file() else None,
     )
 

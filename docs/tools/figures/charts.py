@@ -89,7 +89,7 @@ def _draw_forces() -> Figure:
 
 
 def _draw_load_map() -> Figure:
-    """Load-distance integral per area and path length on the unrolled lateral surface."""
+    """Sliding load per area and path length on the unrolled lateral surface."""
     facets, study = record_table("validation/run_facets"), record_table("study/uhlmann2015").iloc[0]
     side = facets[facets["centre_z_m"] > 1e-6]
     depth_m = study["motion_immersion_depth_m"]
@@ -112,7 +112,7 @@ def _draw_load_map() -> Figure:
     )
     axes.invert_yaxis()
     axes.grid(visible=False)
-    label = f"load-distance integral per area\nand path length (N/m²)\n{ABOVE_SCALE}"
+    label = f"sliding load per area\nand path length (N/m²)\n{ABOVE_SCALE}"
     figure.colorbar(shown, label=label.replace(", on", "\non"), extend="max")
     return figure
 
