@@ -8,7 +8,9 @@ The report contains the same panels. Each function returns its axes and takes a 
 from typing import Any
 
 import numpy as np
+from matplotlib import rcParams
 from matplotlib.axes import Axes
+from matplotlib.transforms import ScaledTranslation
 
 from dragchain.errors import UnknownNameError
 from dragchain.figures.panels import as_compass, compass_bars
@@ -41,7 +43,15 @@ def drag(run: FinishedRun, ax: Axes | None = None, *, peaks: bool = True) -> Axe
     if peaks:
         times_s, label = findings.peaks.process_time_s, f"{findings.peaks.count} peaks"
         ax.plot(times_s, findings.peaks.drag_n, "v", color=COLOURS["peak"], label=label)
-    ax.legend(loc="upper left", bbox_to_anchor=(0.0, -0.15), frameon=False, fontsize="small")
+    below = ScaledTranslation(0.0, -3.4 * rcParams["font.size"] / 72, ax.figure.dpi_scale_trans)
+    ax.legend(
+        loc="upper left",
+        bbox_to_anchor=(0.0, 0.0),
+        bbox_transform=ax.transAxes + below,
+        borderaxespad=0.0,
+        frameon=False,
+        fontsize="small",
+    )
     true_minus(ax)
     return ax
 

@@ -84,6 +84,15 @@ def test_the_drag_is_drawn_with_its_peaks(run: FinishedRun) -> None:
     assert len(lines(plot.bottleneck(run, peaks=False))) == len(lines(plot.bottleneck(run))) - 1
 
 
+def test_the_legend_of_a_narrow_panel_leaves_its_label_free(run: FinishedRun) -> None:
+    figure, (panel, *_) = pyplot.subplots(1, 3, figsize=(9, 2))
+    axes = plot.drag(run, panel)
+    figure.canvas.draw()
+    label, legend = axes.xaxis.label.get_window_extent(), axes.get_legend().get_window_extent()
+    pyplot.close(figure)
+    assert not label.overlaps(legend)
+
+
 def test_chain_lengths_are_fractions_of_each_definition(run: FinishedRun) -> None:
     axes = plot.chain_lengths(run)
     _, paths = lines(axes)
