@@ -112,7 +112,9 @@ def columns() -> str:
     parts: dict[str, list[list[str]]] = {"In several tables": []}
     for (tables, meaning), names in merged.items():
         cells = [f"`{_braced(names)}`", meaning]
-        listed = ", ".join(f"`{name}`" for name in tables.split()) if tables.count(" ") < 7 else "most"
+        listed = (
+            ", ".join(f"`{name}`" for name in tables.split()) if tables.count(" ") < 7 else "most"
+        )
         if " " in tables and counts[tables].max() < 3:
             parts["In several tables"].append([*cells, listed])
         else:

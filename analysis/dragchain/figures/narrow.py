@@ -20,7 +20,7 @@ NARROW = "-narrow"
 
 
 def save(figure: Figure, file: Path) -> Path:
-    """Write a figure as PNG, also for a phone; each appears under its name only once it is whole."""
+    """Write a figure as PNG, also for a phone; each appears only once it is whole."""
     write_bytes(file, png(figure))
     write_bytes(file.with_stem(file.stem + NARROW), png(narrow(figure)))
     return file
@@ -35,7 +35,8 @@ def narrow(figure: Figure) -> Figure:
             places.setdefault(spec, []).append(axes)
     rows, tall = _rows(list(places), figure.get_figwidth()), 0.0
     height = max(0.7 * figure.get_figheight() / next(iter(places)).get_gridspec().nrows, 2.2)
-    for cell, row in zip(figure.add_gridspec(len(rows), 1), rows, strict=True):
+    outer: Any = figure.add_gridspec(len(rows), 1)
+    for cell, row in zip(outer, rows, strict=True):
         inner = cell.subgridspec(1, len(row), width_ratios=[_share(spec) for spec in row])
         for spec, new in zip(row, inner, strict=True):
             for axes in places[spec]:
@@ -46,12 +47,11 @@ def narrow(figure: Figure) -> Figure:
         first.set_ylabel(fill(label, int(0.7 * _LETTERS_IN * height)))
         lines = sum(name.get_text().count("\n") + 1 for name in first.get_yticklabels())
         tall += max(height, 0.8 + 0.17 * lines)
-    for owner in [axes for axes in figure.axes if axes.get_legend()] + [figure] * len(figure.legends):
-        legend = owner.legends[0] if owner is figure else owner.get_legend()
+    legends: list[Any] = [*figure.legends, *(axes.get_legend() for axes in figure.axes)]
+    for legend in filter(None, legends):
         labels = [fill(text.get_text(), 46) for text in legend.get_texts()]
-        handles = legend.legend_handles
         legend.remove()
-        figure.legend(handles, labels, loc="outside lower left", ncols=1)
+        figure.legend(legend.legend_handles, labels, loc="outside lower left", ncols=1)
         tall += 0.2 * len(labels)
     figure.set_size_inches(NARROW_IN, tall)
     for text in figure.texts:

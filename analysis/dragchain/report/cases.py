@@ -218,7 +218,9 @@ def in_words(case: CaseOfRun, packings: int) -> str:
     how = ", ".join(settings) if own.name.startswith("E") else own.name.replace("-", " ")
     one = f"packing {seed}" if seed else "one packing"
     values = [f"{field.replace('_', ' ')} {value}" for field, value in swept.items()]
-    return ", ".join([f"{stiffness} ({how})", *values, one if packings == 1 else f"{packings} packings"])
+    return ", ".join(
+        [f"{stiffness} ({how})", *values, one if packings == 1 else f"{packings} packings"]
+    )
 
 
 @dataclass(frozen=True)

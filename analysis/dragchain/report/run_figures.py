@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 
 from dragchain.arrays import Floats
 from dragchain.figures import network_picture
-from dragchain.figures.network_picture import force_bar, show_network
 from dragchain.figures.narrow import save
+from dragchain.figures.network_picture import force_bar, show_network
 from dragchain.figures.panels import (
     compass,
     compass_bars,

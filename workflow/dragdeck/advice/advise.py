@@ -48,8 +48,8 @@ _FILLING_FRACTION = 0.5
 of smaller steps (docs/evidence/simplifications.md)."""
 
 _STABILITY_NUMBER = 0.72
-"""Stability number that steps at the physical modulus are forecast to have (docs/evidence/windows.md).
-In fast drags they are no larger than those of the plain run: a sliding distance was 12 % too small."""
+"""Stability number that steps at the physical modulus are forecast to have. In fast drags they are
+no larger than those of the plain run: a sliding distance was 12 % too small."""
 
 _PLAIN_FRACTION = 0.64
 """Time step over the Rayleigh time of the plain run that costs are compared with."""

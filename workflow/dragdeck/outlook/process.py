@@ -41,7 +41,8 @@ def workpiece_notes(case: Case) -> list[tuple[str, str]]:
 def dimensionless(case: Case) -> list[tuple[str, str]]:
     """The dimensionless numbers of a process, their values and what two of them mean."""
     words, numbers = {**compared_labels(), **_RATIOS}, describe(case)
-    soft = numbers["stiffness_number"] * case.study.chosen_fidelity().youngs_modulus_scale ** (2 / 3)
+    scale = case.study.chosen_fidelity().youngs_modulus_scale
+    soft = numbers["stiffness_number"] * scale ** (2 / 3)
     means = {
         "stiffness_number": f"; {soft:.4g} in the run: overlaps are inversely proportional to it",
         "inertial_number": ": fast; contacts differ from those of slow drags"
