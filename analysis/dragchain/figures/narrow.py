@@ -33,6 +33,8 @@ def narrow(figure: Figure) -> Figure:
         _break_lines(axes)
         if spec := axes.get_subplotspec():  # colour bars have none, twins the same
             places.setdefault(spec, []).append(axes)
+    if not places:
+        return figure
     rows, tall = _rows(list(places), figure.get_figwidth()), 0.0
     height = max(0.7 * figure.get_figheight() / next(iter(places)).get_gridspec().nrows, 2.2)
     outer: Any = figure.add_gridspec(len(rows), 1)

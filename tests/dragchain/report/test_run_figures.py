@@ -16,6 +16,7 @@ from PIL import Image
 
 from dragchain.errors import TableError
 from dragchain.figures import network_picture as scene
+from dragchain.figures.narrow import NARROW
 from dragchain.figures.rendering import RenderError, check_rendering
 from dragchain.network.frame import SIDE, NetworkFrame
 from dragchain.report.findings import FINDINGS_FILE, FillingFindings, ProcessFindings
@@ -137,7 +138,7 @@ def test_process_figures_are_whole_pictures(process: Path, drawn: list[Path]) ->
     names = list(figures_of("process"))
     assert [path.stem for path in drawn] == names
     assert sorted(path.name for path in (process / "figures").iterdir()) == sorted(
-        f"{name}.png" for name in names
+        f"{name}{end}.png" for name in names for end in ("", NARROW)
     )
     for path in drawn:
         with Image.open(path) as picture:
