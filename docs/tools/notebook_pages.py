@@ -31,6 +31,7 @@ def _parts(cell: NotebookNode) -> Iterator[str]:
             yield f"![plot](data:image/png;base64,{''.join(data['image/png'].split())})"
         elif "text/html" in data:
             table = data["text/html"].replace('border="1" class="dataframe"', 'class="table"')
+            table = table.replace("<th></th>", "<td></td>")  # an empty head has no name
             scrolled = f'<div class="pst-scrollable-table-container">{table}</div>'
             yield f"```{{raw}} html\n{scrolled}\n```"
         else:

@@ -1,4 +1,4 @@
-/*! sources: 48801c98f79ccaa99829422ffb545ca548d4524e3d4e0c54d99d3c8879fd11d7
+/*! sources: 0bb940f712cbd7dcc14e0c435172cbb5863b3b60a54852e9606da8537b613cf1
 Made by ./run web from web/; do not edit. It contains three.js:
 
 The MIT License
