@@ -46,7 +46,6 @@ html_theme_options = {
     "navigation_with_keys": False,
     "navbar_persistent": ["search-button"],  # its name is what it shows
     "show_nav_level": 1,
-    "collapse_navigation": True,  # its toggles have no name
     "show_toc_level": 2,
     "secondary_sidebar_items": ["page-toc"],
 }
