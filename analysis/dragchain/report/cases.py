@@ -205,7 +205,7 @@ class ReportedRun(Run, Generic[F]):
     record: RunRecord
 
 
-def in_words(case: CaseOfRun, packings: int) -> str:
+def case_title(case: CaseOfRun, packings: int) -> str:
     """A case by its stiffness, the values that a sweep gives it and its packings."""
     name, own = case.case or case.run, case.fidelity
     if not name.startswith(own.name):
@@ -248,7 +248,7 @@ class StudyRuns:
     @property
     def title(self) -> str:
         """The case in words."""
-        return in_words(self.process.case, 1)
+        return case_title(self.process.case, 1)
 
     @cached_property
     def values(self) -> Values:
@@ -337,7 +337,7 @@ class ReportedCase:
     @property
     def title(self) -> str:
         """The case in words."""
-        return in_words(self.first.process.case, len(self.studies))
+        return case_title(self.first.process.case, len(self.studies))
 
     @cached_property
     def values(self) -> Values:
