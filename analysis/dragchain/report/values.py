@@ -58,8 +58,8 @@ class Values:
 
     @property
     def adjusted(self) -> bool:
-        """Whether any value differs from the run's, or is missing."""
-        return any(standing.value != standing.run for standing in self.standings)
+        """Whether any value differs from the run's."""
+        return any(standing.value not in (None, standing.run) for standing in self.standings)
 
     @property
     def corrected(self) -> bool:
