@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -353,14 +354,14 @@ def _removed(case: ReportedCase) -> tuple[RemovalOfCase, str] | None:
     if removal is None:
         return None
     label = "depth of removal (µm/h), mean over areas of a particle's radius"
-    title = f"{case.name}: depth of removal by {removal.removal.law}"
+    title = f"{case.title}: depth of removal by {removal.removal.law}"
     depth = removal.facets["depth_m_s"].to_numpy(np.float64)
     return removal, _surface_map(case, UM_PER_H * depth, label, title)
 
 
 def _ra_map(case: ReportedCase, roughness: RoughnessOfCase) -> str:
     """The map of the roughness of a case as a picture."""
-    title = f"{case.name}: roughness after {roughness.map_minutes:.3g} min"
+    title = f"{case.title}: roughness after {roughness.map_minutes:.3g} min"
     return _surface_map(case, 1e6 * roughness.ra["ra_m"].to_numpy(np.float64), "Ra (µm)", title)
 
 
@@ -412,7 +413,7 @@ def _overview(cases: Sequence[ReportedCase]) -> str:
     rows = [row for case in cases for row in case.values.against]
     with drawing():
         figure = drag_of_cases(
-            [case.name for case in cases],
+            [fill(case.title, 32) for case in cases],
             [case.values.drag.shown for case in cases],
             list(dict.fromkeys((row.reference.label, row.reference.mean_n) for row in rows)),
         )
