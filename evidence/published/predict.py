@@ -13,7 +13,7 @@ import pandas as pd
 from dragchain.calibration.angles import read_angle
 from dragchain.scaling.fit import read_scalings
 from dragchain.statistics.bed_effects import EffectsFit, fit_effects
-from dragchain.statistics.estimate import Estimate, mean_of
+from dragchain.statistics.estimate import Estimate
 from dragdeck.cases.case import Case
 from dragdeck.decks import RUN_FILE
 from dragdeck.decks.templates import environment
@@ -36,8 +36,6 @@ RESULTS = ("plate", "lift", "angle", "spin", "repose")
 LIFTED = ("bar_round", "bar_square", "bar_half_flat_down", "bar_half_flat_up")
 """Bars that lie across the direction of motion; the others have their angle to it in the name."""
 
-PACKINGS = 3
-
 FRICTION_STD = 0.067 / 0.274
 """Relative standard deviation of a measured friction of glass."""
 
@@ -51,6 +49,12 @@ _WINDOW_M = 0.005
 
 _FROM_DEPTH_M = 0.013
 """Two particle diameters: above, the flat plate meets single particles."""
+
+
+class Repeated(Variation):
+    """Points of the design and the number of their packings."""
+
+    packings: int = 2
 
 
 def predict(out_dir: Path) -> None:
@@ -80,13 +84,13 @@ def predict(out_dir: Path) -> None:
     )
 
 
-def cases_of(result: str, packings: int = PACKINGS) -> Iterator[Case]:
-    """The cases of a design, packing by packing."""
+def cases_of(result: str) -> Iterator[Case]:
+    """The cases of a design, packing by packing of each point."""
     data: Any = read_yaml(DESIGN)
-    design = Design[Variation].read(DESIGN, result)
-    for seed in range(1, packings + 1):
-        for block in (design.reference, *design.points):
-            for _, values in block.points():
+    design = Design[Repeated].read(DESIGN, result)
+    for block in (design.reference, *design.points):
+        for _, values in block.points():
+            for seed in range(1, block.packings + 1):
                 yield settle_case(DESIGN, data["study"], {**design.base, **values, "seed": seed})
 
 
@@ -118,7 +122,7 @@ def _drag(batch: Batch, case: Case) -> dict[str, Any]:
     row: dict[str, Any] = {
         "seed": study.seed,
         "body": Path(getattr(study.workpiece.shape, "file", "rod")).stem,
-        "friction": study.pairs["ceramic-steel"].friction,
+        "friction": study.pairs[f"ceramic-{study.workpiece.material}"].friction,
         "spin_rpm": study.motion.spin.rpm if study.motion.spin else 0.0,
         "cpu_time_s": RunRecord.read(folder / RUN_FILE).cpu_time_s,
     }
@@ -186,18 +190,23 @@ def _peak(runs: pd.DataFrame, draws: int = 2000) -> Estimate:
 
 
 def _spin(runs: pd.DataFrame) -> dict[str, Estimate]:
-    """Reductions by spin: how much larger with more friction, and how much smaller deeper."""
+    """Reductions by spin: how much larger with more friction, and how much smaller deeper.
+
+    The reductions of a packing and friction at both depths have a random effect in common.
+    """
     force = runs.set_index(["friction", "seed"])[["value", "deeper"]]
     spins = (runs.spin_rpm > 0).to_numpy()
-    reduction: Any = 1 - force[spins] / force[~spins]
-    more = (reduction.loc[0.60] - reduction.loc[0.10]).mean(axis=1)
-    less = (reduction["value"] - reduction["deeper"]).groupby("seed").mean()
-    return {
-        "spin_reduction_smooth": mean_of(reduction.loc[0.10, "value"]),
-        "spin_reduction_rough": mean_of(reduction.loc[0.60, "value"]),
-        "spin_friction_effect": mean_of(more),
-        "spin_depth_effect": mean_of(less),
-    }
+    reduced: Any = (1 - force[spins] / force[~spins]).stack()
+    rows = reduced.rename("value").reset_index()
+    design = np.column_stack([
+        np.ones(len(rows)),
+        np.where(rows.friction == rows.friction.max(), 1, 0),
+        np.where(rows.level_2 == "deeper", -1, 0),
+    ])  # fmt: skip
+    pairs = rows.assign(seed=rows.friction.astype(str) + rows.seed.astype(str))
+    names = ("spin_reduction", "spin_friction_effect", "spin_depth_effect")
+    fit = _fit(design, pairs)
+    return dict(zip(names, map(fit.estimate, np.eye(3)), strict=True))
 
 
 def _by_friction() -> Estimate:
@@ -229,8 +238,8 @@ def compare(predicted: pd.DataFrame, published: pd.DataFrame) -> pd.DataFrame:
     predicted : DataFrame
         As `predictions` makes it.
     published : DataFrame
-        Columns ``quantity``, ``published`` (a value, or 1 or -1 for a sign) and ``kind``, ``value``
-        or ``sign``.
+        Columns ``quantity``, ``published`` (a value, or 1 or -1 for a sign, or none) and ``kind``,
+        ``value`` or ``sign``.
     """
     both = published.merge(predicted, on="quantity", how="left")
     both["verdict"] = [_verdict(row) for row in both.itertuples()]
@@ -243,36 +252,41 @@ def write_comparison(folder: Path) -> None:
     Parameters
     ----------
     folder : Path
-        With ``runs.csv``, too; gets ``comparison.csv`` and ``results.csv``.
+        With ``runs.csv`` and ``labels.csv``, too; gets ``comparison.csv`` and ``results.csv``.
     """
-    runs, predicted, published = (
-        pd.read_csv(folder / f"{name}.csv") for name in ("runs", "predictions", "published")
+    runs, labels, predicted, published = (
+        pd.read_csv(folder / f"{name}.csv")
+        for name in ("runs", "labels", "predictions", "published")
     )
-    compared = compare(predicted, published)
+    compared = compare(predicted, labels.merge(published, on="quantity", how="left"))
     compared.to_csv(folder / "comparison.csv", index=False)
     minutes = runs.groupby("result").cpu_time_s.sum() / 60
-    rows = []
-    for (number, result), part in compared.groupby(["no", "result"], sort=False):
-        rows.append({
-            "no": number, "result": result, "statement": part.statement.iloc[0],
-            "predicted": "; ".join(map(_said, part.itertuples())),
-            "published": "; ".join(part.said), "cpu_min": minutes.get(result),
+    rows = [
+        {
+            "no": number, "statement": statement,
+            "predicted": "; ".join(filter(None, map(_said, part.itertuples()))),
+            "published": "; ".join(part.said.dropna()), "cpu_min": minutes.get(result),
             "verdict": "; ".join(dict.fromkeys(part.verdict)),
-        })  # fmt: skip
+        }
+        for (number, result, statement), part in compared.groupby(["no", "result", "statement"])
+    ]  # fmt: skip
     pd.DataFrame(rows).to_csv(folder / "results.csv", index=False, float_format="%.3g")
 
 
 def _said(row: Any) -> str:
     """A prediction as words; empty if there is none."""
-    if row.predicted != row.predicted:
+    if np.isnan(row.predicted):
         return ""
-    return f"{row.label} {row.predicted:.2g} ({row.low:.2g} to {row.high:.2g})".strip()
+    label = row.label if isinstance(row.label, str) else ""
+    return f"{label} {row.predicted:.2g} ({row.low:.2g} to {row.high:.2g})".strip()
 
 
 def _verdict(row: Any) -> str:
     known = Estimate(row.predicted, row.low, row.high)
     if not known.known:
         return "not run"
+    if np.isnan(row.published):
+        return "no experiment"
     if row.kind == "value":
         return known.agrees_with(row.published)
     return known.over(row.published).exceeds(0.0)

@@ -9,14 +9,15 @@ keeps, and by chance: trajectories diverge.
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from dragchain.statistics.estimate import mean_of
+from dragchain.statistics.correlated import estimate_mean
+from dragchain.statistics.estimate import Estimate
 from dragdeck.arrays import Floats
 from dragdeck.cases.case import Case
 from dragdeck.decks.deck import Scene
@@ -62,7 +63,7 @@ def compare_engines(out_dir: Path) -> None:
         runs = pd.DataFrame(rows)
         runs.to_csv(out_dir / "engine_runs.csv", index=False, float_format="%.5g")
         compared(runs).to_csv(out_dir / "engines.csv", index=False, float_format="%.5g")
-        say(f"compared: {len(rows) // 2} packings")
+        say(f"compared: {PROCESS.run_id(case)}")
 
 
 def rows_of_case(batch: Batch, case: Case) -> list[dict[str, Any]]:
@@ -71,11 +72,16 @@ def rows_of_case(batch: Batch, case: Case) -> list[dict[str, Any]]:
     filling = batch.folder / FILLING.run_id(case) / "tables"
     scene = process_scene(case, read_bed(filling / "packing.json"))
     other = run_lammps(folder / "lammps", scene, filling / "particles.parquet")
+    engines = {
+        "LIGGGHTS": quantities_of_liggghts(folder, scene.case.media.count),
+        "LAMMPS": quantities_of_lammps(other, scene),
+    }
     scale = case.study.chosen_fidelity().youngs_modulus_scale
     known = {"modulus_scale": scale, "seed": case.study.seed}
     return [
-        {**known, "engine": "LIGGGHTS", **quantities_of_liggghts(folder, scene.case.media.count)},
-        {**known, "engine": "LAMMPS", **quantities_of_lammps(other, scene)},
+        {**known, "engine": engine, "quantity": name, "value": of.value, "half": of.half_width}
+        for engine, quantities in engines.items()
+        for name, of in quantities.items()
     ]
 
 
@@ -107,7 +113,7 @@ def run_lammps(folder: Path, scene: Scene[ProcessCase], particles: Path) -> Path
 # --- quantities ----------------------------------------------------------------------------------
 
 
-def quantities_of_liggghts(folder: Path, particles: int) -> dict[str, float]:
+def quantities_of_liggghts(folder: Path, particles: int) -> dict[str, Estimate]:
     """The quantities of a run, from its tables."""
     force, loads, network = (
         pd.read_parquet(folder / "tables" / f"{name}.parquet")
@@ -115,19 +121,18 @@ def quantities_of_liggghts(folder: Path, particles: int) -> dict[str, float]:
     )
     force, loads = force[force.in_statistics], loads[loads.in_statistics]
     pairs = network[(network.kind == "particle-particle") & network.step.isin(force.step)]
-    return _quantities(
-        force[["drag_n", "lateral_n", "vertical_n"]].to_numpy(),
-        _strength(loads), loads.step.nunique(),
-        _strength(pairs), pairs.step.nunique(), particles,
-    )  # fmt: skip
+    components = force[["drag_n", "lateral_n", "vertical_n"]].to_numpy()
+    return _quantities(components, _strengths(loads), _strengths(pairs), particles)
 
 
-def _strength(rows: pd.DataFrame) -> Floats:
+def _strengths(rows: pd.DataFrame) -> list[Floats]:
+    """The forces of each frame, N, without contacts of no force."""
     forces = np.linalg.norm(rows[["force_x_n", "force_y_n", "force_z_n"]], axis=1)
-    return np.asarray(forces[forces > 0])
+    acting = pd.Series(forces[forces > 0]).groupby(rows.step.to_numpy()[forces > 0])
+    return [frame.to_numpy() for _, frame in acting]
 
 
-def quantities_of_lammps(folder: Path, scene: Scene[ProcessCase]) -> dict[str, float]:
+def quantities_of_lammps(folder: Path, scene: Scene[ProcessCase]) -> dict[str, Estimate]:
     """The same, from the output of LAMMPS."""
     deck: Any = scene.deck
     begin = deck.legs[-1].start_step + scene.case.statistics.transient_s / deck.timestep_s
@@ -136,52 +141,47 @@ def quantities_of_lammps(folder: Path, scene: Scene[ProcessCase]) -> dict[str, f
     direction = scene.case.motion.start_direction_rad + turn[step >= begin]
     along = x * np.cos(direction) + y * np.sin(direction)
     left = y * np.cos(direction) - x * np.sin(direction)
+    columns = {"workpiece": [f"f_workpiece[{column}]" for column in (2, 3, 4)],
+               "network": ["c_network[2]", "c_network[3]"]}  # fmt: skip
     loads, network = (
-        [frame.vectors(*names) for frame in read_dump(folder / file) if frame.step >= begin]
-        for file, names in (
-            ("workpiece.dump", [f"f_workpiece[{column}]" for column in (2, 3, 4)]),
-            ("network.dump", ["c_network[2]", "c_network[3]"]),
-        )
-    )
-    return _quantities(
-        np.column_stack([along, left, z]),
-        np.linalg.norm(np.concatenate(loads), axis=1), len(loads),
-        np.linalg.norm(np.concatenate(network), axis=1), len(network), scene.case.media.count,
+        [np.linalg.norm(frame.vectors(*names), axis=1)
+         for frame in read_dump(folder / f"{file}.dump") if frame.step >= begin]
+        for file, names in columns.items()
     )  # fmt: skip
+    return _quantities(np.column_stack([along, left, z]), loads, network, scene.case.media.count)
 
 
 def _quantities(
-    force: Floats, loads: Floats, load_frames: int, network: Floats, frames: int, particles: int
-) -> dict[str, float]:
-    """Ten quantities of a drag.
+    force: Floats, loads: Sequence[Floats], network: Sequence[Floats], particles: int
+) -> dict[str, Estimate]:
+    """Ten means over a drag, with the intervals of correlated samples.
 
     Parameters
     ----------
     force : (N, 3) ndarray
         Drag, lateral and vertical force on the workpiece, N.
-    loads, network : ndarray
-        Forces of all contacts on the workpiece, and of those between particles, N.
-    load_frames, frames : int
-        Number of the samples that these are from.
+    loads, network : sequence of ndarray
+        Forces of all contacts on the workpiece, and of those between particles, N, in each frame.
     particles : int
     """
-    drag, lateral, vertical = force.mean(axis=0)
-    return {
+    drag, lateral, vertical = force.T
+    series = {
         "drag_n": drag,
-        "drag_std_n": force[:, 0].std(),
+        "drag_variance_n2": (drag - drag.mean()) ** 2,
         "lateral_n": lateral,
         "vertical_n": vertical,
-        "workpiece_contacts": len(loads) / load_frames,
-        "contact_force_n": loads.mean(),
-        "contact_force_p90_n": np.quantile(loads, 0.9),
-        "coordination": 2 * len(network) / frames / particles,
-        "network_force_n": network.mean(),
-        "network_force_cv": network.std() / network.mean(),
+        "workpiece_contacts": [len(frame) for frame in loads],
+        "contact_force_n": [frame.mean() for frame in loads],
+        "contact_force_p90_n": [np.quantile(frame, 0.9) for frame in loads],
+        "coordination": [2 * len(frame) / particles for frame in network],
+        "network_force_n": [frame.mean() for frame in network],
+        "network_force_cv": [frame.std() / frame.mean() for frame in network],
     }
+    return {name: estimate_mean(values).estimate for name, values in series.items()}
 
 
 def compared(runs: pd.DataFrame) -> pd.DataFrame:
-    """The quantities of both engines, and their difference packing by packing with its interval.
+    """The quantities of both engines, and the mean of their differences packing by packing.
 
     Parameters
     ----------
@@ -191,17 +191,18 @@ def compared(runs: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        One row per modulus and quantity; the interval is Student's over the packings.
+        One row per modulus and quantity. The interval of the difference is that of the means of
+        the single runs: packings are the same in both engines.
     """
-    rows = []
-    for scale, group in runs.groupby("modulus_scale"):
-        of = {name: part.set_index("seed") for name, part in group.groupby("engine")}
-        for quantity in runs.columns.drop(["modulus_scale", "seed", "engine"]):
-            ours, theirs = of["LIGGGHTS"][quantity], of["LAMMPS"][quantity]
-            difference = mean_of(theirs - ours)
-            rows.append({
-                "modulus_scale": scale, "quantity": quantity, "packings": len(ours),
-                "liggghts": ours.mean(), "lammps": theirs.mean(), "difference": difference.value,
-                "difference_low": difference.ci95_low, "difference_high": difference.ci95_high,
-            })  # fmt: skip
+    index, rows = ["modulus_scale", "quantity", "seed"], []
+    wide = runs.pivot(index=index, columns="engine", values=["value", "half"])
+    for (scale, quantity), part in wide.groupby(level=index[:2], sort=False):
+        ours, theirs = (part["value", engine] for engine in ("LIGGGHTS", "LAMMPS"))
+        reach = np.sqrt((part["half"] ** 2).to_numpy().sum()) / len(part)
+        known = Estimate.around((theirs - ours).mean(), reach)
+        rows.append({
+            "modulus_scale": scale, "quantity": quantity, "packings": len(part),
+            "liggghts": ours.mean(), "lammps": theirs.mean(), "difference": known.value,
+            "difference_low": known.ci95_low, "difference_high": known.ci95_high,
+        })  # fmt: skip
     return pd.DataFrame(rows)

@@ -40,7 +40,7 @@ def runs() -> pd.DataFrame:
     for friction, left in ((0.1, 0.8), (0.6, 0.5)):
         made += rows("spin", noise, friction=friction, spin_rpm=0.0, value=10.0, deeper=20.0)
         made += rows(
-            "spin", noise, friction=friction, spin_rpm=382.0, value=10 * left, deeper=20 * left + 1
+            "spin", noise, friction=friction, spin_rpm=382.0, value=10 * left, deeper=20 * left + 2
         )
     for friction, radius in ((0.35, 3e-3), (0.2, 3e-3), (0.6, 3e-3), (0.35, 2e-3)):
         steep = friction**FRICTION_EXPONENT * radius**DIAMETER_EXPONENT
@@ -54,10 +54,9 @@ def runs() -> pd.DataFrame:
         ("plate_ratio", 2.5),
         *((f"lift_{body}_n", lift) for body, lift in LIFTS.items()),
         ("angle_of_largest_force_deg", 40.0),
-        ("spin_reduction_smooth", 0.2),
-        ("spin_reduction_rough", 0.5),
+        ("spin_reduction", 0.2),
         ("spin_friction_effect", 0.3),
-        ("spin_depth_effect", 0.05),
+        ("spin_depth_effect", 0.1),
         ("repose_friction_exponent", FRICTION_EXPONENT),
         ("repose_diameter_exponent", DIAMETER_EXPONENT),
     ],
@@ -89,7 +88,7 @@ def test_verdicts(kind: str, published: float, low: float, high: float, verdict:
 
 @pytest.mark.parametrize("result", RESULTS)
 def test_the_product_can_run_the_design(result: str) -> None:
-    for case in cases_of(result, packings=1):
+    for case in (case for case in cases_of(result) if case.study.seed == 1):
         if result == "repose":
             run = AngleRun(rig="repose", friction=0.3, rolling_friction=0.1, seed=1)
             assert angle_scene(case, run).case.media.count
