@@ -278,7 +278,7 @@ def _said(row: Any) -> str:
     if np.isnan(row.predicted):
         return ""
     label = row.label if isinstance(row.label, str) else ""
-    return f"{label} {row.predicted:.2g} ({row.low:.2g} to {row.high:.2g})".strip()
+    return f"{label} {row.predicted:.3g} ({row.low:.3g} to {row.high:.3g})".strip()
 
 
 def _verdict(row: Any) -> str:
@@ -286,7 +286,7 @@ def _verdict(row: Any) -> str:
     if not known.known:
         return "not run"
     if np.isnan(row.published):
-        return "no experiment"
+        return "not compared"
     if row.kind == "value":
         return known.agrees_with(row.published)
     return known.over(row.published).exceeds(0.0)
