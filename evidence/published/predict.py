@@ -266,11 +266,18 @@ def write_comparison(folder: Path) -> None:
             "no": number, "statement": statement,
             "predicted": "; ".join(filter(None, map(_said, part.itertuples()))),
             "published": "; ".join(part.said.dropna()), "cpu_min": minutes.get(result),
-            "verdict": "; ".join(dict.fromkeys(part.verdict)),
+            "verdict": _judged(part),
         }
         for (number, result, statement), part in compared.groupby(["no", "result", "statement"])
     ]  # fmt: skip
     pd.DataFrame(rows).to_csv(folder / "results.csv", index=False, float_format="%.3g")
+
+
+def _judged(part: pd.DataFrame) -> str:
+    """The verdicts of the quantities of a result, named where they differ."""
+    if part.verdict.nunique() == 1:
+        return str(part.verdict.iloc[0])
+    return "; ".join(f"{row.short}: {row.verdict}" for row in part.itertuples())
 
 
 def _said(row: Any) -> str:
