@@ -1,5 +1,6 @@
 """Predictions of planted runs, verdicts, and a design that the product can run."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,14 @@ import pytest
 
 from dragdeck.scenes.angles import AngleRun, angle_scene
 from dragdeck.scenes.process import process_scene
-from evidence.published.predict import LIFTED, RESULTS, cases_of, compare, predictions
+from evidence.published.predict import (
+    LIFTED,
+    RESULTS,
+    cases_of,
+    compare,
+    predictions,
+    write_comparison,
+)
 
 PLATES = {"plate_flat": 400e3, "plate_upright": 160e3}
 LIFTS = dict(zip(LIFTED, (1.0, 0.5, -0.2, 1.5), strict=True))
@@ -84,6 +92,24 @@ def test_verdicts(kind: str, published: float, low: float, high: float, verdict:
     )
     known = pd.DataFrame({"quantity": ["a"], "published": [published], "kind": [kind]})
     assert list(compare(predicted, known).verdict) == [verdict]
+
+
+def test_a_result_has_the_verdicts_of_its_quantities(tmp_path: Path) -> None:
+    files = {
+        "runs": "result,cpu_time_s\nlift,90\nlift,30\n",
+        "labels": "quantity,no,result,statement,label,short\nup,a,lift,Lift,up:,up\n"
+        "down,a,lift,Lift,down:,down\ngap,b,bars,Gap,,\n",
+        "predictions": "quantity,predicted,low,high\nup,1.0,0.5,1.5\ndown,0.1,-0.5,0.7\n",
+        "published": "quantity,published,kind,said\nup,1,sign,up\n"
+        "down,-1,sign,down\ngap,3,value,3\n",
+    }
+    for name, text in files.items():
+        (tmp_path / f"{name}.csv").write_text(text)
+    write_comparison(tmp_path)
+    lift, bars = pd.read_csv(tmp_path / "results.csv").to_dict("records")
+    assert lift["verdict"] == "up: confirmed; down: not confirmed"
+    assert lift["predicted"] == "up: 1 (0.5 to 1.5); down: 0.1 (-0.5 to 0.7)"
+    assert lift["cpu_min"] == 2 and bars["verdict"] == "not run"
 
 
 @pytest.mark.parametrize("result", RESULTS)
