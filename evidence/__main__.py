@@ -42,6 +42,19 @@ COMMANDS = (
             "Fill bowls with media of several shapes and sizes, and measure the solid fraction of "
             "the beds. The runs are in results/solid_fraction.", "solid_fraction:measure_beds", (
         Argument("out", type=Path, metavar="FILE", help="CSV file to write"),)),
+    Command("compare-engines", "run a study in LIGGGHTS and in LAMMPS from the same packings",
+            "Run the study quickstart in LIGGGHTS and, from the same packings, in LAMMPS, and "
+            "compare ten quantities. Needs ./run setup lammps; the runs are in "
+            "results/second_engine.", "second_engine.compare:compare_engines", (
+        out_in("results/second_engine/comparison"),)),
+    Command("predict", "run what published results are compared with, and predict these",
+            "Run plates, bars, rods and heaps of published experiments, and predict their results "
+            "with intervals. The runs are in results/published.", "published.predict:predict", (
+        out_in("results/published/predicted"),)),
+    Command("compare-published", "compare predictions with published results",
+            "Compare predictions.csv with published.csv.",
+            "published.predict:write_comparison", (
+        Argument("folder", type=Path, metavar="DIR", help="folder of both, and of runs.csv"),)),
     Command("validate", "compare the runs of a study with the publication it reproduces",
             "Compare the runs of a study with the publication it reproduces; write the report.",
             "validation.report:write_validation", (

@@ -407,7 +407,7 @@ def test_every_dependency_is_pinned_at_or_above_its_minimum() -> None:
             pins.setdefault(re.sub(r"[-_.]+", "-", pin.name.lower()), []).append(version)
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())
     wanted = [*project["project"]["dependencies"], *project["build-system"]["requires"]]
-    for extra in ("cad", "crate", "docs", "notebook", "slurm", "test"):
+    for extra in ("cad", "crate", "docs", "lammps", "notebook", "slurm", "test"):
         wanted += project["project"]["optional-dependencies"][extra]
     for requirement in map(Requirement, wanted):
         for version in pins[requirement.name.lower()]:

@@ -8,7 +8,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 from records import chosen, record_table
 
-from dragchain.figures.panels import log_ticks
+from dragchain.figures.panels import log_ticks, row_mark, row_names
 from dragchain.figures.style import (
     ABOVE_SCALE,
     BLUE,
@@ -225,6 +225,27 @@ def _draw_validation() -> Figure:
     effects = chosen("validation/effects", "quantity == 'drag_mean'").fillna({"field": ""})
     bars += [effect_bar(drag.value, effect) for effect in effects.itertuples()]
     return draw_drags(bars, record_table("validation/comparison").set_index("label")["mean_n"])
+
+
+def _draw_published() -> Figure:
+    """Predictions over published values, and those of which the sign was published."""
+    rows = record_table("published/comparison").dropna(subset=["predicted", "published"])
+    figure, panels = _panels(8.6, 2.6, 3)
+    for axes, kind, result, label in zip(
+        panels,
+        ("value", "sign", "sign"),
+        ("", "lift", "spin"),
+        ("predicted / published", "lift (N)", "difference of the reduction"),
+        strict=True,
+    ):
+        part = rows[(rows["kind"] == kind) & (rows["result"] == result if result else True)]
+        for place, row in enumerate(part.itertuples()):
+            known = Estimate(row.predicted, row.low, row.high)
+            row_mark(axes, place, known.over(1.0 if result else row.published), BLUE)
+        row_names(axes, [f"{row.no}: {row.short}" for row in part.itertuples()])
+        axes.axvline(0.0 if result else 1.0, color=RED, ls="--")
+        axes.set_xlabel(label)
+    return figure
 
 
 def _draw_verification(smallest: float = 1e-12) -> Figure:

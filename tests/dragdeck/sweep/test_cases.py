@@ -13,7 +13,7 @@ from dragdeck.project import Project, by_run
 from dragdeck.scenes.drop_test import DROP_TEST
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import PROCESS, SCENES, process_scene
-from dragdeck.sweep.cases import load_cases, new_study, study_file
+from dragdeck.sweep.cases import load_cases, new_study, settle_case, study_file
 
 
 def ids(case: Case) -> dict[str, str]:
@@ -51,6 +51,15 @@ def test_a_matrix_makes_every_combination(load: Load) -> None:
     assert cases[3].study.motion.speed_m_s == 0.02
     assert len(by_run(cases, FILLING)) == 3
     assert len(by_run(cases, DROP_TEST)) == 1
+
+
+def test_a_point_does_not_change_the_values_of_the_next(small: dict[str, Any]) -> None:
+    base = {"pairs.ceramic-steel": {"restitution": 0.7, "friction": 0.3}}
+    frictions = [
+        settle_case(Path("design.yaml"), small, {**base, **point}).study.pairs["ceramic-steel"]
+        for point in ({"pairs.ceramic-steel.friction": 0.5}, {})
+    ]
+    assert [pair.friction for pair in frictions] == [0.5, 0.3]
 
 
 def test_many_cases_need_a_confirmation(small: dict[str, Any], load: Load) -> None:

@@ -281,7 +281,7 @@ def settle_case(
     """
     combined = copy.deepcopy(dict(data))
     for field, value in values.items():
-        _set(combined, field, value, named_in or file)
+        _set(combined, field, copy.deepcopy(value), named_in or file)
     study = validate(combined, named_in or file)
     case = Case(file, values if shown is None else shown, study)
     if not isinstance(study.fidelity, Tolerance):

@@ -1,0 +1,1 @@
+"""Published results that were not used for the model: predicted, then compared."""
