@@ -89,7 +89,7 @@ def option_case(case: Case, values: Settings, seconds: float) -> Case:
     InputError
         The study has no such field, or may not have the value.
     """
-    data = copy.deepcopy(case.study.model_dump(mode="json", exclude_unset=True))
+    data = copy.deepcopy(case.written.model_dump(mode="json", exclude_unset=True))
     data["fidelity"] = case.study.chosen_fidelity().model_dump(
         mode="json", exclude_unset=True, exclude={"soft_start", "windows"}
     )

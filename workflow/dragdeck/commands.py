@@ -37,7 +37,13 @@ from dragdeck.errors import DragdeckError, InputError, choices, together
 from dragdeck.files import write_bytes
 from dragdeck.outlook.explain import explanation, show
 from dragdeck.outlook.explain import scene_lines as page_of_scene
-from dragdeck.outlook.process import bed_notes, dimensionless, not_corrected, workpiece_notes
+from dragdeck.outlook.process import (
+    bed_notes,
+    dimensionless,
+    not_corrected,
+    reduced,
+    workpiece_notes,
+)
 from dragdeck.outlook.runs import expected_runs, plan_in_words, written
 from dragdeck.outlook.timestep import stable_step_cautions, stable_step_note, timestep_notes
 from dragdeck.physics.packing import Bed
@@ -156,7 +162,7 @@ class _Findings:
         more = (*_friction_unknown(used_templates), *used_templates["script_findings"])
         for text in (*map(str, scene.warnings), *more):
             self.warnings.setdefault(text, {})[case.name] = None
-        notes = [not_corrected(case) if kind.needs_bed else ""]
+        notes = [reduced(case), not_corrected(case)] if kind.needs_bed else []
         notes.append(changed_in_words(used_templates["changed_scripts"]))
         notes.append(ways_in_words(case, measured_tradeoff()) if kind.needs_bed else "")
         for text in filter(None, notes):
@@ -298,8 +304,8 @@ def preview(study: str, fidelity: str | None, case: str | None) -> None:
     except InputError as error:
         raise located(error) from None
     file = project.results(study) / "preview.png"
-    title = "\n".join([f"{study}, case {chosen.name}", remeshing(chosen) or ""])
-    write_bytes(file, picture(scene, title.strip()))
+    title = [f"{study}, case {chosen.name}", remeshing(chosen) or "", reduced(chosen, 1)]
+    write_bytes(file, picture(scene, "\n".join(filter(None, title))))
     print(f"{study}: case {chosen.name}" + (f", one of {len(every)} (--case)" if every[1:] else ""))
     print(file)
 

@@ -109,6 +109,8 @@ def judge(
     factor = case.fidelity.speed_factor**quantity.time
     run = measured.over(1.0 / factor)
     scaled = Basis.SCALED if factor != 1.0 else Basis.SIMULATED
+    if quantity.radial and case.study and case.study.reduction and case.study.reduction.cut_out:
+        return Standing(quantity, run, None, Basis.NONE, "a straight cut-out does not give it")
     doubts = changed_settings(case.fidelity)
     if not doubts:
         return Standing(quantity, run, run, scaled)

@@ -27,6 +27,12 @@ class Quantity:
         Whether a reduced modulus and a faster workpiece change it so little that the run's value
         stands for the process where there is no correction: force and torque on the whole
         workpiece.
+    radial : bool
+        Whether it depends on the curvature of the path and on unequal walls beside it.
+    coarse : str
+        How it follows from runs with larger particles of diameter d: ``linear`` in d;
+        ``inverse_square``, d^2 times it is linear; ``by_drag``, its product with the number of
+        contacts over the drag is constant; empty if that is not known.
     """
 
     name: str
@@ -36,6 +42,8 @@ class Quantity:
     kind: str = "plain"
     time: int = 0
     robust: bool = False
+    radial: bool = False
+    coarse: str = ""
 
     @property
     def squared(self) -> bool:
@@ -62,6 +70,7 @@ def _quantities(column: str) -> tuple[Quantity, ...]:
         Quantity(
             row["name"], row["label"], row["unit"], row["short"].replace("|", "\N{SOFT HYPHEN}"),
             row["kind"], int(row["time"] or 0), row["robust"] == "yes",
+            row["radial"] == "yes", row["coarse"],
         )
         for row in QUANTITIES
         if row[column]

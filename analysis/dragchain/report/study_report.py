@@ -22,6 +22,7 @@ from dragchain.report.cases import (
     read_reported,
     read_study_runs,
 )
+from dragchain.report.coarse_grained import Extrapolation, coarse_grained, table_of_sizes
 from dragchain.report.findings import Findings
 from dragchain.report.page import NETWORK_PAGE, data_uri, file_uri, render_page, write_bundle
 from dragchain.report.removal import UM_PER_H, RemovalOfCase, removal_of, touch_rows, touches_per_s
@@ -49,7 +50,7 @@ _STEPS = ("render", "share", "run", "tabulate", "find_chains", "map_loading", "d
 _LOG_BYTES = 20_000
 _SAID = re.compile(r"^(?:dragdeck|dragchain): (.*)", re.MULTILINE | re.DOTALL)
 
-_OF_CASES = ("network*.html", "*-removal.*", "signal.*")
+_OF_CASES = ("network*.html", "*-removal.*", "signal.*", "true_size.*")
 """Files beside the report that an earlier one may have written of cases there are no longer."""
 
 _READ_SCREEN = "read the end of its last screen.*.txt"
@@ -220,8 +221,9 @@ def write_study_report(
         removed = [(case, *removal) for case in cases if (removal := _removed(case))]
         rough = {case.key: course for case, of, _ in removed if (course := roughness_of(case, of))}
         signals = _signals(cases, signal)
+        coarse = coarse_grained([study.measured for study in studies])
         picture = file_uri(preview) if preview else None
-        page = _render(sections, cases, missing, picture, removed, rough, signals)
+        page = _render(sections, cases, missing, picture, removed, rough, signals, coarse)
         earlier = {file.resolve() for name in _OF_CASES for file in out_dir.glob(name)}
         for file in earlier - {section.network for section in sections}:
             file.unlink()
@@ -234,7 +236,9 @@ def write_study_report(
             maps[f"{key}-removal"] = maps[f"{key}-removal"].join(course.ra)
         write_bundle(
             out_dir,
-            tables={"summary": table, **maps} | _tables(signals),
+            tables={"summary": table, **maps}
+            | _tables(signals)
+            | ({"true_size": table_of_sizes(coarse)} if coarse else {}),
             files={"summary.xlsx": summary_workbook(table, assumed)},
             pages={"report": page},
         )
@@ -316,6 +320,7 @@ def _render(
     removed: Sequence[tuple[ReportedCase, RemovalOfCase, str]],
     rough: Mapping[str, RoughnessOfCase],
     signals: Sequence["SignalComparison"],
+    coarse: Sequence[Extrapolation],
 ) -> str:
     """The page: HTML that needs no other file and no network."""
     studies = [section.study for section in sections]
@@ -338,6 +343,7 @@ def _render(
         ],
         overview=_overview(cases) if len(cases) > 1 else None,
         shown=_SHOWN,
+        coarse=coarse,
         asked=[(case, answer) for case in cases for answer in answers(case)],
         removed=removed,
         rough=[(case, of, _ra_map(case, of)) for case in cases if (of := rough.get(case.key))],

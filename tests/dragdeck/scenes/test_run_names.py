@@ -145,6 +145,8 @@ RICH: dict[str, dict[str, Any]] = {
             "kind": "mesh", "file": "shaft.step", "unit": "mm", "axis": "+x", "facet_size_m": 0.003,
             "edge_facet_size_m": 0.002},
         "motion.path": LINE,
+        "motion.bowl": {"kind": "acceleration", "acceleration_m_s2": 2.0, "direction_deg": 30},
+        "reduction": {"cut_out": True, "counted_m": 0.01, "coarser": 1.2},
         "bowl.lid_m": 0.07,
         "fidelity": {**SOFT, "soft_start": {"youngs_modulus_scale": 1e-3}},
     },
@@ -166,9 +168,10 @@ BOUND = (
     f"sieve.{len(SIEVE) - 1}.1",
     "contact.rolling_model",
     "fidelity.speed_factor",
+    "reduction.cut_out",
 )
-"""Fields that others bind: the last sieve passes all, rolling_damping requires epsd, windows
-forbid a faster workpiece. Another study has the last two."""
+"""Fields that others bind: a length is of a cut-out, the last sieve passes all, rolling_damping
+requires epsd, windows forbid a faster workpiece."""
 
 UNCHANGED = {
     "motion": {"drop_test", "filling"},
@@ -186,6 +189,7 @@ UNCHANGED = {
     "fidelity.timestep_fraction": {"drop_test", "filling"},
     "fidelity.windows.tolerance": {"drop_test", "filling", "process", "window"},
     "fidelity.windows.quantities": {"drop_test", "filling", "process", "window"},
+    "reduction": {"drop_test", "filling", "process", "lead", "window"},
     **{block: {"drop_test", "filling", "process", "lead", "window"} for block in OF_NO_RUN},
 }
 """Scenes whose runs are found again when a field, or a field of a block, is changed."""

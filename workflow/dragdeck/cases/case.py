@@ -68,6 +68,8 @@ class Case:
         What tells its process from others of the same settings.
     rank_of_window : int
         Of a window: when it is run, from 1; otherwise 0.
+    machine : Study or None
+        What `study` is a cut-out of.
     """
 
     file: Path
@@ -82,6 +84,12 @@ class Case:
     lead: "Case | None" = None
     part: str = ""
     rank_of_window: int = 0
+    machine: Study | None = None
+
+    @property
+    def written(self) -> Study:
+        """The study as its file has it, of the whole machine."""
+        return self.machine or self.study
 
     @property
     def all_workpieces(self) -> "Case":

@@ -135,3 +135,16 @@ def not_corrected(case: Case) -> str:
         "physical modulus, by amounts that differ from scene to scene, and the report does not "
         "correct them: fidelity: {tolerance: 0.1} measures them in this scene"
     )
+
+
+def reduced(case: Case, clauses: int | None = None) -> str:
+    """What stands for the machine of the study, and what that cannot give; empty if nothing does.
+
+    Parameters
+    ----------
+    case : Case
+    clauses : int, optional
+        So many of the first; all by default.
+    """
+    said = [entry for entry in case.study.assumptions if entry.field.startswith("reduction.")]
+    return "; ".join("; ".join(entry.why.split("; ")[:clauses]) for entry in said)

@@ -150,7 +150,7 @@ def _particle_data(study: Study, types: int) -> str:
 
 _NOT_READ = (
     *("bowl", "compound", "fidelity", "filling", "motion", "outputs", "seed"),
-    *("workpiece.shape", "workpieces"),
+    *("reduction", "workpiece.shape", "workpieces"),
 )
 _NOT_READ_OF_MEDIA = (
     *("classes", "count", "distribution", "fill_height_m", "fraction", "fractions_of"),

@@ -533,7 +533,7 @@ def _particles_data(study: Study, top_m: float, types: int) -> str:
 
 
 _NOT_READ = (
-    *("bowl.lid_m", "drop_test", "motion", "outputs", "workpiece", "workpieces"),
+    *("bowl.lid_m", "drop_test", "motion", "outputs", "reduction", "workpiece", "workpieces"),
     *("fidelity.filling_youngs_modulus_scale", "fidelity.soft_start", "fidelity.speed_factor"),
     *("fidelity.timestep_fraction", "fidelity.windows"),
 )

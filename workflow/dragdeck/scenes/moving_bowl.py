@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from dragdeck.cases.bed import MESHED_PART
 from dragdeck.cases.case import Case
 from dragdeck.errors import Caution, InputError, together
 from dragdeck.physics.packing import Bed
+from dragdeck.physics.rounding import round_to
 from dragdeck.physics.turning_bed import surface_rise, surface_tilt
 from dragdeck.study.drive import Floats
 from dragdeck.study.model import Study
@@ -19,31 +21,63 @@ _PLACES = 200
 """Of a path, at which the surface below it is computed."""
 
 
+class _Rise(NamedTuple):
+    """Height of a bed's surface in the drag above its mean: below the path, and extremes, m."""
+
+    path_m: float
+    lowest_m: float
+    highest_m: float
+
+
 def bed_in_motion(study: Study, bed: Bed) -> Bed:
     """A settled bed as it is in the drag.
 
     That in a rotating bowl is inclined: its surface is that below the path, in the mean, and its
     top the highest point at the wall.
     """
-    radius, rise = _rise(study, bed)
-    if not rise.any():
+    rise = _rise(study, bed)
+    if not any(rise):
         return bed
-    below = float(np.interp(_path_radii(study), radius, rise).mean())
-    return replace(bed, surface_m=bed.surface_m + below, top_m=bed.top_m + float(rise.max()))
+    return replace(bed, surface_m=bed.surface_m + rise.path_m, top_m=bed.top_m + rise.highest_m)
 
 
-def path_tilt_deg(study: Study, rad_s: float) -> float:
-    """Inclination of the bed's surface below the path in a bowl that rotates, at most, degrees."""
-    return math.degrees(surface_tilt(rad_s, *_resisting(study), _path_radii(study)).max())
+def path_tilt_deg(study: Study, factor: float = 1.0) -> float:
+    """Inclination of the bed's surface below the path, with speeds multiplied, at most, degrees."""
+    motion = study.motion
+    centrifugal = motion.bowl_rad_s**2 * np.hypot(*_path_places(study).T)
+    sideways = math.hypot(*_sideways(study))
+    accelerations = factor**2 * np.append(centrifugal, sideways)
+    return math.degrees(surface_tilt(1.0, *_resisting(study), accelerations).max())
 
 
-def _driven_rad_s(study: Study) -> float:
-    """Angular speed of the bowl as it is driven, rad/s."""
-    return study.motion.bowl_rad_s * study.chosen_fidelity().speed_factor
+def driven_gravity(study: Study, gravity_m_s2: float) -> tuple[float, tuple[float, float, float]]:
+    """Size, m/s2, and direction of what acts on the particles in the process.
+
+    Parameters
+    ----------
+    study : Study
+    gravity_m_s2 : float
+        Of the filling, down.
+    """
+    if not any(_sideways(study)):
+        return gravity_m_s2, (0, 0, -1)
+    x, y = (_factor(study) ** 2 * part for part in _sideways(study))
+    size = math.hypot(x, y, gravity_m_s2)
+    right, ahead, down = (round_to(part / size, 12) for part in (x, y, -gravity_m_s2))
+    return round_to(size, 12), (right, ahead, down)
+
+
+def _factor(study: Study) -> float:
+    return study.chosen_fidelity().speed_factor
+
+
+def _sideways(study: Study) -> tuple[float, float]:
+    """Acceleration of the particles along x and y at the study's own speed, m/s2."""
+    return study.motion.bowl.sideways_m_s2 if study.motion.bowl else (0.0, 0.0)
 
 
 def _driven_tilt(study: Study) -> float:
-    return path_tilt_deg(study, _driven_rad_s(study))
+    return path_tilt_deg(study, _factor(study))
 
 
 def _resisting(study: Study) -> tuple[float, float]:
@@ -51,17 +85,24 @@ def _resisting(study: Study) -> tuple[float, float]:
     return study.gravity_m_s2, math.radians(study.motion.bed_friction_deg)
 
 
-def _path_radii(study: Study) -> Floats:
-    """Distances of the path from the axis of the bowl, m."""
+def _path_places(study: Study) -> Floats:
+    """X and y of the path, (N, 2), from the axis of the bowl, m."""
     places = as_rows(study.motion.path.place(np.linspace(0.0, 1.0, _PLACES)))
-    return np.asarray(np.hypot(*np.atleast_2d(places)[:, :2].T))
+    return np.atleast_2d(places)[:, :2]
 
 
-def _rise(study: Study, bed: Bed) -> tuple[Floats, Floats]:
-    """Distances from the axis, and heights of the bed in the drag above its mean, m."""
-    radii = [float(outline[:, 0].max()) for outline in study.bowl.container.sections(bed.surface_m)]
-    outer, inner = [*radii, 0.0][:2]
-    return surface_rise(_driven_rad_s(study), *_resisting(study), inner, outer)
+def _rise(study: Study, bed: Bed) -> _Rise:
+    """Heights of the bed in the drag."""
+    outlines, places = study.bowl.container.sections(bed.surface_m), _path_places(study)
+    if any(_sideways(study)):
+        push = np.array(_sideways(study)) / math.hypot(*_sideways(study))
+        slope, along = math.tan(math.radians(_driven_tilt(study))), outlines[0] @ push
+        return _Rise(*(slope * np.array([(places @ push).mean(), along.min(), along.max()])))
+    outer, inner = [*(float(outline[:, 0].max()) for outline in outlines), 0.0][:2]
+    rate = study.motion.bowl_rad_s * _factor(study)
+    radius, rise = surface_rise(rate, *_resisting(study), inner, outer)
+    below = float(np.interp(np.hypot(*places.T), radius, rise).mean())
+    return _Rise(below, float(rise.min()), float(rise.max()))
 
 
 def check_bowl_motion(case: Case, settled: Bed, top_m: float) -> None:
@@ -87,11 +128,11 @@ def check_bowl_motion(case: Case, settled: Bed, top_m: float) -> None:
 
 def _spilled(case: Case, settled: Bed) -> Iterator[InputError]:
     study = case.study
-    _, rise = _rise(study, settled)
-    if not rise.any():
+    rise = _rise(study, settled)
+    if not any(rise):
         return
-    rim, top = study.bowl.height_m, settled.top_m + settled.margin_m + float(rise.max())
-    floor = settled.surface_m - settled.margin_m + float(rise.min())
+    rim, top = study.bowl.height_m, settled.top_m + settled.margin_m + rise.highest_m
+    floor = settled.surface_m - settled.margin_m + rise.lowest_m
     tilt = f"the bed turns with the bowl, and its surface is inclined by {_driven_tilt(study):.3g}"
     remedy = "rotate the bowl more slowly, or use fewer particles or a higher bowl"
     for wrong, what, limit in (

@@ -41,7 +41,12 @@ from dragdeck.scenes.motion import (
     moved_workpiece,
     output_periods,
 )
-from dragdeck.scenes.moving_bowl import bed_in_motion, bowl_cautions, check_bowl_motion
+from dragdeck.scenes.moving_bowl import (
+    bed_in_motion,
+    bowl_cautions,
+    check_bowl_motion,
+    driven_gravity,
+)
 from dragdeck.scenes.scene import (
     SceneType,
     acting_gravity,
@@ -127,6 +132,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         )
         check_headroom(workpiece, way.start_m[2] + bed.margin_m - reference_height(workpiece), top)
     skin = max(map(process_skin, each))
+    gravity, down = driven_gravity(study, acting_gravity(study))
     types, parts = study.type_names(), rank_split(whole, skin)
     materials = material_table(study, types, fidelity.youngs_modulus_scale, whole)
     bowl = study.bowl.closed
@@ -141,7 +147,8 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         source=_source(whole),
         materials=materials,
         limit_force=study.contact.limit_force,
-        gravity_m_s2=acting_gravity(study),
+        gravity_m_s2=gravity,
+        gravity_direction=down,
         liquid=liquid(study),
         skin_m=skin,
         timestep_s=dt,
@@ -452,7 +459,7 @@ def _stretches(case: Case) -> Json:
     return {**content, "lead": PROCESS.run_id(case.lead)} if case.lead else content
 
 
-_NOT_READ = ("drop_test", "fidelity.windows")
+_NOT_READ = ("drop_test", "fidelity.windows", "reduction")
 """Fields that a process does not depend on, besides where its windows begin."""
 
 

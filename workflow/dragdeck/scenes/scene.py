@@ -55,7 +55,7 @@ def read_bed(file: Path) -> Bed:
 _NOT_SAID = ("calibration", "fidelities", "licence", "scaling", "search", "sweep")
 _OF_PROCESS = (
     *("accepted", "assumptions", "compound", "drop_test", "fidelity", "filling", "motion"),
-    *("outputs", "reference", "removal", "seed", "workpiece.shape", "workpieces"),
+    *("outputs", "reduction", "reference", "removal", "seed", "workpiece.shape", "workpieces"),
 )
 """Fields that no file of a run says, and those that only files of a process do."""
 

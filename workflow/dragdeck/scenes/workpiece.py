@@ -752,7 +752,7 @@ def describe(case: Case) -> dict[str, float]:
     acceleration = weight_acceleration(study)
     optional = {
         "bowl_froude_number": motion.bowl_rad_s**2 * study.bowl.container.reach_m / acceleration,
-        "surface_tilt_deg": path_tilt_deg(study, motion.bowl_rad_s),
+        "surface_tilt_deg": path_tilt_deg(study),
         "tilt_deg": abs(motion.tilt_deg or 0.0),
         "submerged_weight_ratio": acceleration / study.gravity_m_s2 if study.compound else 0.0,
         "further_workpieces": float(len(of_each_workpiece(case.all_workpieces)) - 1),

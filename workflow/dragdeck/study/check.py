@@ -28,6 +28,7 @@ from dragdeck.study.model import (
 )
 from dragdeck.study.plausible import implausible, plausible_range
 from dragdeck.study.recorded import Places, mesh_errors, recorded_file, with_recording
+from dragdeck.study.reduction import RADIAL
 from dragdeck.study.removal import disagreements
 from dragdeck.study.search import Search
 from dragdeck.study.workpiece import CylinderShape, Shape
@@ -305,6 +306,9 @@ def _search(search: Search, study: Study) -> _Found:
         if lacking := measure.lacks(given):
             limit = f"a study with {lacking}, or another quantity"
             yield f"search.{name}.quantity", f"no run has {measure.quantity}", limit
+        if study.reduction and study.reduction.cut_out and measure.quantity in RADIAL:
+            limit = "another quantity, or the machine without reduction.cut_out"
+            yield f"search.{name}.quantity", "a straight cut-out does not give it", limit
     for field in search.vary:
         if field.split(".")[0] in (*OF_NO_RUN, "fidelity", "fidelities", "seed", "outputs"):
             yield f"search.vary.{field}", "it is no setting of the machine", "another field"

@@ -41,6 +41,7 @@ from dragdeck.study.paths.path import as_rows, turned
 from dragdeck.study.paths.rest import RestPath
 from dragdeck.study.paths.waypoints import WaypointsPath
 from dragdeck.study.quantities import QUANTITIES
+from dragdeck.study.reduction import Reduction
 from dragdeck.study.reference import Reference
 from dragdeck.study.removal import Removal
 from dragdeck.study.roughness import Roughness
@@ -610,6 +611,7 @@ class Study(Model):
     workpiece: Workpiece
     workpieces: Carousel | None = None
     motion: Motion
+    reduction: Reduction | None = Field(default=None, exclude_if=lambda value: value is None)
     contact: Contact = Contact()
     drop_test: DropTest = DropTest()
     calibration: Calibration | None = None
@@ -743,7 +745,8 @@ class Study(Model):
     def bowl_facet_size_m(self) -> float | None:
         """Edge length of the bowl's facets, m; None for exact walls, which cannot move."""
         size = self.bowl.own_facet_size_m
-        if size is None and (self.motion.bowl_rad_s or self.motion.bowl):
+        bowl = self.motion.bowl
+        if size is None and (self.motion.bowl_rad_s or (bowl and any(bowl.reach_m))):
             return 2 * self.media.typical_radius_m
         return size
 

@@ -30,10 +30,13 @@ from dragdeck.cases.case import Case
 from dragdeck.errors import InputError, choices, together
 from dragdeck.mesh.files import FORMATS
 from dragdeck.study.base import NAME, NAME_LIMIT, STUDY_FILE, Json, Model
-from dragdeck.study.check import explained, validate
+from dragdeck.study.check import contradictions, explained, validate
 from dragdeck.study.model import Tolerance
+from dragdeck.study.reduction import Reduction
 from dragdeck.study.search import Search, SearchRecord
 from dragdeck.study.yaml import read_study, read_yaml, studies_called
+from dragdeck.sweep.coarse import with_larger_particles
+from dragdeck.sweep.cut_out import with_cut_out
 from dragdeck.sweep.own_part import study_of_part
 
 Settings = Mapping[str, Any]
@@ -284,6 +287,9 @@ def settle_case(
         _set(combined, field, copy.deepcopy(value), named_in or file)
     study = validate(combined, named_in or file)
     case = Case(file, values if shown is None else shown, study)
+    if study.reduction is not None:
+        case = _reduced(case, study.reduction, named_in or file)
+        study = case.study
     if not isinstance(study.fidelity, Tolerance):
         return case
     if resolve is None:
@@ -296,6 +302,22 @@ def settle_case(
             remedy="use the settings that ./run dragdeck advise shows for it",
         )
     return resolve(case, study.fidelity)
+
+
+def _reduced(case: Case, reduction: Reduction, named_in: Path) -> Case:
+    """The case of a smaller scene, which is checked as any other."""
+    try:
+        if reduction.cut_out:
+            case = with_cut_out(case)
+        if reduction.coarser is not None:
+            case = with_larger_particles(case)
+    except InputError as error:
+        for problem in (error, *error.more):
+            problem.file = problem.file or named_in
+        raise
+    if problems := list(contradictions(case.study, whole=False)):
+        raise together([replace(error, file=named_in) for error in problems])
+    return case
 
 
 def study_file(studies: Path, name: str) -> Path:

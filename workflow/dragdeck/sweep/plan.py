@@ -123,7 +123,7 @@ def plan_points(
     check_number(len(plan.scenes) * packings, plan_file)
     unlike_cases: dict[str, Case] = {}
     for scene, block in itertools.product(plan.scenes.values(), blocks):
-        for settings in _settings(plan, block, base.study, scene):
+        for settings in _settings(plan, block, base.written, scene):
             shown = {**scene, **_unnamed(settings)}
             case = _case(base, {**plan.base, **scene, **settings}, shown, plan_file, resolve)
             _check_counted(case, plan_file)
@@ -187,6 +187,6 @@ def _case(
     base: Case, values: Settings, shown: Settings, plan_file: Path, resolve: Resolve | None
 ) -> Case:
     """The base case with other values; fields below ``fidelity`` replace its name."""
-    data = copy.deepcopy(base.study.model_dump(mode="json", exclude_unset=True))
+    data = copy.deepcopy(base.written.model_dump(mode="json", exclude_unset=True))
     data["fidelity"] = {}
     return settle_case(base.file, data, values, shown, named_in=plan_file, resolve=resolve)

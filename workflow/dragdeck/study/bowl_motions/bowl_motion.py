@@ -32,6 +32,11 @@ class BowlMotion(Model):
         return 0.0
 
     @property
+    def sideways_m_s2(self) -> tuple[float, float]:
+        """Acceleration of the particles along x and y, relative to a bowl that stands still."""
+        return 0.0, 0.0
+
+    @property
     def reach_m(self) -> tuple[float, float, float]:
         """How far it takes the bowl along x, y and z to either side, m."""
         return 0.0, 0.0, 0.0

@@ -4,7 +4,8 @@ from typing import Annotated
 
 from pydantic import Field
 
+from dragdeck.study.bowl_motions.acceleration import Acceleration
 from dragdeck.study.bowl_motions.rotation import Rotation
 from dragdeck.study.bowl_motions.vibration import Vibration
 
-AnyBowlMotion = Annotated[Rotation | Vibration, Field(discriminator="kind")]
+AnyBowlMotion = Annotated[Acceleration | Rotation | Vibration, Field(discriminator="kind")]
