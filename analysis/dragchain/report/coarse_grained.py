@@ -3,8 +3,9 @@
 Runs of a scene differ in `reduction.coarser`, the factor k on the diameters, and in the packing. A
 quantity, or what its rule makes of it, is fitted as ``a + b (k - 1)`` by least squares, weighted by
 the variances of the runs, which follow from the blocks of each; ``a`` is the value at the true
-size. Its interval is the wider of two: by these variances, with the normal quantile, and by the
-scatter of the runs about the line, with Student's t.
+size. Its interval follows from these variances; where runs scatter more about the line, it is wider
+by the root of the mean square of their residuals in standard errors (Birge 1932, Phys. Rev. 40,
+207).
 """
 
 import math
@@ -18,7 +19,7 @@ from scipy.stats import chi2
 from dragchain.arrays import Floats
 from dragchain.quantities.document import RunQuantities
 from dragchain.quantities.registry import REPORTED, Quantity
-from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate, flattened, student_quantile
+from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate, flattened
 
 NO_RULE, TOO_FEW = "no rule is known", "fewer than two sizes with intervals"
 _UNTESTED = "not tested: two sizes fit any line"
@@ -90,13 +91,15 @@ def fit_line(factors: Floats, values: Floats, errors: Floats) -> Line | None:
     covariance = np.linalg.inv(design.T @ design)
     effects = covariance @ design.T @ (y / error)
     square, left = float(np.sum((y / error - design @ effects) ** 2)), len(k) - 2
-    own = math.sqrt(covariance[0, 0])
-    widths = [NORMAL_QUANTILE * own]
-    if left:
-        widths.append(student_quantile(left) * own * math.sqrt(square / left))
-    half = max(widths)
+    error_of_value = math.sqrt(covariance[0, 0]) * _wider(square, left)
+    value = Estimate.around(float(effects[0]), NORMAL_QUANTILE * error_of_value)
     p = float(chi2.sf(square, left)) if left else math.nan
-    return Line(Estimate.around(float(effects[0]), half), half / NORMAL_QUANTILE, sizes, p)
+    return Line(value, error_of_value, sizes, p)
+
+
+def _wider(square: float, left: int) -> float:
+    """Factor on standard errors from the squares of residuals, with so many degrees of freedom."""
+    return math.sqrt(max(1.0, square / left)) if left else 1.0
 
 
 def coarse_grained(runs: Sequence[RunQuantities]) -> list[Extrapolation]:
@@ -158,7 +161,7 @@ def _extrapolated(quantity: Quantity, runs: Sequence[RunQuantities]) -> Extrapol
         label=quantity.label,
         unit=quantity.unit,
         value=value,
-        at_true_size=_mean([run for run in runs if _factor(run) == 1.0], quantity.name),
+        at_true_size=mean_of_runs([run for run in runs if _factor(run) == 1.0], quantity.name),
         sizes=", ".join(f"{size:g} ({count})" for size, count in counts.items()),
         linearity=linearity,
     )
@@ -196,16 +199,14 @@ def _by_drag(name: str, runs: Sequence[RunQuantities], k: Floats) -> tuple[Estim
     return Estimate(*ends), f"drag: {drag.words}"
 
 
-def _mean(runs: Sequence[RunQuantities], name: str) -> Estimate | None:
-    """Mean over packings, weighted by the variances of the runs, with the wider interval."""
+def mean_of_runs(runs: Sequence[RunQuantities], name: str) -> Estimate | None:
+    """Mean over packings, weighted by the variances of the runs, with an interval as a line's."""
     values, errors = _series(runs, name)
     known = np.isfinite(values) & (errors > 0)
     if not known.any():
         return None
     weight = errors[known] ** -2.0
-    mean, own = float(np.average(values[known], weights=weight)), math.sqrt(1 / weight.sum())
-    widths, left = [NORMAL_QUANTILE * own], int(known.sum()) - 1
-    if left:
-        square = float((weight * (values[known] - mean) ** 2).sum())
-        widths.append(student_quantile(left) * own * math.sqrt(square / left))
-    return Estimate.around(mean, max(widths))
+    mean = float(np.average(values[known], weights=weight))
+    square = float((weight * (values[known] - mean) ** 2).sum())
+    error = math.sqrt(1 / weight.sum()) * _wider(square, int(known.sum()) - 1)
+    return Estimate.around(mean, NORMAL_QUANTILE * error)

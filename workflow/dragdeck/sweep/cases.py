@@ -32,7 +32,6 @@ from dragdeck.mesh.files import FORMATS
 from dragdeck.study.base import NAME, NAME_LIMIT, STUDY_FILE, Json, Model
 from dragdeck.study.check import contradictions, explained, validate
 from dragdeck.study.model import Tolerance
-from dragdeck.study.reduction import Reduction
 from dragdeck.study.search import Search, SearchRecord
 from dragdeck.study.yaml import read_study, read_yaml, studies_called
 from dragdeck.sweep.coarse import with_larger_particles
@@ -288,7 +287,7 @@ def settle_case(
     study = validate(combined, named_in or file)
     case = Case(file, values if shown is None else shown, study)
     if study.reduction is not None:
-        case = _reduced(case, study.reduction, named_in or file)
+        case = _reduced(case, named_in or file)
         study = case.study
     if not isinstance(study.fidelity, Tolerance):
         return case
@@ -304,13 +303,10 @@ def settle_case(
     return resolve(case, study.fidelity)
 
 
-def _reduced(case: Case, reduction: Reduction, named_in: Path) -> Case:
+def _reduced(case: Case, named_in: Path) -> Case:
     """The case of a smaller scene, which is checked as any other."""
     try:
-        if reduction.cut_out:
-            case = with_cut_out(case)
-        if reduction.coarser is not None:
-            case = with_larger_particles(case)
+        case = with_larger_particles(with_cut_out(case))
     except InputError as error:
         for problem in (error, *error.more):
             problem.file = problem.file or named_in

@@ -18,17 +18,17 @@ drag was linear in their diameter (docs/evidence/simplifications.md)."""
 
 
 def with_larger_particles(case: Case) -> Case:
-    """The case with the larger particles that its study asks for.
+    """The case with the larger particles that its study asks for; itself if it asks for none.
 
     Raises
     ------
     InputError
         The gap between workpiece and wall is too narrow for them.
     """
-    written = case.study
-    assert written.reduction is not None and written.reduction.coarser is not None
-    factor = written.reduction.coarser
-    study = coarsened(written, factor)
+    if case.study.reduction is None or case.study.reduction.coarser is None:
+        return case
+    factor = case.study.reduction.coarser
+    study = coarsened(case.study, factor)
     settled = study
     if isinstance(study.fidelity, Tolerance):
         settled = study.model_copy(update={"fidelity": Fidelity()})

@@ -85,7 +85,7 @@ class Passage(NamedTuple):
 
 
 def with_cut_out(case: Case) -> Case:
-    """The case of the cut-out of a machine.
+    """The case of the cut-out of a machine; the case itself if its study asks for none.
 
     Raises
     ------
@@ -93,6 +93,8 @@ def with_cut_out(case: Case) -> Case:
         A line cannot stand for what the machine does; every reason is named.
     """
     study = case.study
+    if study.reduction is None or not study.reduction.cut_out:
+        return case
     problems = list(_refused(study))
     if problems:
         raise together(problems)

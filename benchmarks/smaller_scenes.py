@@ -1,0 +1,128 @@
+"""Machines against their cut-outs and against larger particles (docs/evidence/simplifications.md).
+
+    ./run all --config study=drag_finisher
+    ./run all --config study=stream_finisher
+    python benchmarks/smaller_scenes.py docs/data/scenes results/{drag,stream}_finisher
+
+Makes two records of the runs of these studies: ``smaller_scenes.csv``, mean values over the
+packings of each scene and size with the cost of filling and process; and ``true_size.csv``, what
+follows from the larger particles for the true size.
+"""
+
+import argparse
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from dragchain.quantities.document import MEASURED_FILE, RunQuantities
+from dragchain.report.coarse_grained import coarse_grained, mean_of_runs
+from dragchain.run.case import upstream_folders
+from dragchain.statistics.estimate import Estimate, flattened
+from dragchain.tables.by_step import read_table
+from dragdeck.records.case import load_case
+from dragdeck.records.run import RunRecord
+
+QUANTITIES = {"drag_n": "drag_mean", "contacts": "workpiece_contacts",
+              "contact_force_n": "contact_force_mean", "load_n": "normal_load"}  # fmt: skip
+UNKNOWN = Estimate(math.nan, math.nan, math.nan)
+
+_PATH_M, _NEAR_M, _BINS = 0.0625, 0.02, 8
+"""Radius of the path, and surface beside it to either side, m; bins of the latter."""
+
+
+def main() -> None:
+    """Read the runs of studies and write the records."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("out", type=Path)
+    parser.add_argument("results", type=Path, nargs="+")
+    chosen = parser.parse_args()
+    rows, lines = [], []
+    for study in chosen.results:
+        folders = sorted(file.parents[1] for file in study.glob(f"process/*/{MEASURED_FILE}"))
+        runs = {folder: RunQuantities.read(folder / MEASURED_FILE) for folder in folders}
+        groups: dict[tuple[str, float], list[Path]] = {}
+        for folder, run in runs.items():
+            groups.setdefault(_kind(run), []).append(folder)
+        rows += [_row(study.name, *kind, of, runs) for kind, of in sorted(groups.items())]
+        for scene in sorted({scene for scene, _ in groups}):
+            of_scene = [run for run in runs.values() if _kind(run)[0] == scene]
+            for line in coarse_grained(of_scene):
+                if line.value is not None:
+                    row = {**vars(line), "scene": scene, "study": study.name}
+                    row["at_true_size"] = line.at_true_size or UNKNOWN
+                    lines.append(flattened(row))
+    table = pd.DataFrame(rows)
+    whole = table[(table["scene"] == "whole") & (table["factor"] == 1)]
+    cost = table["study"].map(whole.set_index("study")["cpu_time_s"])
+    table["relative_cpu_time"] = table["cpu_time_s"] / cost
+    table.to_csv(chosen.out / "smaller_scenes.csv", index=False, float_format="%.6g")
+    pd.DataFrame(lines).to_csv(chosen.out / "true_size.csv", index=False, float_format="%.6g")
+
+
+def _kind(run: RunQuantities) -> tuple[str, float]:
+    """Whether it is of the whole machine, and the factor on the diameters."""
+    reduction = run.study.reduction
+    cut = reduction is not None and reduction.cut_out
+    return "cut out" if cut else "whole", (reduction and reduction.coarser) or 1.0
+
+
+def _row(
+    study: str, scene: str, factor: float, folders: Sequence[Path], runs: dict[Path, RunQuantities]
+) -> dict[str, object]:
+    of_scene = [runs[folder] for folder in folders]
+    values = {name: mean_of_runs(of_scene, key) or UNKNOWN for name, key in QUANTITIES.items()}
+    return flattened(
+        {
+            "study": study,
+            "scene": scene,
+            "factor": factor,
+            "packings": len(folders),
+            "particles": load_case(folders[0]).media.count,
+            **values,
+            "surface_tilt_deg": np.mean([_tilt_deg(folder) for folder in folders]),
+            "cpu_time_s": np.mean([_cpu_time(folder, runs[folder]) for folder in folders]),
+        }
+    )
+
+
+def _cpu_time(folder: Path, run: RunQuantities) -> float:
+    """Of the filling and of the process, s."""
+    (filling,) = (
+        place for name, place in upstream_folders(folder, load_case(folder)).items()
+        if name == "filling"
+    )  # fmt: skip
+    return run.cost.cpu_time_s + float(RunRecord.read(filling / "run.json").cpu_time_s or math.nan)
+
+
+def _tilt_deg(folder: Path) -> float:
+    """Inclination of the surface across the path, outwards, in the second half of the drag.
+
+    Of particles beside the path, half a layer of the highest in each bin across it.
+    """
+    case, diameter = load_case(folder), 2 * load_case(folder).media.radius_mean_m
+    drag = case.phases[-1]
+    particles = read_table(folder / "tables/particles.parquet", ["step", "x_m", "y_m", "z_m"])
+    particles = particles[particles["step"] > (drag.start_step + drag.end_step) / 2]
+    if case.bowl.round:
+        edges = _PATH_M + np.linspace(-_NEAR_M, _NEAR_M, _BINS + 1)
+        across, areas, sign = np.hypot(particles["x_m"], particles["y_m"]), edges**2 * math.pi, 1.0
+    else:
+        edges = np.linspace(-_NEAR_M, _NEAR_M, _BINS + 1)
+        across, areas = particles["y_m"], edges * 2 * case.bowl.half_widths_m[0]
+        sign = 1.0 if case.bowl.motion is None else np.sign(case.bowl.motion.sideways_m_s2[1])
+    top = np.diff(areas) / diameter**2 / 2
+    slopes = []
+    for _, frame in particles.assign(bin=np.digitize(across, edges) - 1).groupby("step"):
+        heights = [
+            frame.loc[frame["bin"] == number, "z_m"].nlargest(round(top[number])).mean()
+            for number in range(_BINS)
+        ]
+        slopes.append(np.polyfit((edges[1:] + edges[:-1]) / 2, heights, 1)[0])
+    return float(sign * np.degrees(np.arctan(np.mean(slopes))))
+
+
+if __name__ == "__main__":
+    main()
