@@ -3,8 +3,10 @@ import html
 import json
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 from loading_files import made_contacts, write_run, write_without_picture
@@ -25,6 +27,8 @@ from report_files import (
 )
 
 from dragchain.errors import MissingRunsError, TableError
+from dragchain.report import study_report
+from dragchain.report.coarse_grained import NO_RULE, Extrapolation
 from dragchain.report.study_report import write_study_report
 from dragchain.report.summary import main_numbers
 from dragchain.statistics.estimate import Estimate
@@ -97,6 +101,25 @@ def test_each_case_has_its_own_page_on_the_contact_network(
     assert "network-workpiece-1.html" not in page.references
     write_study_report(tmp_path / "one", [other])
     stands_alone((tmp_path / "one/report.html").read_text(encoding="utf-8"), ["network.html"])
+
+
+def test_values_at_the_true_size_have_a_table_and_a_file(
+    process: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_study_report(tmp_path, [process])
+    assert not (tmp_path / "true_size.csv").exists()
+    known = Extrapolation(
+        "first", "drag_mean", "mean drag", "N", Estimate(-1.25, -1.5, -1.0), None, "1.5 (2), 2 (2)",
+        "not tested",
+    )  # fmt: skip
+    rows = [known, replace(known, quantity="events", value=None, linearity=NO_RULE)]
+    monkeypatch.setattr(study_report, "coarse_grained", lambda _: rows)
+    write_study_report(tmp_path, [process])
+    table = pd.read_csv(tmp_path / "true_size.csv")
+    assert table["value"].tolist()[0] == -1.25 and np.isnan(table["value"][1])
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    section = text.partition('id="first-true-size"')[2].partition("<h2")[0]
+    assert "1.25" in section and "not simulated" in section and "contact events" not in section
 
 
 def test_no_process_run_is_no_report(process: Path, tmp_path: Path) -> None:
