@@ -110,7 +110,8 @@ class Case:
         """
         asked = self.study.chosen_fidelity().ranks
         if asked == "auto":
-            return auto_ranks(self.study.sphere_count, self.beside, cores_here())
+            column = self.study.bowl.container.hollow
+            return auto_ranks(self.study.sphere_count, self.beside, cores_here(), column=column)
         return ranks_within(asked)
 
     @property

@@ -17,7 +17,12 @@ _ALWAYS_ACCEPTED = 2
 """Ranks that a study may have on any machine: the default."""
 
 
-def auto_ranks(particles: int, cases: int, cores: int) -> int:
+_AROUND_COLUMN = (8, 4, 2, 1)
+"""Ranks among which a ring is split evenly: others have a part in the column, or the fullest has
+half more than the mean (tests/dragdeck/cases/test_ranks.py)."""
+
+
+def auto_ranks(particles: int, cases: int, cores: int, *, column: bool = False) -> int:
     """Ranks of a run of a study with that many cases.
 
     Ranks wait for each other, cases do not: where there are as many cases as cores, each
@@ -31,8 +36,11 @@ def auto_ranks(particles: int, cases: int, cores: int) -> int:
         That can run beside each other.
     cores : int
         Of the machine.
+    column : bool
+        Whether a column stands in the middle of the bowl.
     """
-    return max(1, min(cores // cases, particles // FEWEST_PARTICLES_A_RANK))
+    most = max(1, min(cores // cases, particles // FEWEST_PARTICLES_A_RANK))
+    return next(count for count in _AROUND_COLUMN if count <= most) if column else most
 
 
 def ranks_within(ranks: int) -> int:

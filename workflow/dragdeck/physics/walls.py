@@ -155,6 +155,11 @@ class Container(Part):
         return not self.own_facets.size and all(wall.shape == "zcylinder" for wall in self.upright)
 
     @property
+    def hollow(self) -> bool:
+        """Whether a round column stands in its middle."""
+        return any(wall.shape == "zcylinder" and wall.inwards > 0 for wall in self.upright)
+
+    @property
     def own_facets(self) -> Floats:
         """The facets of a bowl that has no other walls, (F, 3, 3)."""
         every = [wall.triangles for wall in self.walls if wall.corners_m]
