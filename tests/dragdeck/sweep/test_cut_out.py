@@ -181,7 +181,7 @@ def test_other_lengths_may_be_asked_for(cut: Made) -> None:
     [
         ({"motion.path": {"kind": "figure_eight", "radius_m": 0.02}}, "motion.path.kind"),
         ({"workpieces": {"count": 2}}, "workpieces"),
-        ({"motion.orientation": "fixed", "motion.tilt_deg": 5}, "motion.orientation"),
+        ({"motion.orientation": "fixed"}, "motion.orientation"),
         ({"motion.bowl": {"kind": "vibration", "amplitude_m": [1e-4, 0, 0], "frequency_hz": 20}},
          "motion.bowl"),
         ({"compound": {"density_kg_m3": 1000}, "motion.path": REST, "motion.speed_m_s": None},

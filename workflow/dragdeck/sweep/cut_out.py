@@ -30,7 +30,6 @@ from dragdeck.study.bowls.trough import TroughBowl
 from dragdeck.study.model import Assumption, Fidelity, Motion, Study, Tolerance
 from dragdeck.study.paths.line import LinePath
 from dragdeck.study.paths.path import AroundBowl
-from dragdeck.study.workpiece import CylinderShape
 
 SIDE_DIAMETERS, SIDE_WORKPIECES = 6.0, 4.0
 """Gap to a side wall, in particle and in workpiece diameters, from which the drag no longer
@@ -327,10 +326,9 @@ def _refused(study: Study) -> Iterator[InputError]:
         yield error(f"a path of kind {path.kind}", "motion.path.kind", kinds)
     if study.of_each_workpiece()[0] is not study:
         yield error("several workpieces", "workpieces", "one workpiece")
-    plain = isinstance(study.workpiece.shape, CylinderShape) and not motion.tilt_deg
-    if around and path.kind == "circle" and motion.orientation == "fixed" and not plain:
+    if path.kind == "circle" and motion.orientation == "fixed":
         problem = "a circle on which the workpiece shows its direction of motion all its sides"
-        yield error(problem, "motion.orientation", "follow_path, or an upright cylinder")
+        yield error(problem, "motion.orientation", "follow_path")
     bowl = motion.bowl
     if bowl is None:
         turning = bool(motion.bowl_rad_s)
