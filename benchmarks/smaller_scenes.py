@@ -4,14 +4,15 @@
     ./run all --config study=stream_finisher
     python benchmarks/smaller_scenes.py docs/data/scenes results/{drag,stream}_finisher
 
-Makes two records of the runs of these studies: ``smaller_scenes.csv``, mean values over the
-packings of each scene and size with the cost of filling and process; and ``true_size.csv``, what
-follows from the larger particles for the true size.
+Makes three records of the runs of these studies: ``smaller_scenes.csv``, mean values over the
+packings of each scene and size with the cost of filling and process; ``cut_out_change.csv``, the
+change of the drag by the cut-outs; and ``true_size.csv``, what follows from the larger particles
+for the true size.
 """
 
 import argparse
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -58,8 +59,29 @@ def main() -> None:
     whole = table[table["scene"] == "whole"].sort_values("factor").drop_duplicates("study")
     cost = table["study"].map(whole.set_index("study")["cpu_time_s"])
     table["relative_cpu_time"] = table["cpu_time_s"] / cost
+    pd.DataFrame(_changes(table)).to_csv(
+        chosen.out / "cut_out_change.csv", index=False, float_format="%.6g"
+    )
     table.to_csv(chosen.out / "smaller_scenes.csv", index=False, float_format="%.6g")
     pd.DataFrame(lines).to_csv(chosen.out / "true_size.csv", index=False, float_format="%.6g")
+
+
+def _changes(table: pd.DataFrame) -> Iterator[dict[str, object]]:
+    """Relative change of the drag by the cut-out, the mean over the particle sizes of a study."""
+    for study, of_study in table.groupby("study"):
+        rows = {scene: part.set_index("factor") for scene, part in of_study.groupby("scene")}
+        cut, whole = (rows[scene] for scene in ("cut out", "whole"))
+        sizes = cut.index.intersection(whole.index)
+        ratio = np.log((cut["drag_n"] / whole["drag_n"])[sizes])
+        parts = [
+            (of["drag_n_ci95_high"] - of["drag_n_ci95_low"]) / 2 / of["drag_n"].abs()
+            for of in (cut, whole)
+        ]
+        weight = 1 / (parts[0][sizes] ** 2 + parts[1][sizes] ** 2)
+        mean, half = float(np.average(ratio, weights=weight)), float(weight.sum() ** -0.5)
+        change = Estimate.around(mean, half).exp(minus=1.0)
+        row = flattened({"study": study, "sizes": len(sizes), "drag": change})
+        yield {"drag_value" if name == "drag" else name: value for name, value in row.items()}
 
 
 def _kind(run: RunQuantities) -> tuple[str, float]:

@@ -133,7 +133,9 @@ def _scene(run: RunQuantities) -> str:
     common = {name: value for name, value in inputs if not name.startswith(differ)}
     media = run.study.media
     true_m = round(media.typical_radius_m / _factor(run), 12)
-    return f"{common} {true_m} {media.fill_height_m} {media.mass_kg} {run.fidelity}"
+    chosen = run.fidelity
+    settings = chosen.youngs_modulus_scale, chosen.timestep_fraction, chosen.speed_factor
+    return f"{common} {true_m} {media.fill_height_m} {media.mass_kg} {settings}"
 
 
 def _series(runs: Sequence[RunQuantities], name: str) -> tuple[Floats, Floats]:

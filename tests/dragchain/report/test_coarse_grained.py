@@ -39,8 +39,11 @@ def run(factor: float, seed: int = 1, relative: float = 0.05, **more: Any) -> Ru
     study = SimpleNamespace(
         reduction=SimpleNamespace(coarser=factor), media=media, inputs=lambda: inputs
     )
+    fidelity = SimpleNamespace(
+        youngs_modulus_scale=1e-3, timestep_fraction=0.6, speed_factor=1.0, skin_m=1e-4 * factor
+    )
     made = SimpleNamespace(
-        study=study, run=f"{factor}-{seed}", values_of_run=estimates, fidelity="draft"
+        study=study, run=f"{factor}-{seed}", values_of_run=estimates, fidelity=fidelity
     )
     return cast("RunQuantities", made)
 
