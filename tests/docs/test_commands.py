@@ -23,8 +23,15 @@ WAYPOINTS = "time_s,x_m,y_m\n0,0.02,0\n2,0,0.02\n5,-0.02,0\n"
 """A recorded path that examples name."""
 
 SPEEDS = {"speed_m_s": 0.02, "plunge_speed_m_s": 0.2, "approach_speed_m_s": 0.2}
-SHORT = {"motion.path.revolutions": 0.16, **{f"motion.{name}": v for name, v in SPEEDS.items()}}
-"""Fields of the study without `--long`."""
+SHORT = {
+    "media.count": 355,
+    "bowl.radius_m": 0.03,
+    "motion.path.revolutions": 0.28,
+    "motion.path.radius_m": 0.0115,
+    "motion.immersion_depth_m": 0.018,
+    **{f"motion.{name}": v for name, v in SPEEDS.items()},
+}
+"""Fields of the study without `--long`: a quarter of the bed, a short path, a faster workpiece."""
 
 pytestmark = [pytest.mark.engine, pytest.mark.slow]
 
