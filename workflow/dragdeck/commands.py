@@ -45,7 +45,12 @@ from dragdeck.outlook.process import (
     workpiece_notes,
 )
 from dragdeck.outlook.runs import expected_runs, plan_in_words, written
-from dragdeck.outlook.timestep import stable_step_cautions, stable_step_note, timestep_notes
+from dragdeck.outlook.timestep import (
+    settling_cautions,
+    stable_step_cautions,
+    stable_step_note,
+    timestep_notes,
+)
 from dragdeck.physics.packing import Bed
 from dragdeck.preview.layout import layout
 from dragdeck.preview.picture import picture, small_picture
@@ -252,7 +257,8 @@ def _built(kind: SceneType, case: Case, bed: Bed | None) -> StudyScene:
     except InputError as error:
         error.file = error.file or case.file
         raise located(error) from None
-    more = stable_step_cautions(case) if kind.needs_bed else ()
+    step = stable_step_cautions if kind.needs_bed else settling_cautions
+    more = () if kind.single_particle else step(case)
     return replace(scene, warnings=[*warnings(case.study), *scene.warnings, *more])
 
 

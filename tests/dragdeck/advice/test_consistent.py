@@ -11,7 +11,12 @@ from random_scenes import random_scenes
 from dragdeck.advice.advise import consistent, resolve
 from dragdeck.cases.case import Case
 from dragdeck.errors import Caution
-from dragdeck.outlook.timestep import check_timestep, largest_of_case, stable_step_cautions
+from dragdeck.outlook.timestep import (
+    check_timestep,
+    largest_of_case,
+    settling_cautions,
+    stable_step_cautions,
+)
 from dragdeck.scenes.filling import filling_cautions
 from dragdeck.scenes.lead import with_leads
 from dragdeck.scenes.process import PROCESS, SCENES
@@ -28,7 +33,8 @@ def with_fidelity(case: Case, fidelity: Fidelity) -> Case:
 
 
 def curable(case: Case) -> list[Caution]:
-    found = [*filling_cautions(case), *process_cautions(case), *stable_step_cautions(case)]
+    found = [*filling_cautions(case), *settling_cautions(case), *process_cautions(case)]
+    found += stable_step_cautions(case)
     return [one for one in found if one.settings]
 
 

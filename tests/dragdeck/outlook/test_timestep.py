@@ -16,6 +16,7 @@ from dragdeck.outlook.timestep import (
     expected_error,
     outlook,
     safe_fraction,
+    settling_cautions,
     stable_fraction,
     stable_step_cautions,
     stable_step_note,
@@ -137,6 +138,22 @@ def test_runs_far_beyond_are_refused_and_runs_far_below_pass_without_a_warning(
         cured = paper(scale, caution.settings["timestep_fraction"])
         assert not list(stable_step_cautions(cured))
         assert "NOT BELOW" in stable_step_note(case)[1]
+
+
+@pytest.mark.parametrize(
+    ("restitution", "fraction", "rests"), [(0.3, 0.25, True), (0.3, 0.5, False), (0.86, 0.5, True)]
+)
+def test_a_filling_that_may_never_rest_is_told(
+    made: Made, restitution: float, fraction: float, rests: bool
+) -> None:
+    """Three of the recorded fillings, about: docs/data/stability/settling.csv."""
+    fields = {"pairs.ceramic-ceramic.restitution": restitution}
+    step = "fidelities.quick.filling_timestep_fraction"
+    cautions = list(settling_cautions(made({**fields, step: fraction})))
+    assert (not cautions) == rests
+    for caution in cautions:
+        smaller = caution.settings["filling_timestep_fraction"]
+        assert not list(settling_cautions(made({**fields, step: smaller})))
 
 
 def test_damping_softness_and_equal_radii_shorten_the_stable_step() -> None:

@@ -14,7 +14,12 @@ from dragdeck.advice.ways import Way, Ways, Work
 from dragdeck.cases.bed import expected_surface, full_stiffness_number, softest_scale, widest_skin
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
-from dragdeck.outlook.timestep import largest_fraction, stable_fraction, stable_step_cautions
+from dragdeck.outlook.timestep import (
+    largest_fraction,
+    settling_cautions,
+    stable_fraction,
+    stable_step_cautions,
+)
 from dragdeck.physics.contact_mechanics import FAST
 from dragdeck.physics.rounding import rounded
 from dragdeck.records.advised import AdvisedSettings
@@ -125,7 +130,8 @@ def consistent(case: Case) -> Fidelity:
 def _remedies(case: Case) -> Iterator[Mapping[str, float]]:
     """What checks that a case's settings do not pass take; the next one may need less after it."""
     stable = stable_step_cautions(case, surely=True)
-    cautions = chain(filling_cautions(case), process_cautions(case), stable)
+    settling = settling_cautions(case)
+    cautions = chain(filling_cautions(case), settling, process_cautions(case), stable)
     yield from (caution.settings for caution in cautions if caution.settings)
 
 

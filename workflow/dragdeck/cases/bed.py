@@ -251,6 +251,11 @@ def tip_pressure(study: Study) -> float:
     return bed_pressure(weight_density(study, depth), study.gravity_m_s2, depth)
 
 
+def floor_pressure(study: Study) -> float:
+    """Weight of the bed on the floor, Pa."""
+    return bed_pressure(weight_density(study), study.gravity_m_s2, expected_surface(study))
+
+
 def full_stiffness_number(study: Study) -> float:
     """Stiffness number at the tip, with the physical Young's modulus."""
     return stiffness_number(particle_material(study), tip_pressure(study))

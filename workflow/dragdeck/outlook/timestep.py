@@ -12,7 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dragdeck.cases.bed import bed_density, particle_material, smallest_radius, tip_pressure
+from dragdeck.cases.bed import (
+    bed_density,
+    floor_pressure,
+    particle_material,
+    smallest_radius,
+    tip_pressure,
+)
 from dragdeck.cases.case import Case
 from dragdeck.errors import Caution, InputError
 from dragdeck.physics.contact_mechanics import (
@@ -26,6 +32,7 @@ from dragdeck.physics.estimates import SOLID_FRACTION_ESTIMATE
 from dragdeck.physics.rounding import rounded
 from dragdeck.records.stability import RestitutionErrors, stability_map, stable_step_law
 from dragdeck.scenes.scene import Regime, SceneType, StudyScene
+from dragdeck.study.model import Study
 
 ORDINARY_RESTITUTION = 0.5
 """The map tells apart conditions below and above: strong damping needs smaller steps."""
@@ -198,14 +205,35 @@ def stable_fraction(case: Case, margin: float = 0.0) -> float:
     margin : float
         Logarithm of the stability number that the step then is forecast to have.
     """
-    study, law = case.study, stable_step_law()
+    density = SOLID_FRACTION_ESTIMATE * bed_density(case.study)
+    pressure = tip_pressure(case.study) + _MOMENTUM * density * case.axis_speed_m_s**2
+    return _stable_under(case.study, pressure, math.exp(margin))
+
+
+def _stable_under(study: Study, pressure_pa: float, number: float) -> float:
+    """The step over the Rayleigh time that has a stability number under a pressure."""
     softer = study.chosen_fidelity().youngs_modulus_scale ** (2 / 3)
-    density = SOLID_FRACTION_ESTIMATE * bed_density(study)
-    pressure = tip_pressure(study) + _MOMENTUM * density * case.axis_speed_m_s**2
-    kappa = softer * stiffness_number(particle_material(study), pressure)
+    kappa = softer * stiffness_number(particle_material(study), pressure_pa)
     restitution = study.pair(study.media.main_material, study.media.main_material).restitution
     spread = study.media.typical_std_m / study.media.typical_radius_m
-    return law.largest_fraction(kappa, restitution, spread, math.exp(margin))
+    return stable_step_law().largest_fraction(kappa, restitution, spread, number)
+
+
+def settling_cautions(case: Case) -> Iterator[Caution]:
+    """A caution if the step of the filling keeps particles moving, with one that does not.
+
+    Fillings with a forecast stability number above 1 under the weight of the bed may never come to
+    rest (measured: docs/evidence/stability.md).
+    """
+    step, study = case.study.chosen_fidelity().filling_timestep_fraction, case.study.at_filling()
+    limit = _stable_under(study, floor_pressure(study), 1.0)
+    if step > limit * (1 + 1e-9):
+        yield Caution(
+            "stable_timestep",
+            f"the filling's step of {100 * step:.2g} % of the Rayleigh time is above "
+            f"{100 * limit:.2g} %: damped contacts may keep particles from coming to rest",
+            {"filling_timestep_fraction": rounded(limit, up=False)},
+        )
 
 
 def stable_step_cautions(case: Case, surely: bool = False) -> Iterator[Caution]:

@@ -173,7 +173,8 @@ CheckReason = Literal["lost_particles", "other", "particles", "finite_numbers", 
 
 _SMALLER_STEP = "choose a smaller timestep_fraction or a larger youngs_modulus_scale"
 REMEDIES: Mapping[CheckCode, str] = {
-    "at_rest": "choose a larger filling.max_time_s or filling.energy_ratio",
+    "at_rest": "choose a smaller fidelity.filling_timestep_fraction if the energy no longer falls, "
+    "else a larger filling.max_time_s or filling.energy_ratio",
     "packing_in_bowl": "use fewer particles, or a wider or higher bowl",
     "steady_bed": "choose a longer motion.transient_m, or more motion.path.revolutions",
     "particles_kept": _SMALLER_STEP,

@@ -24,6 +24,7 @@ from dragdeck.cases.bed import (
     buoyancy_density,
     expected_surface,
     farthest_point,
+    floor_pressure,
     media_classes,
     particle_material,
     skin,
@@ -38,7 +39,6 @@ from dragdeck.mesh.files import stl_text
 from dragdeck.physics.contact_mechanics import (
     ENGINE_NEIGHBOURS,
     bed_overlap,
-    bed_pressure,
     effective_modulus,
     fall_energy,
     fall_speed,
@@ -333,8 +333,7 @@ def floor_overlap(study: Study) -> float:
     An estimate.
     """
     particle, scale = particle_material(study), study.chosen_fidelity().youngs_modulus_scale
-    pressure = bed_pressure(weight_density(study), study.gravity_m_s2, expected_surface(study))
-    return bed_overlap(effective_modulus(particle, particle, scale), pressure)
+    return bed_overlap(effective_modulus(particle, particle, scale), floor_pressure(study))
 
 
 def filling_cautions(case: Case) -> Iterator[Caution]:
