@@ -194,6 +194,11 @@ class Pairs:
         """Relative, of the soft run's stretches."""
         return float(np.var(self.stretches, ddof=1))
 
+    @property
+    def is_usable(self) -> bool:
+        """Whether both scatter; a number of rare events may be the same in all windows."""
+        return self.variance > 0.0 and self.slope_variance > 0.0
+
     @cached_property
     def slope(self) -> float:
         """Of the windows on the soft run."""
@@ -272,7 +277,7 @@ def _between_scenes(
 
 def _known(quantity: Quantity, scenes: Scenes, windowed: Sequence[Windowed]) -> Known | None:
     measured = [[*_runs_with(quantity, runs)] for runs in scenes]
-    pairs = [of for windows in windowed if (of := windows.pairs(quantity)) and of.variance]
+    pairs = [of for windows in windowed if (of := windows.pairs(quantity)) and of.is_usable]
     if len(pairs) >= _FEWEST_SCENES:
         said = _of_windows(quantity, pairs)
     elif (whole := _of_whole_runs(measured)) is None:
