@@ -1,6 +1,5 @@
 """axe finds nothing on report, network page and networks: wide and narrow, light and dark."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -36,13 +35,6 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> Path:
     page = render_page("compare/networks.html.j2", shown=[("network.html", "one")])
     (folder / "networks.html").write_text(page, encoding="utf-8")
     return folder
-
-
-@pytest.fixture(scope="module")
-def window(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    browser = Browser(tmp_path_factory.mktemp("profile"))
-    yield browser
-    browser.close()
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
