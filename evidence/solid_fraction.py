@@ -36,9 +36,8 @@ def bed_cases() -> Iterator[tuple[str, Case]]:
     """Shape and case of each packing."""
     data: Any = read_yaml(DESIGN)
     design = Design[Beds].read(DESIGN, "beds")
-    for block in (design.reference, *design.points):
-        for _, values in block.points():
-            yield block.shape, settle_case(DESIGN, data["study"], {**design.base, **values})
+    for block, values in design.settings():
+        yield block.shape, settle_case(DESIGN, data["study"], values)
 
 
 def row(shape: str, case: Case, bed: Packing) -> dict[str, Any]:

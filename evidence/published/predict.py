@@ -88,10 +88,9 @@ def cases_of(result: str) -> Iterator[Case]:
     """The cases of a design, packing by packing of each point."""
     data: Any = read_yaml(DESIGN)
     design = Design[Repeated].read(DESIGN, result)
-    for block in (design.reference, *design.points):
-        for _, values in block.points():
-            for seed in range(1, block.packings + 1):
-                yield settle_case(DESIGN, data["study"], {**design.base, **values, "seed": seed})
+    for block, values in design.settings():
+        for seed in range(1, block.packings + 1):
+            yield settle_case(DESIGN, data["study"], {**values, "seed": seed})
 
 
 # --- measures ------------------------------------------------------------------------------------

@@ -88,9 +88,8 @@ def rows_of_case(batch: Batch, case: Case) -> list[dict[str, Any]]:
 def design_cases(file: Path) -> Iterator[Case]:
     """The cases of the design, of a study file."""
     design, study = Design[Variation].read(DESIGN), {**read_study(file), "fidelity": {}}
-    for block in (design.reference, *design.points):
-        for _, values in block.points():
-            yield settle_case(file, study, {**design.base, **values})
+    for _, values in design.settings():
+        yield settle_case(file, study, values)
 
 
 def run_lammps(folder: Path, scene: Scene[ProcessCase], particles: Path) -> Path:

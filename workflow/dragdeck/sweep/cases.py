@@ -136,6 +136,12 @@ class Design(Model, Generic[Block]):
             )
         return plan
 
+    def settings(self) -> Iterator[tuple[Block, dict[str, Any]]]:
+        """What is set at each point, the reference first, with the block that it is of."""
+        for block in (self.reference, *self.points):
+            for _, values in block.points():
+                yield block, {**self.base, **values}
+
 
 def check_number(points: int, file: Path) -> None:
     """Refuse a design of more points than can be listed.
