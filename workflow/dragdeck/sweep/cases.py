@@ -31,7 +31,7 @@ from dragdeck.errors import InputError, choices, together
 from dragdeck.mesh.files import FORMATS
 from dragdeck.study.base import NAME, NAME_LIMIT, STUDY_FILE, Json, Model
 from dragdeck.study.check import contradictions, explained, validate
-from dragdeck.study.model import Tolerance
+from dragdeck.study.model import Fidelity, Tolerance
 from dragdeck.study.search import Search, SearchRecord
 from dragdeck.study.yaml import read_study, read_yaml, studies_called
 from dragdeck.sweep.coarse import with_larger_particles
@@ -311,12 +311,18 @@ def settle_case(
 
 def _reduced(case: Case, named_in: Path) -> Case:
     """The case of a smaller scene, which is checked as any other."""
+    study, alone = case.study, case
+    if isinstance(study.fidelity, Tolerance):  # sizes do not depend on what it will come to
+        alone = replace(case, study=study.model_copy(update={"fidelity": Fidelity()}))
     try:
-        case = with_larger_particles(with_cut_out(case))
+        smaller = with_larger_particles(with_cut_out(alone))
     except InputError as error:
         for problem in (error, *error.more):
             problem.file = problem.file or named_in
         raise
+    if smaller is not alone:
+        reduced = smaller.study.model_copy(update={"fidelity": study.fidelity})
+        case = replace(case, study=reduced, machine=study)
     if problems := list(contradictions(case.study, whole=False)):
         raise together([replace(error, file=named_in) for error in problems])
     return case

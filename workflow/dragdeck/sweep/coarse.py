@@ -10,7 +10,7 @@ from dragdeck.scenes.filling import expected_bed
 from dragdeck.scenes.moving_bowl import bed_in_motion
 from dragdeck.scenes.workpiece import clearances
 from dragdeck.study.media import Grains, Media, Sieve
-from dragdeck.study.model import Assumption, Fidelity, Study, Tolerance
+from dragdeck.study.model import Assumption, Study
 
 LEAST_GAP = 2.7
 """Smallest gap between workpiece and wall, in diameters of the larger particles, from which the
@@ -29,12 +29,9 @@ def with_larger_particles(case: Case) -> Case:
         return case
     factor = case.study.reduction.coarser
     study = coarsened(case.study, factor)
-    settled = study
-    if isinstance(study.fidelity, Tolerance):
-        settled = study.model_copy(update={"fidelity": Fidelity()})
-    wide = replace(case, study=settled)
-    gap = clearances(wide, bed_in_motion(settled, expected_bed(settled)).surface_m).wall_m
-    diameter = 2 * typical_reach(settled)
+    wide = replace(case, study=study)
+    gap = clearances(wide, bed_in_motion(study, expected_bed(study)).surface_m).wall_m
+    diameter = 2 * typical_reach(study)
     if factor > 1 and gap < LEAST_GAP * diameter * (1 - 1e-6):
         raise InputError(
             "the gap between workpiece and wall is too narrow for larger particles: the drag would "
@@ -45,7 +42,7 @@ def with_larger_particles(case: Case) -> Case:
             f"at least {LEAST_GAP:g} diameters",
             remedy="use a smaller factor or a wider bowl",
         )
-    return replace(case, study=study, machine=case.written)
+    return wide
 
 
 def coarsened(study: Study, factor: float) -> Study:

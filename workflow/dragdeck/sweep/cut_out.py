@@ -27,7 +27,7 @@ from dragdeck.scenes.workpiece import dip, workpiece_reach
 from dragdeck.study.bowl_motions.acceleration import Acceleration
 from dragdeck.study.bowl_motions.bowl_motion import BowlMotion
 from dragdeck.study.bowls.trough import TroughBowl
-from dragdeck.study.model import Assumption, Fidelity, Motion, Study, Tolerance
+from dragdeck.study.model import Assumption, Motion, Study
 from dragdeck.study.paths.line import LinePath
 from dragdeck.study.paths.path import AroundBowl
 
@@ -97,14 +97,8 @@ def with_cut_out(case: Case) -> Case:
     problems = list(_refused(study))
     if problems:
         raise together(problems)
-    settled = study
-    if isinstance(study.fidelity, Tolerance):  # sizes do not depend on what it will come to
-        settled = study.model_copy(update={"fidelity": Fidelity()})
-    alone = replace(case, study=settled)
-    low = dip(alone) - vertical_range(study.motion)[0]
-    cut = cut_out(settled, workpiece_reach(alone), low)
-    cut = cut.model_copy(update={"fidelity": study.fidelity})
-    return replace(case, study=cut, machine=case.written)
+    low = dip(case) - vertical_range(study.motion)[0]
+    return replace(case, study=cut_out(study, workpiece_reach(case), low))
 
 
 def cut_out(study: Study, reach_m: float, low_m: float = 0.0) -> Study:
