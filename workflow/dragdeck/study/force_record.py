@@ -101,8 +101,7 @@ def _series(
     InputError
         As `Table.numbers`.
     """
-    units = dict(_unit(table, name, FORCE_UNITS) for name in columns)
-    units |= dict(_unit(table, name, ANGLE_UNITS) for name in [angle] if name is not None)
+    units = _units(table, columns, angle)
     names = [_column(table, {name: unit}) for name, unit in units.items()]
     missing = names if gaps else ()
     if rate_hz is None or {*table.names} & {*TIME_COLUMNS}:
@@ -131,14 +130,20 @@ def in_words(file: Path, signal: Signal | None = None) -> str:
         + f" (line {lines[row]})"
         for row in (0, -1)
     )
-    wanted = [(name, FORCE_UNITS) for name in columns]
-    wanted += [(name, ANGLE_UNITS) for name in [angle] if name]
-    names = ", ".join(_unit(table, *column)[0] for column in wanted)
+    names = ", ".join(_units(table, columns, angle))
     _, filled = _with_holes(time, values) if gaps else (time, values)
     missing = np.count_nonzero(~np.isfinite(filled).all(axis=0))
     left_out = f"; {missing} of {filled.shape[1]:,} samples missing, left out" if missing else ""
     where = f"{file.name} read as {names}: {len(time):,} rows at {rate:.5g} Hz, {ends}"
     return where + left_out
+
+
+def _units(table: Table, columns: Sequence[str], angle: str | None) -> dict[str, float]:
+    """Names of columns of forces, and of one of an angle at last, with their units in N or rad."""
+    units = dict(_unit(table, name, FORCE_UNITS) for name in columns)
+    if angle is not None:
+        units |= [_unit(table, angle, ANGLE_UNITS)]
+    return units
 
 
 def _unit(table: Table, column: str, units: Mapping[str, float]) -> tuple[str, float]:

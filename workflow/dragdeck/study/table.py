@@ -121,6 +121,8 @@ def _with_columns(text: str) -> str:
     cells = _between_blanks(named, widths[first]) if aligned else _cells(named)
     if len(cells) != widths[first]:
         return text
+    if not aligned and named == lines[first - 1]:
+        return text
     lines[first - 1] = named
     if aligned:
         lines[:first] = ["\t".join(_between_blanks(line, widths[first])) for line in lines[:first]]
