@@ -10,6 +10,7 @@ from rich.table import Table
 
 from dragdeck import __version__
 from dragdeck.advice.advise import Advice, Option, advised_settings, shown_share, with_option
+from dragdeck.advice.smaller_scenes import smaller_scenes
 from dragdeck.cases.case import Case
 from dragdeck.engine.reports import shown_time
 from dragdeck.outlook.explain import expected_cost, measured_speeds
@@ -48,7 +49,9 @@ def question(case: Case, tolerance: float | None, quantity: str | None) -> Toler
     return Tolerance.model_validate({**base.model_dump(), **given})
 
 
-def advised_case(case: Case, advice: Advice, results: Path) -> AdvisedCase:
+def advised_case(
+    case: Case, advice: Advice, results: Path, tradeoff: TradeoffRecord
+) -> AdvisedCase:
     """A case of ``advice.json``: its options with their steps and wall time.
 
     Parameters
@@ -58,6 +61,8 @@ def advised_case(case: Case, advice: Advice, results: Path) -> AdvisedCase:
     advice : Advice
     results : Path
         The study's results: what earlier runs took, or else an assumption, gives the speed.
+    tradeoff : TradeoffRecord
+        What steps cost.
     """
     chosen = replace(case, study=with_option(case.study, advice.chosen))
     return AdvisedCase(
@@ -66,6 +71,7 @@ def advised_case(case: Case, advice: Advice, results: Path) -> AdvisedCase:
         asked=advice.for_case,
         options=[_forecast(case, role, option, results) for role, option in _roles(advice)],
         ways=[*_ways(advice)],
+        smaller_scenes=smaller_scenes(case, advice.requested.quantities, tradeoff),
     )
 
 
@@ -137,8 +143,9 @@ def advice_tables(case: Case, advice: Advice, advised: AdvisedCase) -> Iterator[
         wall = shown_time(sum(row.wall_time_s.values()))
         table.add_row(role, str(option), cost, steps, wall, style=style)
     yield table
-    if advised.ways:
-        yield _ways_table(advised.ways, requested)
+    for title, ways in (("ways", advised.ways), ("smaller scenes", advised.smaller_scenes)):
+        if ways:
+            yield _ways_table(title, ways, requested)
     said = Table(show_header=False)
     said.add_column(style="bold")
     said.add_column()
@@ -167,12 +174,11 @@ def _half_width(half_width: float | None) -> str:
     return "not known" if half_width is None else shown_share(half_width)
 
 
-def _ways_table(ways: Sequence[WayEntry], requested: Tolerance) -> Table:
+def _ways_table(what: str, ways: Sequence[WayEntry], requested: Tolerance) -> Table:
     """What each way is expected to give, and to cost."""
-    table = Table(
-        title="ways, with the half-width expected from other scenes", title_justify="left"
-    )
-    for name in ("way", "half-width", "cost"):
+    title = f"{what}, with the half-width expected from other scenes"
+    table = Table(title=title, title_justify="left")
+    for name in ("", "half-width", "cost"):
         table.add_column(name)
     for way in ways:
         enough = way.half_width is not None and way.half_width <= requested.tolerance

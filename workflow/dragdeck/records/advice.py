@@ -57,7 +57,7 @@ class OptionEntry(Part):
 
 
 class WayEntry(Part):
-    """A way to the quantities at the physical modulus.
+    """A way to the quantities: to the physical modulus, or to a machine by a smaller scene.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class WayEntry(Part):
         Expected relative half-width of the 95 % interval, the largest of the quantities; None where
         other scenes say nothing of one.
     relative_cost : float
-        CPU time / CPU time of a plain run at the physical modulus.
+        CPU time / CPU time of a plain run at the physical modulus, or of the whole machine.
     """
 
     name: str
@@ -87,6 +87,8 @@ class AdvisedCase(Part):
         The advised settings first.
     ways : sequence of WayEntry
         What could be done, the cheapest way first.
+    smaller_scenes : sequence of WayEntry
+        The machine and what could stand for it, the cheapest first; empty if nothing could.
     """
 
     case: str
@@ -94,6 +96,7 @@ class AdvisedCase(Part):
     asked: AdvisedSettings
     options: tuple[OptionEntry, ...]
     ways: tuple[WayEntry, ...] = ()
+    smaller_scenes: tuple[WayEntry, ...] = ()
 
 
 class AdviceFile(Document):
