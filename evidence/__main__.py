@@ -76,6 +76,18 @@ COMMANDS = (
         Argument("archive", type=Path, metavar="FILE", help="tar.xz archive to write"),
         Argument("results", type=Path, nargs="+", metavar="RESULTS",
                  help="folders of the results of studies"))),
+    Command("write-kinds", "write studies of each kind of scene, with a tolerance and plain",
+            "Write two studies of each kind of scene into the project: one with a tolerance, and "
+            "one of plain runs with other packings.", "windows.judge:write_kinds", (
+        Argument("--fidelity", metavar="YAML", help="block of each study; default: %(default)s",
+                 default="{tolerance: 0.2, quantity: [drag_mean, workpiece_contacts]}"),
+        Argument("--packings", type=int, default=2, metavar="N",
+                 help="of the plain runs; default: 2"))),
+    Command("judge-windows", "compare studies with a tolerance with plain runs",
+            "Compare the results of studies with a tolerance with those of plain runs, and write "
+            "errors and costs.", "windows.judge:judge_tolerances", (
+        Argument("out", type=Path, metavar="FILE", help="CSV file to write"),
+        Argument("studies", nargs="+", metavar="STUDY", help="studies with a tolerance"))),
     Command("record-scenes", "make windows.json and stable_step.json from runs of designed scenes",
             "Make windows.json and stable_step.json, which decide tolerances and time steps, from "
             "the runs of designed scenes.", "windows.record:write_scene_records", (

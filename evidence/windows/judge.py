@@ -1,0 +1,146 @@
+"""Tolerances beside plain runs of the same scenes: which are kept, and what they cost.
+
+python -m evidence write-kinds                                # studies kind-* in this project
+./run all --config study=kind-line; ./run all --config study=kind-line-plain; ...
+python -m evidence judge-windows kinds.csv kind-line kind-spin ...
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import yaml
+
+from dragchain.quantities.document import EXTRAPOLATED, MEASURED_FILE, Extrapolated, RunQuantities
+from dragchain.statistics.estimate import NORMAL_QUANTILE
+from dragdeck.advice.advise import plain_option
+from dragdeck.cases.case import Case, of_each_workpiece
+from dragdeck.project import Project, by_run, project_here
+from dragdeck.records.run import RunRecord
+from dragdeck.scenes.filling import FILLING
+from dragdeck.scenes.lead import with_leads
+from dragdeck.scenes.process import PROCESS
+from dragdeck.study.yaml import read_yaml
+from dragdeck.sweep.cases import Design, Variation, settle_case
+
+PLAIN = "-plain"
+"""Ends the name of the study of plain runs beside one with a tolerance."""
+
+KINDS = Path(__file__).with_name("kinds.yaml")
+
+
+class Kinds(Variation):
+    """A scene of the design with the name of its kind."""
+
+    kind: str
+
+
+def write_pair(name: str, case: Case, fidelity: str, packings: int) -> None:
+    """Write a study that asks for a tolerance, and one of plain runs with other packings.
+
+    Parameters
+    ----------
+    name : str
+        Of the first study.
+    case : Case
+        The scene.
+    fidelity : str
+        Block of the first study, as YAML.
+    packings : int
+        Of the second.
+    """
+    data, studies = case.study.plain(), project_here().studies
+    seeds = [case.study.seed + number for number in range(1, packings + 1)]
+    plain = {**plain_option(case).fidelity.plain(), "ranks": 1}
+    for study, changes in (
+        (name, {"fidelity": yaml.safe_load(fidelity)}),
+        (name + PLAIN, {"fidelity": plain, "sweep": {"seed": seeds}}),
+    ):
+        (studies / study).mkdir(parents=True)
+        text = yaml.safe_dump({**data, **changes}, sort_keys=False)
+        (studies / study / "study.yaml").write_text(text)
+
+
+def write_kinds(fidelity: str, packings: int) -> str:
+    """Write both studies of each kind; return the names."""
+    data: Any = read_yaml(KINDS)
+    names = []
+    for block, values in Design[Kinds].read(KINDS, "kinds").settings():
+        names.append(f"kind-{block.kind.replace(' ', '-')}")
+        write_pair(names[-1], settle_case(KINDS, data["study"], values), fidelity, packings)
+    return "\n".join(names)
+
+
+def judge_tolerances(out: Path, studies: Sequence[str]) -> None:
+    """Write a row per study, workpiece and requested quantity: error against the plain runs.
+
+    Parameters
+    ----------
+    out : Path
+        CSV file.
+    studies : sequence of str
+        Those with a tolerance; the plain runs of NAME are of the study NAME-plain.
+    """
+    project = project_here()
+    rows = [row for study in studies for row in _rows(project, study)]
+    pd.DataFrame(rows).to_csv(out, index=False, float_format="%.5g")
+
+
+def _rows(project: Project, study: str) -> Iterator[dict[str, Any]]:
+    asked = project.cases(study)
+    plain = [run for case in project.cases(study + PLAIN) for run in of_each_workpiece(case)]
+    plain_cpu = _cpu_time(project, plain) / len({case.study.seed for case in plain})
+    cpu = _cpu_time(project, with_leads(asked))
+    for case in (run for each in asked for run in of_each_workpiece(each)):
+        folder = project.run_folder(case, PROCESS)
+        result = Extrapolated.read(folder / EXTRAPOLATED)
+        assert result.tolerance is not None
+        beside = [
+            RunQuantities.read(project.run_folder(run, PROCESS) / MEASURED_FILE)
+            for run in plain
+            if run.number == case.number
+        ]
+        for name in result.tolerance.asked:
+            value, (mean, error) = result.values[name], _reference(beside, name)
+            half = (value.ci95_high - value.ci95_low) / 2
+            yield {
+                "study": study,
+                "workpiece": case.number,
+                "quantity": name,
+                "windows": len(result.tolerance.runs),
+                "whole_drag": result.tolerance.whole or not result.tolerance.runs,
+                "tolerance": result.tolerance.tolerance,
+                "reached": half <= result.tolerance.tolerance * abs(value.value),
+                "value": value.value,
+                "half_width": half / abs(value.value),
+                "reference": mean,
+                "reference_error": error / abs(mean),
+                "error": value.value / mean - 1,
+                "covered": abs(value.value - mean) <= math.hypot(half, NORMAL_QUANTILE * error),
+                "cpu_time_s": cpu,
+                "plain_cpu_time_s": plain_cpu,
+            }
+
+
+def _reference(runs: Sequence[RunQuantities], name: str) -> tuple[float, float]:
+    """Mean over packings and its standard error, no smaller than the runs' own scatter explains."""
+    estimates = [run.estimates({})[name] for run in runs]
+    means = np.array([estimate.value for estimate in estimates])
+    widths = np.array([estimate.ci95_high - estimate.ci95_low for estimate in estimates])
+    within = float(np.mean((widths / 2 / NORMAL_QUANTILE) ** 2))
+    between = float(means.var(ddof=1)) if len(means) > 1 else 0.0
+    return float(means.mean()), math.sqrt(max(within, between) / len(means))
+
+
+def _cpu_time(project: Project, cases: Sequence[Case]) -> float:
+    """CPU time of all runs of some cases that were made, with their fillings, s."""
+    folders = {
+        project.run_folder(case, scene)
+        for scene in (FILLING, PROCESS)
+        for case in by_run(cases, scene).values()
+    }
+    files = (folder / "run.json" for folder in folders)
+    return sum(RunRecord.read(file).processor_time_s for file in files if file.is_file())
