@@ -13,6 +13,7 @@ from dragdeck.cases.case import Case
 from dragdeck.outlook.explain import expected_cost, explanation, measured_speeds, price_of
 from dragdeck.scenes.filling import FILLING, filling_scene
 from dragdeck.scenes.process import PROCESS, process_scene
+from dragdeck.scenes.scene import particles_step_s
 
 
 def measured(results: Path, name: str, particles: int, steps_per_s: float) -> None:
@@ -43,6 +44,14 @@ def test_other_runs_count_by_their_particles(case: Case, tmp_path: Path) -> None
     measured(tmp_path, "big", 10 * case.study.media.count, 50.0)
     cost = expected_cost(FILLING, scene, measured_speeds(tmp_path))
     assert cost.wall_time_s == pytest.approx(scene.steps / 500.0)
+
+
+def test_particles_of_large_beds_cost_more_each() -> None:
+    small, medium, large, huge = (
+        particles_step_s(count, 7e6) / count for count in (1_000, 10_000, 100_000, 1_000_000)
+    )
+    assert small == pytest.approx(1 / 7e6) == medium
+    assert large / medium == pytest.approx(huge / large) == pytest.approx(1.65, rel=0.01)
 
 
 def test_a_price_is_quoted_with_engine_and_date() -> None:

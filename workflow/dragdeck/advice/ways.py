@@ -20,6 +20,7 @@ from dragdeck.scenes.lead import (
     window_fraction,
 )
 from dragdeck.scenes.motion import plunge_point
+from dragdeck.scenes.scene import particles_step_s
 from dragdeck.scenes.workpiece import FACET_STEP_S, PARTICLE_STEPS_PER_S, workpiece_facets
 from dragdeck.study.model import Fidelity, Study, Tolerance
 
@@ -88,9 +89,9 @@ class Work:
         filled = self.study.model_copy(update={"fidelity": fidelity}).at_filling()
         filling = self.filling_s / bed_timestep(filled, "filling_timestep_fraction")
         count, of_facets = self.study.sphere_count, self.facets * FACET_STEP_S
-        return filling * count / FILLING.particle_steps_per_s + self.steps(fidelity, windows) * (
-            count / PARTICLE_STEPS_PER_S + of_facets
-        )
+        filling_s = filling * particles_step_s(count, FILLING.particle_steps_per_s)
+        particles_s = particles_step_s(count, PARTICLE_STEPS_PER_S)
+        return filling_s + self.steps(fidelity, windows) * (particles_s + of_facets)
 
     def _steps(self, study: Study, time_s: float) -> float:
         """Steps of a stretch of the process, each counted as it costs at its modulus."""

@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from dragdeck.records.tradeoff import CostEntry, TradeoffRecord
-from dragdeck.scenes.scene import SceneType, StudyScene
+from dragdeck.scenes.scene import SceneType, StudyScene, particles_step_s
 from dragdeck.scenes.workpiece import FACET_STEP_S
 
 
@@ -48,7 +48,8 @@ def expected_cost(kind: SceneType, scene: StudyScene, speeds: Sequence[tuple[int
     if measured:
         rate = sum(particles / count * rate for particles, rate in measured) / len(measured)
         return Cost(scene.steps, scene.steps / rate, f"{len(measured)} run(s) of this study here")
-    rate = 1 / (count / kind.particle_steps_per_s + scene.facets * FACET_STEP_S)
+    particles_s = particles_step_s(count, kind.particle_steps_per_s)
+    rate = 1 / (particles_s + scene.facets * FACET_STEP_S)
     return Cost(scene.steps, scene.steps / rate, "assumed: no run of this study measured here")
 
 
