@@ -1,6 +1,7 @@
 """Scenes of drag finishing drawn from a seed, for what windows are judged by.
 
     python -m evidence draw-scenes 17 --scenes 12    # studies in this project
+    python -m evidence draw-scenes 17 --packings 3   # the same, each with plain runs beside it
     ./run $(python -m evidence window-targets drawn-17-00) --config study=drawn-17-00
     python -m evidence collect-windows drawn.tar.xz results/drawn-17-*
 
@@ -15,7 +16,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from dragchain.quantities.document import MEASURED_FILE
 from dragchain.windows.rounds import measured_window
@@ -23,6 +23,8 @@ from dragdeck.project import project_here
 from dragdeck.records.case import load_case
 from dragdeck.scenes.lead import windows_of
 from dragdeck.scenes.process import PROCESS
+from dragdeck.sweep.cases import settle_case
+from evidence.windows.judge import write_pair
 
 MATERIALS = {
     "glass": (63e9, 0.22, 2500.0),
@@ -104,8 +106,8 @@ def _short(number: float) -> float:
     return float(f"{number:.4g}")
 
 
-def draw_scenes(seed: int, scenes: int, fidelity: str) -> str:
-    """Write a study for each scene into the project; return their names.
+def draw_scenes(seed: int, scenes: int, fidelity: str, packings: int) -> str:
+    """Write a study for each scene into the project, and perhaps one of plain runs; their names.
 
     Parameters
     ----------
@@ -113,16 +115,14 @@ def draw_scenes(seed: int, scenes: int, fidelity: str) -> str:
     scenes : int
     fidelity : str
         Block of each study, as YAML.
+    packings : int
+        Of the plain runs; 0: no such study.
     """
-    random, studies = np.random.default_rng(seed), project_here().studies
-    names = []
+    random, names = np.random.default_rng(seed), []
     for number in range(scenes):
-        name = f"drawn-{seed}-{number:02d}"
-        folder = studies / name
-        folder.mkdir(parents=True)
-        study = {**drawn(random, number), "fidelity": yaml.safe_load(fidelity)}
-        (folder / "study.yaml").write_text(yaml.safe_dump(study, sort_keys=False))
-        names.append(name)
+        names.append(f"drawn-{seed}-{number:02d}")
+        case = settle_case(Path(names[-1]), drawn(random, number), {})
+        write_pair(names[-1], case, fidelity, packings)
     return "\n".join(names)
 
 

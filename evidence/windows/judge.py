@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import yaml
+from pydantic import JsonValue
 
 from dragchain.quantities.document import EXTRAPOLATED, MEASURED_FILE, Extrapolated, RunQuantities
 from dragchain.statistics.estimate import NORMAL_QUANTILE
@@ -23,6 +24,7 @@ from dragdeck.records.run import RunRecord
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.lead import with_leads
 from dragdeck.scenes.process import PROCESS
+from dragdeck.study.base import Json
 from dragdeck.study.yaml import read_yaml
 from dragdeck.sweep.cases import Design, Variation, settle_case
 
@@ -50,15 +52,15 @@ def write_pair(name: str, case: Case, fidelity: str, packings: int) -> None:
     fidelity : str
         Block of the first study, as YAML.
     packings : int
-        Of the second.
+        Of the second; 0: only the first is written.
     """
     data, studies = case.study.plain(), project_here().studies
-    seeds = [case.study.seed + number for number in range(1, packings + 1)]
+    seeds: list[JsonValue] = [case.study.seed + number for number in range(1, packings + 1)]
     plain = {**plain_option(case).fidelity.plain(), "ranks": 1}
-    for study, changes in (
-        (name, {"fidelity": yaml.safe_load(fidelity)}),
-        (name + PLAIN, {"fidelity": plain, "sweep": {"seed": seeds}}),
-    ):
+    pair: dict[str, Json] = {name: {"fidelity": yaml.safe_load(fidelity)}}
+    if packings:
+        pair[name + PLAIN] = {"fidelity": plain, "sweep": {"seed": seeds}}
+    for study, changes in pair.items():
         (studies / study).mkdir(parents=True)
         text = yaml.safe_dump({**data, **changes}, sort_keys=False)
         (studies / study / "study.yaml").write_text(text)
