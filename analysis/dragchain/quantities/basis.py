@@ -13,6 +13,7 @@ from typing import NamedTuple
 from dragchain.quantities.other_scenes import OtherScenes, other_scenes
 from dragchain.quantities.registry import Quantity
 from dragchain.statistics.estimate import Estimate
+from dragdeck.physics.contact_mechanics import AT_SPEED, SOFT_AT_SPEED
 from dragdeck.records.case import CaseOfRun, FidelityOfRun
 from dragdeck.records.run import changed_in_words
 
@@ -179,6 +180,8 @@ def _of_modulus_and_speed(case: CaseOfRun) -> Iterator[str]:
         yield "Values at the physical modulus are from windows: short runs at that modulus."
     elif scale != 1.0:
         yield f"Nothing is corrected: {_why_not(case)}."
+    if scale != 1.0 and case.numbers.get("inertial_number", 0.0) > AT_SPEED:
+        yield f"{SOFT_AT_SPEED[0].upper()}{SOFT_AT_SPEED[1:]}."
     if case.lead:
         yield (
             "Plunge, approach and the start of the drag have a reduced modulus; it was raised "

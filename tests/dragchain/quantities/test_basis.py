@@ -95,6 +95,16 @@ def test_a_step_that_was_accepted_though_unstable_is_said_to_be() -> None:
     assert "no effect" not in text
 
 
+@pytest.mark.parametrize(("scale", "inertial", "said"), [
+    (1e-3, 2.4, True), (1e-3, 0.3, False), (1.0, 2.4, False),
+])  # fmt: skip
+def test_soft_contacts_of_a_fast_drag_are_said_to_be_wrong_by_more(
+    scale: float, inertial: float, said: bool
+) -> None:
+    text = " ".join(notes(case(scale, numbers={"inertial_number": inertial})))
+    assert ("1.7 times as many contacts" in text) is said
+
+
 DRAG, CONTACTS = (
     next(quantity for quantity in REPORTED if quantity.name == name)
     for name in ("drag_mean", "workpiece_contacts")

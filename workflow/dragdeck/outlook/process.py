@@ -5,7 +5,13 @@ import math
 from dragdeck.cases.bed import particle_material, skin
 from dragdeck.cases.case import Case, of_each_workpiece
 from dragdeck.cases.ranks import cores_here
-from dragdeck.physics.contact_mechanics import FAST, effective_modulus, impact_overlap
+from dragdeck.physics.contact_mechanics import (
+    AT_SPEED,
+    FAST,
+    SOFT_AT_SPEED,
+    effective_modulus,
+    impact_overlap,
+)
 from dragdeck.scenes.filling import MOST_OVERLAP, expected_bed, floor_overlap, rank_split
 from dragdeck.scenes.moving_bowl import bed_in_motion
 from dragdeck.scenes.workpiece import clearances, closest, describe, fastest_surface, in_diameters
@@ -130,10 +136,11 @@ def not_corrected(case: Case) -> str:
     chosen = case.study.chosen_fidelity()
     if chosen.youngs_modulus_scale == 1 or chosen.windows is not None or case.part:
         return ""
+    at_speed = f" ({SOFT_AT_SPEED})" if describe(case)["inertial_number"] > AT_SPEED else ""
     return (
         f"E x {chosen.youngs_modulus_scale:g} gives more and smaller contact forces than the "
-        "physical modulus, by amounts that differ from scene to scene, and the report does not "
-        "correct them: fidelity: {tolerance: 0.1} measures them in this scene"
+        f"physical modulus, by amounts that differ from scene to scene{at_speed}, and the report "
+        "does not correct them: fidelity: {tolerance: 0.1} measures them in this scene"
     )
 
 
