@@ -188,6 +188,7 @@ def test_other_lengths_may_be_asked_for(cut: Made) -> None:
          "compound"),
         ({"motion.path.radius_m": 0.02}, "reduction.cut_out"),
         ({"reduction": {"counted_m": 0.1}}, "reduction"),
+        ({"reduction": {"cut_out": True, "counted_m": 3.0}}, "reduction.cut_out"),
         ({"motion.bowl": {"kind": "rotation", "rpm": 0.02 / 0.06 * 60 / math.tau}}, "motion.bowl"),
     ],
 )  # fmt: skip
