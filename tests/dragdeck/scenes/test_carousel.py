@@ -105,6 +105,26 @@ def test_a_list_gives_each_an_angle_and_a_shape(carousel: Carousel, project: Pro
     assert "n_meshes 3 meshes workpiece workpiece_2 workpiece_3" in text
 
 
+def test_workpieces_at_different_depths_reach_them_at_the_same_step(carousel: Carousel) -> None:
+    """The shallower one starts higher, and plunges as far."""
+    stations = [{"angle_deg": 0}, {"angle_deg": 180, "immersion_depth_m": 0.004}]
+    case = carousel(stations)
+    deeper = case.study.motion.immersion_depth_m - 0.004
+    assert deeper > 0
+    bodies = process_scene(case, BED).deck.workpieces
+    starts = [body.start_m[2] for body in bodies]
+    assert starts[1] - starts[0] == pytest.approx(deeper, abs=2e-6)
+    plunges = [body.legs[0] for body in bodies]
+    assert plunges[0].velocity_m_s == plunges[1].velocity_m_s
+    assert [leg.end_step for leg in bodies[0].legs] == [leg.end_step for leg in bodies[1].legs]
+    each = of_each_workpiece(case)
+    depths = [process_scene(member, BED).case.workpiece.immersion_depth_m for member in each]
+    assert depths == [case.study.motion.immersion_depth_m, 0.004]
+    assert PROCESS.run_id(case) != PROCESS.run_id(carousel([{"angle_deg": 0}, {"angle_deg": 180}]))
+    with pytest.raises(InputError, match="immersion_depth_m"):
+        process_scene(carousel([{"angle_deg": 0, "immersion_depth_m": 0.5}]), BED)
+
+
 def test_no_two_workpieces_share_a_name(carousel: Carousel, project: Project) -> None:
     """Variables and fixes: LIGGGHTS would take the later one for both."""
     superposed = {

@@ -228,7 +228,9 @@ def driven_surface_speed(study: Study, radius_m: float) -> float:
     return way.fastest_m_s + added_speed(study.motion, radius_m, way.factor)
 
 
-def course(study: Study, bed: Bed, reference_m: float = 0.0) -> Course:
+def course(
+    study: Study, bed: Bed, reference_m: float = 0.0, deepest_m: float | None = None
+) -> Course:
     """The motion of a workpiece in a bed.
 
     Parameters
@@ -237,9 +239,13 @@ def course(study: Study, bed: Bed, reference_m: float = 0.0) -> Course:
     bed : Bed
     reference_m : float
         Height of the workpiece's reference point above its lowest point.
+    deepest_m : float, optional
+        Immersion depth of the deepest workpiece of the carousel: the others start higher, so that
+        all plunge as far.
     """
     motion, timestep = study.motion, bed_timestep(study, "timestep_fraction")
-    clear = round_to(bed.top_m + study.media.typical_radius_m, 6)
+    higher = (deepest_m or motion.immersion_depth_m) - motion.immersion_depth_m
+    clear = round_to(bed.top_m + study.media.typical_radius_m + higher, 6)
     dive = clear - (bed.surface_m - motion.immersion_depth_m + motion.path.start_height_m)
     legs, begun, period = list[Leg](), 0, output_periods(study, timestep).network
     for name, duration, velocity in _entry(motion, dive, study.chosen_fidelity().speed_factor):

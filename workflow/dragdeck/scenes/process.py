@@ -119,10 +119,11 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
     check_apart(each, bed)
     check_lid(whole, bed)
     check_submerged(whole, bed)
-    courses, moved = (
-        [course(workpiece.study, bed, reference_height(workpiece)) for workpiece in each],
-        [],
-    )
+    deepest = max(workpiece.study.motion.immersion_depth_m for workpiece in each)
+    courses = [
+        course(workpiece.study, bed, reference_height(workpiece), deepest) for workpiece in each
+    ]
+    moved = []
     drag, bowl_motion = courses[0].drag, courses[0].driven.bowl
     steps = covered(whole, drag)
     for workpiece, way in zip(each, courses, strict=True):

@@ -272,11 +272,19 @@ class Motion(Superposed):
         """Length of the path after a time, at the end of its start or later, m."""
         return (max(time_s, self.ramp_s) - self.ramp_s / 2) * self.nominal_speed_m_s
 
-    def turned(self, angle_deg: float) -> "Motion":
-        """The same motion turned about the bowl's axis, immersed where the drag begins."""
+    def turned(self, angle_deg: float, depth_m: float | None = None) -> "Motion":
+        """The same motion turned about the bowl's axis, immersed where the drag begins.
+
+        Parameters
+        ----------
+        angle_deg : float
+        depth_m : float, optional
+            Another immersion depth.
+        """
         path, place = self.path.turned(angle_deg), self.plunge_at_m
         at = path.start_point if place is None else turned(place, angle_deg)
-        return self.model_copy(update={"path": path, "plunge_at_m": at})
+        depth = depth_m or self.immersion_depth_m
+        return self.model_copy(update={"path": path, "plunge_at_m": at, "immersion_depth_m": depth})
 
     def at(self, pace: float, length_m: float) -> "Motion":
         """The drag at another pace and with another length, all of it counted.
@@ -651,7 +659,7 @@ class Study(Model):
                     "workpiece": self.workpiece.model_copy(
                         update={"shape": station.shape or self.workpiece.shape}
                     ),
-                    "motion": self.motion.turned(station.angle_deg),
+                    "motion": self.motion.turned(station.angle_deg, station.immersion_depth_m),
                     "workpieces": None,
                 }
             )
@@ -663,7 +671,7 @@ class Study(Model):
         """The workpieces of the carousel; none where one stands as the study gives it."""
         stations = self.workpieces.stations if self.workpieces else ()
         differ = len(stations) > 1 or any(
-            station.angle_deg or station.shape for station in stations
+            station.angle_deg or station.shape or station.immersion_depth_m for station in stations
         )
         return stations if differ else ()
 

@@ -71,6 +71,9 @@ class Station(Model):
         "counter-clockwise seen from above"
     )
     shape: Shape | None = None
+    immersion_depth_m: Positive | None = Field(
+        default=None, description="immersion depth of its tip, m; none: that of the motion"
+    )
 
 
 class Carousel(Model):
