@@ -1,8 +1,8 @@
 """Machines against their cut-outs and against larger particles (docs/evidence/simplifications.md).
 
-    ./run all --config study=drag_finisher
-    ./run all --config study=stream_finisher
-    python benchmarks/smaller_scenes.py docs/data/scenes results/{drag,stream}_finisher
+    ./run all --config study=drag_finisher      # and the others below
+    python benchmarks/smaller_scenes.py docs/data/scenes results/drag_finisher{,_coarse} \
+        results/stream_finisher results/stream_machine{,_whole}
 
 Makes three records of the runs of these studies: ``smaller_scenes.csv``, mean values over the
 packings of each scene and size with the cost of filling and process; ``cut_out_change.csv``, the
@@ -25,13 +25,15 @@ from dragchain.statistics.estimate import Estimate, flattened
 from dragchain.tables.by_step import read_table
 from dragdeck.records.case import load_case
 from dragdeck.records.run import RunRecord
+from dragdeck.study.paths.path import AroundBowl
 
 QUANTITIES = {"drag_n": "drag_mean", "contacts": "workpiece_contacts",
-              "contact_force_n": "contact_force_mean", "load_n": "normal_load"}  # fmt: skip
+              "contact_force_n": "contact_force_mean", "load_n": "normal_load",
+              "sliding_load_n_m_per_m": "force_slide", "vertical_n": "vertical_mean"}  # fmt: skip
 UNKNOWN = Estimate(math.nan, math.nan, math.nan)
 
-_PATH_M, _NEAR_M, _BINS = 0.0625, 0.02, 8
-"""Radius of the path, and surface beside it to either side, m; bins of the latter."""
+_NEAR_M, _BINS = 0.02, 8
+"""Surface beside the path to either side, m, and its bins."""
 
 
 def main() -> None:
@@ -41,18 +43,23 @@ def main() -> None:
     parser.add_argument("results", type=Path, nargs="+")
     chosen = parser.parse_args()
     rows, lines = [], []
+    machines: dict[str, dict[Path, RunQuantities]] = {}
     for study in chosen.results:
-        folders = sorted(file.parents[1] for file in study.glob(f"process/*/{MEASURED_FILE}"))
-        runs = {folder: RunQuantities.read(folder / MEASURED_FILE) for folder in folders}
+        of_study = machines.setdefault(
+            study.name.removesuffix("_coarse").removesuffix("_whole"), {}
+        )
+        for file in sorted(study.glob(f"process/*/{MEASURED_FILE}")):
+            of_study.setdefault(file.parents[1], RunQuantities.read(file))
+    for machine, runs in machines.items():
         groups: dict[tuple[str, float], list[Path]] = {}
         for folder, run in runs.items():
             groups.setdefault(_kind(run), []).append(folder)
-        rows += [_row(study.name, *kind, of, runs) for kind, of in sorted(groups.items())]
+        rows += [_row(machine, *kind, of, runs) for kind, of in sorted(groups.items())]
         for scene in sorted({scene for scene, _ in groups}):
             of_scene = [run for run in runs.values() if _kind(run)[0] == scene]
             for line in coarse_grained(of_scene):
                 if line.value is not None:
-                    row = {**vars(line), "scene": scene, "study": study.name}
+                    row = {**vars(line), "scene": scene, "study": machine}
                     row["at_true_size"] = line.at_true_size or UNKNOWN
                     lines.append(flattened(row))
     table = pd.DataFrame(rows)
@@ -104,7 +111,7 @@ def _row(
             "packings": len(folders),
             "particles": load_case(folders[0]).media.count,
             **values,
-            "surface_tilt_deg": np.mean([_tilt_deg(folder) for folder in folders]),
+            "surface_tilt_deg": np.mean([_tilt_deg(folder, runs[folder]) for folder in folders]),
             "cpu_time_s": np.mean([_cpu_time(folder, runs[folder]) for folder in folders]),
         }
     )
@@ -119,7 +126,7 @@ def _cpu_time(folder: Path, run: RunQuantities) -> float:
     return run.cost.cpu_time_s + float(RunRecord.read(filling / "run.json").cpu_time_s or math.nan)
 
 
-def _tilt_deg(folder: Path) -> float:
+def _tilt_deg(folder: Path, run: RunQuantities) -> float:
     """Inclination of the surface across the path, outwards, in the second half of the drag.
 
     Of particles beside the path, half a layer of the highest in each bin across it.
@@ -129,7 +136,9 @@ def _tilt_deg(folder: Path) -> float:
     particles = read_table(folder / "tables/particles.parquet", ["step", "x_m", "y_m", "z_m"])
     particles = particles[particles["step"] > (drag.start_step + drag.end_step) / 2]
     if case.bowl.round:
-        edges = _PATH_M + np.linspace(-_NEAR_M, _NEAR_M, _BINS + 1)
+        path = run.study.motion.path
+        assert isinstance(path, AroundBowl)
+        edges = path.radius_m + np.linspace(-_NEAR_M, _NEAR_M, _BINS + 1)
         across, areas, sign = np.hypot(particles["x_m"], particles["y_m"]), edges**2 * math.pi, 1.0
     else:
         edges = np.linspace(-_NEAR_M, _NEAR_M, _BINS + 1)

@@ -32,6 +32,7 @@ D = 0.004
 
 RADIUS = 0.003
 SIDE = max(6 * D, 4 * 2 * RADIUS)
+BELOW = 4 * D
 WIDE: dict[str, Any] = {
     "media": {"material": "ceramic", "radius_mean_m": D / 2, "radius_std_m": 0.0,
               "fill_height_m": 0.05, "count": None},
@@ -79,7 +80,7 @@ def test_a_wide_machine_gives_a_trough_of_the_sizes_of_the_laws(cut: Made) -> No
     reach = workpiece_radius(case)
     side = max(6 * D, 8 * reach)
     assert sides(case) == pytest.approx((side, side), abs=2e-6)
-    assert tip_of(case) == pytest.approx(2 * D, rel=0.01)
+    assert tip_of(case) == pytest.approx(BELOW, rel=0.01)
     assert path.start_m[0] + bowl.length_m / 2 - reach == pytest.approx(side, abs=2e-6)
     end = path.start_m[0] + path.length_m
     assert bowl.length_m / 2 - end == pytest.approx(14 * D, abs=2e-6)
@@ -94,11 +95,11 @@ def test_a_wide_machine_gives_a_trough_of_the_sizes_of_the_laws(cut: Made) -> No
 @pytest.mark.parametrize(
     ("changes", "left", "right", "below"),
     [
-        ({"bowl.radius_m": 0.075}, SIDE, 0.012, 2 * D),
-        ({"bowl.radius_m": 0.075, "motion.path.direction": "cw"}, 0.012, SIDE, 2 * D),
-        ({"bowl": RING}, 0.012, 0.017, 2 * D),
+        ({"bowl.radius_m": 0.075}, SIDE, 0.012, BELOW),
+        ({"bowl.radius_m": 0.075, "motion.path.direction": "cw"}, 0.012, SIDE, BELOW),
+        ({"bowl": RING}, 0.012, 0.017, BELOW),
         ({"media.fill_height_m": 0.02}, SIDE, SIDE, 0.005),
-        ({"motion.oscillation": {"amplitude_m": 0.002, "frequency_hz": 1}}, SIDE, SIDE, 2 * D),
+        ({"motion.oscillation": {"amplitude_m": 0.002, "frequency_hz": 1}}, SIDE, SIDE, BELOW),
     ],
 )
 def test_a_narrower_machine_keeps_its_own_room(
@@ -118,7 +119,7 @@ def test_a_sloping_wall_counts_where_it_is_nearest(cut: Made) -> None:
     assert sides(case)[1] == pytest.approx(wall - 0.06 - RADIUS, rel=0.03)
     outer = cut({"bowl": {**ROUNDED, "profile_m": [[0, 0], [0.02, 0], [0.1, 0.06],
                                                             [0.105, 0.12]]}})  # fmt: skip
-    assert tip_of(outer) < 2 * D and sides(outer)[1] < sides(case)[1]
+    assert tip_of(outer) < BELOW and sides(outer)[1] < sides(case)[1]
 
 
 def test_a_line_is_cut_out_in_its_own_direction(cut: Made) -> None:
@@ -148,14 +149,14 @@ def test_gravity_is_turned_as_the_bed_of_a_turning_bowl(cut: Made) -> None:
     assert case.study.motion.speed_m_s == pytest.approx(rate * 0.06)
     assert path_tilt_deg(case.study) == pytest.approx(math.degrees(liquid) - 26)
     assert path_tilt_deg(case.study) == pytest.approx(path_tilt_deg(machine.study))
-    assert tip_of(case) == pytest.approx(2 * D, rel=0.01)
+    assert tip_of(case) == pytest.approx(BELOW, rel=0.01)
     assert case.study.bowl_facet_size_m is None
     against = cut({**turning, "motion.path": {**REST, "bowl_rpm": -120}})
     assert process_scene(against).deck.gravity_direction == pytest.approx((x, -y, z))
     faster = cut({**turning, "fidelities.quick.speed_factor": 1.2})
     steeper = math.atan(1.44 * math.tan(liquid))
     assert process_scene(faster).deck.gravity_direction[1] == pytest.approx(math.sin(steeper))
-    assert tip_of(faster) == pytest.approx(2 * D, rel=0.01)
+    assert tip_of(faster) == pytest.approx(BELOW, rel=0.01)
 
 
 def test_a_bowl_that_turns_below_a_moving_workpiece(cut: Made) -> None:

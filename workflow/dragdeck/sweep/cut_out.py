@@ -32,18 +32,20 @@ from dragdeck.study.paths.line import LinePath
 from dragdeck.study.paths.path import AroundBowl
 
 SIDE_DIAMETERS, SIDE_WORKPIECES = 6.0, 4.0
-"""Gap to a side wall, in particle and in workpiece diameters, from which the drag no longer
-depends on it (+-13 %)."""
+"""Gap to a side wall, in particle and in workpiece diameters, from which the drag no longer depends
+on it (+-13 %)."""
 
 AHEAD_DIAMETERS, AHEAD_HEIGHTS = 14.0, 1.7
 """Distance of the workpiece's axis from the end wall, in particle diameters and heights of the
 bed, above which it raises the drag by less than 10 %."""
 
-BELOW_DIAMETERS, TRANSIENT_DIAMETERS = 2.0, 12.0
-"""Bed below the tip; and path until the drag is steady at 1 m/s and more."""
+BELOW_DIAMETERS, TRANSIENT_DIAMETERS = 4.0, 12.0
+"""Bed below the tip, with 2.7 of which the drag was 5 % higher; and path until the drag is steady
+at 1 m/s and more."""
 
-BELOW_LARGER = 4.0
-"""Bed below the tip where larger particles are simulated, too, in the same space for all."""
+LARGEST_FACTOR = 2.0
+"""Gap and bed below hold for the diameters that are simulated. Scenes of several sizes have the
+same space, for particles of up to this factor."""
 
 COUNTED_DIAMETERS = 40.0
 """Longest counted path by default: one of 20 diameters gave the mean drag to about 10 %."""
@@ -145,15 +147,16 @@ def cut_out(study: Study, reach_m: float, low_m: float = 0.0) -> Study:
 def room_in_machine(study: Study, passage: Passage, bed: Bed, reach_m: float, low_m: float) -> Room:
     """The room that the laws ask for, or that of the machine where it has less."""
     diameter, bowl = _diameter(study), study.bowl.container
-    aside = max(SIDE_DIAMETERS * diameter, SIDE_WORKPIECES * 2 * reach_m)
+    larger = study.reduction is not None and study.reduction.coarser is not None
+    simulated = LARGEST_FACTOR * diameter if larger else diameter
+    aside = max(SIDE_DIAMETERS * simulated, SIDE_WORKPIECES * 2 * reach_m)
     tip = bed.surface_m - study.motion.immersion_depth_m - low_m
     heights = np.linspace(tip, bed.surface_m, _HEIGHTS)
     left, right = (
         _free(bowl, passage.places_m, sign * passage.left, heights, reach_m, aside)
         for sign in (1, -1)
     )
-    larger = study.reduction is not None and study.reduction.coarser is not None
-    under = (BELOW_LARGER if larger else BELOW_DIAMETERS) * diameter
+    under = BELOW_DIAMETERS * simulated
     below = _free_below(bowl, passage.places_m, tip, reach_m, under)
     height = study.motion.immersion_depth_m + low_m + below
     ahead = max(AHEAD_DIAMETERS * diameter, AHEAD_HEIGHTS * height)
