@@ -8,8 +8,10 @@ from pathlib import Path
 import pytest
 from audit_decks import DECK, LAW, SPINNING, SQUEEZED, run, without, write
 
-from dragdeck.audit.command import Report, audit
+from dragdeck.audit.command import audit
+from dragdeck.audit.zero_steps import engine_findings
 from dragdeck.cli import main
+from dragdeck.script.flow import read_script
 
 pytestmark = pytest.mark.engine
 
@@ -101,11 +103,8 @@ def test_the_error_of_liggghts_with_its_line(
 def test_a_script_that_reaches_outside_is_not_run(tmp_path: Path) -> None:
     file = write(tmp_path, DECK.replace("run 1\n", "print x append ../x\nrun 1\n"))
     assert audit(file, engine=True, select="DK3") == 0
-    report = Report(file, {}, None, "DK", "")
-    from dragdeck.audit.zero_steps import engine_findings
-
-    (skipped,) = engine_findings(report.script)
-    assert "outside" in str(skipped)
+    (skipped,) = engine_findings(read_script(file))
+    assert "outside" in skipped.name
 
 
 def test_a_script_alone_is_read_without_numpy(tmp_path: Path) -> None:

@@ -55,7 +55,7 @@ def test_variables_loops_branches_and_includes(tmp_path: Path) -> None:
     assert "variable b3 equal 1.5+4" in words(script, "variable")
     assert "variable c equal 1.5" in words(script, "variable")
     assert "variable e equal v_half*4" in words(script, "variable")
-    assert not script.not_followed and not script.undefined and not script.absent
+    assert not script.not_followed and not script.missing
     assert words(followed(tmp_path, FLOW, a="8"), "quit") == ["quit"]
 
 

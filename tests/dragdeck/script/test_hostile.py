@@ -11,6 +11,7 @@ from paths import ROOT
 
 from dragdeck.audit.command import audit
 from dragdeck.errors import InputError
+from dragdeck.script.findings import NOT_APPLIED
 from dragdeck.script.flow import Script, read_script
 from dragdeck.script.rules import script_findings
 
@@ -178,7 +179,7 @@ def test_what_depends_on_an_unknown_condition_is_no_fact(
              for line in DECK.replace("neighbor 0.001", "neighbor 1e-5").split("\n")]  # fmt: skip
     assert "".join(lines).count("then") == 1
     found = {result.rule for result in script_findings(followed(tmp_path, "".join(lines)))
-             if hasattr(result, "message")}  # fmt: skip
+             if result.severity != NOT_APPLIED}  # fmt: skip
     assert rule not in found
 
 
@@ -189,9 +190,9 @@ def test_includes(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     names = ("empty", "binary", "self", "pipe", "none")
     script = followed(tmp_path, "".join(f"include {name}\n" for name in names))
-    assert [name for _, name in script.absent] == ["none"]
+    assert [name for *_, name in script.missing] == ["none"]
     notes = " ".join(script.not_followed)
     assert all(f"include {name}" in notes for name in ("binary", "self", "pipe"))
     moved = followed(tmp_path, "shell cd elsewhere\ninclude none\nread_data none\n")
-    assert not moved.absent and "include none" in " ".join(moved.not_followed)
+    assert not moved.missing and "include none" in " ".join(moved.not_followed)
     assert {result.rule for result in script_findings(moved)} == {"DK105", "DK108"}

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import ClassVar
+from typing import NamedTuple
 
 from dragdeck.errors import InputError, choices
 from dragdeck.files import table_rows
@@ -13,6 +13,8 @@ from dragdeck.script.commands import EngineCommand
 from dragdeck.script.flow import Script
 
 _ACCEPTS = re.compile(r"#\s*dragdeck:\s*ignore((?:[\s,]+DK\d+)+)(.*)")
+NOT_APPLIED = "not applied"
+"""Severity of a rule that could not be applied."""
 
 
 @dataclass(frozen=True)
@@ -33,22 +35,51 @@ def rules() -> Mapping[str, Rule]:
     return {row["id"]: Rule(**row) for row in rows}
 
 
+@cache
+def _messages() -> Mapping[tuple[str, str], str]:
+    """The message of each hit, by rule and name."""
+    rows = table_rows(Path(__file__).with_name("messages.csv"))
+    return {(row["rule"], row["name"]): row["message"] for row in rows}
+
+
+class Hit(NamedTuple):
+    """What a rule says: name of its message, or why it is not applied; numbers and words in it."""
+
+    name: str
+    values: Mapping[str, float | str]
+    command: EngineCommand | None = None
+    severity: str = ""
+
+
+Hits = Iterator[Hit]
+
+
+def hit(
+    name: str, command: EngineCommand | None = None, severity: str = "", **values: float | str
+) -> Hit:
+    """A hit of a rule, at a command."""
+    return Hit(name, values, command, severity)
+
+
+def unknown(why: str) -> Hit:
+    """A rule could not be applied."""
+    return Hit(why, {}, severity=NOT_APPLIED)
+
+
 @dataclass(frozen=True)
 class Finding:
     """What a rule says of a script or a run.
 
     Attributes
     ----------
-    rule : str
-    message : str
-        What is the case here, in one sentence without a full stop.
+    rule, message : str
     file : str
     line : int
         0 if it is about the whole file.
     values : mapping of str to float
-        The numbers of the message.
+        The numbers of the message, which is one sentence without a full stop.
     severity : str
-        That of the rule, unless it is given.
+        That of the rule or of the hit, or `NOT_APPLIED`.
     """
 
     rule: str
@@ -60,32 +91,16 @@ class Finding:
 
     def __str__(self) -> str:
         where = f"{self.file}:{self.line}" if self.line else self.file
-        return f"{where}: {self.rule} {self.graded}: {self.message}"
-
-    @property
-    def graded(self) -> str:
-        """Its severity."""
-        return self.severity or rules()[self.rule].severity
+        return f"{where}: {self.rule} {self.severity}: {self.message}"
 
 
-@dataclass(frozen=True)
-class NotApplied:
-    """A rule that could not be applied, and why."""
-
-    rule: str
-    why: str
-    file: ClassVar[str] = ""
-    line: ClassVar[int] = 0
-
-
-Results = Iterator[Finding | NotApplied]
-
-
-def at(
-    rule: str, command: EngineCommand, message: str, severity: str = "", **values: float
-) -> Finding:
-    """A finding at a command."""
-    return Finding(rule, message, command.file, command.line, values, severity)
+def findings(rule: str, hits: Iterable[Hit], source: str = "") -> Iterator[Finding]:
+    """The hits of a rule, as findings on a script or on another file."""
+    for name, values, command, severity in hits:
+        message = _messages().get((rule, name), "").format(**values) or name
+        file, line = (command.file, command.line) if command else (source, 0)
+        numbers = {key: value for key, value in values.items() if not isinstance(value, str)}
+        yield Finding(rule, message, file, line, numbers, severity or rules()[rule].severity)
 
 
 @dataclass(frozen=True)
@@ -119,11 +134,9 @@ def acceptances(script: Script) -> list[Acceptance]:
                 ids = frozenset(re.findall(r"DK\d+", comment[1]))
                 check_ids(ids, file, number)
                 if not comment[2].strip():
-                    raise InputError(
-                        "a comment that accepts a finding gives no reason",
-                        file=file, line=number, value=comment[0],
-                        remedy=f"write the reason after {' '.join(sorted(ids))}",
-                    )  # fmt: skip
+                    problem = "a comment that accepts a finding gives no reason"
+                    raise InputError(problem, file=file, line=number, value=comment[0],
+                                     remedy=f"write it after {' '.join(sorted(ids))}")  # fmt: skip
                 accepted.append(Acceptance(file, range(number, last + 1), ids))
     return accepted[::-1]
 
@@ -137,22 +150,19 @@ def check_ids(ids: Iterable[str], file: str | None = None, line: int | None = No
 
 
 def without_accepted(
-    findings: Sequence[Finding], script: Script, applied: Iterable[str]
+    every: Sequence[Finding], script: Script, applied: Iterable[str]
 ) -> tuple[list[Finding], list[str]]:
     """The findings that no comment accepts, and notes on comments that accept nothing.
 
-    Parameters
-    ----------
-    findings : sequence of Finding
-    script : Script
-    applied : iterable of str
-        Ids of the rules that were applied: only those can be unused.
+    Only those for a rule whose id is in `applied` can be unused.
     """
     accepted = acceptances(script)
-    left = [f for f in findings if not any(comment.holds(f) for comment in accepted)]
-    notes, known = [], set(applied)
-    for comment in accepted:
-        used = {finding.rule for finding in findings if comment.holds(finding)}
-        for name in sorted((comment.ids & known) - used):
-            notes.append(f"{comment.file}:{comment.lines[0]}: nothing to ignore for {name}")
+    met = [finding for finding in every if finding.severity != NOT_APPLIED]
+    left = [finding for finding in met if not any(comment.holds(finding) for comment in accepted)]
+    notes = [
+        f"{comment.file}:{comment.lines[0]}: nothing to ignore for {name}"
+        for comment in accepted
+        for name in sorted(comment.ids.intersection(applied))
+        if not any(finding.rule == name and comment.holds(finding) for finding in met)
+    ]
     return left, notes
