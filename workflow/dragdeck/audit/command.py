@@ -225,7 +225,7 @@ class Report:
         judged, unused = self.judged
         return {
             "version": 1, "file": str(self.script.file), "dialect": self.facts.dialect,
-            "findings": [{**vars(finding), "remedy": rules()[finding.rule].remedy}
+            "findings": [{**finding._asdict(), "remedy": rules()[finding.rule].remedy}
                          for finding in judged],
             "unused": unused, "known": self.known, "not_followed": [*self.script.not_followed],
             "not_applied": [{"rule": skip.rule, "why": skip.message} for skip in self.skipped],

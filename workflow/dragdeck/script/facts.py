@@ -18,6 +18,7 @@ _SMALLEST_SEED, _LARGEST_SEED = 10_000, 2**31
 _ELSEWHERE = {
     "nve/nonspherical", "check/timestep/bond", "hybrid/gran", "nve/sphere/omp", "gran/omp",
     "mesh/surface/deform", "cfd/coupling/force/implicit/accumulated", "bond/gran",
+    "incremental_history",
 }  # fmt: skip
 _SIZES = {"block": slice(1, 7), "cylinder": slice(2, 7), "sphere": slice(1, 5)}
 """Words of a region that are its sizes."""
@@ -233,7 +234,7 @@ class Facts:
         every = {word for command in self.script.commands for word in command.words}
         if elsewhere := _ELSEWHERE & every:
             return f"PFM or a commercial or bonded fork: {min(elsewhere)}"
-        refused = self.seeds and all(refused for *_, refused in self.seeds)
+        refused = sum(refused for *_, refused in self.seeds) > 1  # 3.8 stops at the first
         return "PFM, or a version before 3.4: seeds that 3.8 refuses" if refused else ""
 
     @cached_property

@@ -1,8 +1,7 @@
 """Findings on a script: rules as a table, where each was met, and comments that accept one."""
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
@@ -17,8 +16,7 @@ NOT_APPLIED = "not applied"
 """Severity of a rule that could not be applied."""
 
 
-@dataclass(frozen=True)
-class Rule:
+class Rule(NamedTuple):
     """A rule: severity ``error`` (results are wrong), ``warning`` or ``note``, and texts."""
 
     id: str
@@ -66,8 +64,7 @@ def unknown(why: str) -> Hit:
     return Hit(why, {}, severity=NOT_APPLIED)
 
 
-@dataclass(frozen=True)
-class Finding:
+class Finding(NamedTuple):
     """What a rule says of a script or a run.
 
     Attributes
@@ -86,7 +83,7 @@ class Finding:
     message: str
     file: str = ""
     line: int = 0
-    values: Mapping[str, float] = field(default_factory=dict)
+    values: Mapping[str, float] = {}
     severity: str = ""
 
     def __str__(self) -> str:
@@ -103,22 +100,21 @@ def findings(rule: str, hits: Iterable[Hit], source: str = "") -> Iterator[Findi
         yield Finding(rule, message, file, line, numbers, severity or rules()[rule].severity)
 
 
-@dataclass(frozen=True)
-class Acceptance:
-    """A comment that accepts findings: on the line of a command, or on a line before it."""
+class Acceptance(NamedTuple):
+    """A comment that accepts a finding: on the line of a command, or on a line before it."""
 
     file: str
     lines: range
-    ids: frozenset[str]
+    rule: str
 
     def holds(self, finding: Finding) -> bool:
         """Whether it accepts a finding; those from dumps have no line."""
         there = finding.file == self.file and finding.line in self.lines
-        return finding.rule in self.ids and (there or finding.rule >= "DK2")
+        return finding.rule == self.rule and (there or finding.rule >= "DK2")
 
 
 def acceptances(script: Script) -> list[Acceptance]:
-    """Comments ``# dragdeck: ignore ID REASON`` of a script.
+    """Comments ``# dragdeck: ignore ID REASON`` of a script, by id.
 
     Raises
     ------
@@ -131,14 +127,14 @@ def acceptances(script: Script) -> list[Acceptance]:
         for number, line in reversed([*enumerate(text.split("\n"), start=1)]):
             last = last if last and line.lstrip().startswith("#") else number
             if comment := _ACCEPTS.search(line):
-                ids = frozenset(re.findall(r"DK\d+", comment[1]))
+                ids = sorted({*re.findall(r"DK\d+", comment[1])})
                 check_ids(ids, file, number)
                 if not comment[2].strip():
                     problem = "a comment that accepts a finding gives no reason"
                     raise InputError(problem, file=file, line=number, value=comment[0],
-                                     remedy=f"write it after {' '.join(sorted(ids))}")  # fmt: skip
-                accepted.append(Acceptance(file, range(number, last + 1), ids))
-    return accepted[::-1]
+                                     remedy=f"write it after {ids[-1]}")  # fmt: skip
+                accepted += [Acceptance(file, range(number, last + 1), rule) for rule in ids]
+    return accepted
 
 
 def check_ids(ids: Iterable[str], file: str | None = None, line: int | None = None) -> None:
@@ -150,19 +146,21 @@ def check_ids(ids: Iterable[str], file: str | None = None, line: int | None = No
 
 
 def without_accepted(
-    every: Sequence[Finding], script: Script, applied: Iterable[str]
+    every: Iterable[Finding], script: Script, applied: Collection[str]
 ) -> tuple[list[Finding], list[str]]:
     """The findings that no comment accepts, and notes on comments that accept nothing.
 
     Only those for a rule whose id is in `applied` can be unused.
     """
-    accepted = acceptances(script)
-    met = [finding for finding in every if finding.severity != NOT_APPLIED]
-    left = [finding for finding in met if not any(comment.holds(finding) for comment in accepted)]
-    notes = [
-        f"{comment.file}:{comment.lines[0]}: nothing to ignore for {name}"
+    accepted, used = acceptances(script), set[Acceptance]()
+    left = []
+    for finding in every:
+        holding = [comment for comment in accepted if comment.holds(finding)]
+        used.update(holding)
+        if not holding and finding.severity != NOT_APPLIED:
+            left.append(finding)
+    return left, [
+        f"{comment.file}:{comment.lines[0]}: nothing to ignore for {comment.rule}"
         for comment in accepted
-        for name in sorted(comment.ids.intersection(applied))
-        if not any(finding.rule == name and comment.holds(finding) for finding in met)
+        if comment.rule in applied and comment not in used
     ]
-    return left, notes

@@ -172,9 +172,9 @@ class _Reader:
     def follow(self, file: str) -> None:
         """Execute a script, and say which variables nothing defines."""
         self._file(file, "")
-        defined = re.findall(r"\bvariable\s+(\w+)", "\n".join(self.script.texts.values()))
-        for name in self.undefined.keys() - defined:
-            self.script.missing.append((self.undefined[name], "variable", name))
+        defined = {*re.findall(r"\bvariable\s+(\w+)", "\n".join(self.script.texts.values()))}
+        undefined = [name for name in self.undefined if name not in defined]
+        self.script.missing += [(self.undefined[name], "variable", name) for name in undefined]
 
     def _file(self, name: str, label: str) -> None:
         lines, labels = _lines(self.script.texts[name])

@@ -5,6 +5,7 @@ import os.path
 from collections.abc import Callable, Mapping
 from itertools import combinations
 
+from dragdeck.physics.run_limits import ENGINE_HARD_PA, ENGINE_SOFTEST_PA
 from dragdeck.script.commands import names_read
 from dragdeck.script.facts import Facts, Fix, as_number, as_numbers
 from dragdeck.script.findings import Finding, Hits, findings, hit, unknown
@@ -32,6 +33,10 @@ _NEEDS = {
     "cohesionEnergyDensity": ("cohesion", ("easo/capillary/viscous", "washino/capillary/viscous")),
 }
 """Properties with the keyword that they need, and models of it that do not read them."""
+
+
+_AMOUNTS = ("nparticles", "particles_in_region", "mass", "mass_in_region", "volumefraction_region")
+"""Keywords of an insertion that say how much."""
 
 
 def script_findings(script: Script) -> list[Finding]:
@@ -99,34 +104,50 @@ def _empty_grid(facts: Facts) -> Hits:
         return
     size = (2 * max(facts.radii) + skin) / 2
     bins = math.prod((high - low) / size for low, high in facts.box.bounds) if size > 0 else 0.0
-    particles = sum(as_numbers(
-        [fix.word("nparticles") or fix.word("particles_in_region")
-         for fix in facts.styled("insert/")]) or ())  # fmt: skip
-    if bins > _MOST_BINS and bins > _BINS_PER_PARTICLE * particles:
-        count = f" for {particles:,.0f} particles" if particles else ""
+    counts = [_inserted(facts, fix) for fix in facts.styled("insert/")]
+    particles = sum(count for count in counts if count is not None)
+    if bins > _MOST_BINS and None in counts:
+        yield unknown("the number of particles")
+    elif bins > _MOST_BINS and bins > _BINS_PER_PARTICLE * particles:
         gigabytes, command = bins * _BYTES_PER_BIN / 1e9, next(facts.named("create_box"))
-        yield hit("box", command, bins=bins, particles=count, gigabytes=gigabytes)
+        yield hit("box", command, bins=bins, particles=particles, gigabytes=gigabytes)
 
 
 def _too_dense(facts: Facts) -> Hits:
+    """Spheres that are to be inserted at once; what comes in portions has time to settle."""
     for fix in facts.styled("insert/pack"):
-        if fix.word("overlapcheck") == "no":
+        if fix.word("overlapcheck") == "no" or fix.word("insert_every") not in ("", "once"):
             continue
-        once = fix.word("insert_every") == "once"
-        count = fix.word("particles_in_region") or (fix.word("nparticles") if once else "")
-        fraction, particles = fix.number("volumefraction_region"), as_number(count)
-        region = facts.regions.get(fix.word("region"))
-        if fraction is None and region and region.volume and facts.radii and particles is not None:
-            fraction = particles * 4 / 3 * math.pi * min(facts.radii) ** 3 / region.volume
+        count, region = _inserted(facts, fix), facts.regions.get(fix.word("region"))
+        fraction = fix.number("volumefraction_region")
+        if fraction is None and count is not None and region and region.volume and facts.radii:
+            fraction = count * 4 / 3 * math.pi * min(facts.radii) ** 3 / region.volume
         if fraction is None:
-            yield unknown(f"radius or region of the insertion {fix.id}")
+            yield unknown(f"radius, density or region of the insertion {fix.id}")
         elif fraction > _RANDOM_FRACTION:
             yield hit("region", fix.command, fix=fix.id, solid_fraction=fraction)
 
 
-def _refused_value(facts: Facts) -> Hits:
-    from dragdeck.physics.contact_mechanics import ENGINE_HARD_PA, ENGINE_SOFTEST_PA
+def _inserted(facts: Facts, fix: Fix) -> float | None:
+    """How many spheres, of the smallest template, an insertion asks for; None if not known."""
+    amounts = {name: fix.number(name) for name in _AMOUNTS if name in fix.words}
+    volume = 4 / 3 * math.pi * min(facts.radii or [math.nan]) ** 3
+    region = facts.regions.get(fix.word("region"))
+    densities = [as_number("".join(template.after("density", 2)[1:]))
+                 for template in facts.styled("particletemplate/")]  # fmt: skip
+    mass = volume * min([density or math.nan for density in densities], default=math.nan)
+    units = {
+        "mass": mass,
+        "mass_in_region": mass,
+        "volumefraction_region": volume / region.volume if region and region.volume else math.nan,
+    }
+    for name, amount in amounts.items():
+        count = (amount or math.nan) / (units.get(name, 1.0) or math.nan)
+        return None if math.isnan(count) else count
+    return None
 
+
+def _refused_value(facts: Facts) -> Hits:
     if facts.dialect:
         yield unknown(f"the script is for {facts.dialect}")
         return
@@ -155,8 +176,10 @@ def _refused_value(facts: Facts) -> Hits:
 def _absent(facts: Facts) -> Hits:
     """Variables that nothing defines, and files that are not there."""
     script = facts.script
-    for command, kind, name in script.missing:
-        yield hit(kind, command, what=name)
+    for kind in ("variable", "script"):
+        missing = [(command, name) for command, of_kind, name in script.missing if of_kind == kind]
+        for command, _ in missing[:1]:
+            yield hit(kind, command, what=", ".join(name for _, name in missing))
     read = {name: command for command in script.commands for name in names_read(command.words)}
     written = {w for c in script.commands if not names_read(c.words) for w in c.words}
     if read and script.changes_files:
