@@ -10,6 +10,7 @@ import yaml
 from paths import DATA
 
 from dragdeck.engine.process import find_engine, plain_command
+from dragdeck.script.flow import Script, read_script
 
 FOLDER = DATA / "audit"
 LAW = "hertz tangential history"
@@ -47,6 +48,18 @@ def write(folder: Path, text: str = DECK) -> Path:
     file = folder / "in.deck"
     file.write_text(text)
     return file
+
+
+def followed(folder: Path, text: str, **variables: str) -> Script:
+    """A script that has been followed."""
+    (folder / "in.deck").write_text(text)
+    values = {name: [value] for name, value in variables.items()}
+    return read_script(folder / "in.deck", values)
+
+
+def words_of(script: Script, *names: str) -> list[str]:
+    """The commands of these names, with the values of variables."""
+    return [" ".join(c.words) for c in script.commands if c.words[0] in names]
 
 
 def run(folder: Path, text: str = DECK) -> Path:

@@ -31,7 +31,9 @@ def test_a_rule_hits_or_does_not(tmp_path: Path, case: dict[str, Any]) -> None:
 
 
 def test_every_rule_on_scripts_has_a_case() -> None:
-    assert {rule for rule in rules() if rule < "DK2"} == {rule for c in CASES for rule in c["finds"]}
+    assert {rule for rule in rules() if rule < "DK2"} == {
+        rule for c in CASES for rule in c["finds"]
+    }
 
 
 def test_comments_accept_findings_and_unused_ones_are_noted(tmp_path: Path) -> None:

@@ -196,6 +196,17 @@ class Facts:
         return None if others else values or None
 
     @cached_property
+    def sphere_m3(self) -> float:
+        """Volume of the smallest template; NaN if not known."""
+        return 4 / 3 * math.pi * min(self.radii or [math.nan]) ** 3 or math.nan
+
+    @cached_property
+    def density_kg_m3(self) -> float:
+        """Smallest density of a template; NaN if not known."""
+        words = ["".join(fix.after("density", 2)[1:]) for fix in self.styled("particletemplate/")]
+        return min(as_numbers(words) or [math.nan]) or math.nan
+
+    @cached_property
     def regions(self) -> dict[str, Region | None]:
         """Blocks, cylinders and spheres by their names; None for one that is not known."""
         commands: dict[str, list[EngineCommand]] = {}

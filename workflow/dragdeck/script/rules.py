@@ -35,10 +35,6 @@ _NEEDS = {
 """Properties with the keyword that they need, and models of it that do not read them."""
 
 
-_AMOUNTS = ("nparticles", "particles_in_region", "mass", "mass_in_region", "volumefraction_region")
-"""Keywords of an insertion that say how much."""
-
-
 def script_findings(script: Script) -> list[Finding]:
     """What the rules DK101 to DK112 say of a script, in the order of its lines."""
     facts = Facts(script)
@@ -104,9 +100,9 @@ def _empty_grid(facts: Facts) -> Hits:
         return
     size = (2 * max(facts.radii) + skin) / 2
     bins = math.prod((high - low) / size for low, high in facts.box.bounds) if size > 0 else 0.0
-    counts = [_inserted(facts, fix) for fix in facts.styled("insert/")]
-    particles = sum(count for count in counts if count is not None)
-    if bins > _MOST_BINS and None in counts:
+    asked_m3 = sum(_asked_m3(facts, fix) for fix in facts.styled("insert/"))
+    particles = asked_m3 / facts.sphere_m3
+    if bins > _MOST_BINS and math.isnan(particles):
         yield unknown("the number of particles")
     elif bins > _MOST_BINS and bins > _BINS_PER_PARTICLE * particles:
         gigabytes, command = bins * _BYTES_PER_BIN / 1e9, next(facts.named("create_box"))
@@ -118,33 +114,27 @@ def _too_dense(facts: Facts) -> Hits:
     for fix in facts.styled("insert/pack"):
         if fix.word("overlapcheck") == "no" or fix.word("insert_every") not in ("", "once"):
             continue
-        count, region = _inserted(facts, fix), facts.regions.get(fix.word("region"))
-        fraction = fix.number("volumefraction_region")
-        if fraction is None and count is not None and region and region.volume and facts.radii:
-            fraction = count * 4 / 3 * math.pi * min(facts.radii) ** 3 / region.volume
+        region, fraction = (
+            facts.regions.get(fix.word("region")),
+            fix.number("volumefraction_region"),
+        )
         if fraction is None:
+            fraction = _asked_m3(facts, fix) / ((region and region.volume) or math.nan)
+        if math.isnan(fraction):
             yield unknown(f"radius, density or region of the insertion {fix.id}")
         elif fraction > _RANDOM_FRACTION:
             yield hit("region", fix.command, fix=fix.id, solid_fraction=fraction)
 
 
-def _inserted(facts: Facts, fix: Fix) -> float | None:
-    """How many spheres, of the smallest template, an insertion asks for; None if not known."""
-    amounts = {name: fix.number(name) for name in _AMOUNTS if name in fix.words}
-    volume = 4 / 3 * math.pi * min(facts.radii or [math.nan]) ** 3
-    region = facts.regions.get(fix.word("region"))
-    densities = [as_number("".join(template.after("density", 2)[1:]))
-                 for template in facts.styled("particletemplate/")]  # fmt: skip
-    mass = volume * min([density or math.nan for density in densities], default=math.nan)
-    units = {
-        "mass": mass,
-        "mass_in_region": mass,
-        "volumefraction_region": volume / region.volume if region and region.volume else math.nan,
-    }
-    for name, amount in amounts.items():
-        count = (amount or math.nan) / (units.get(name, 1.0) or math.nan)
-        return None if math.isnan(count) else count
-    return None
+def _asked_m3(facts: Facts, fix: Fix) -> float:
+    """Volume of the spheres, of the smallest template, that an insertion asks for; NaN: unknown."""
+    sphere_m3, region = facts.sphere_m3, facts.regions.get(fix.word("region"))
+    units = {"nparticles": sphere_m3, "particles_in_region": sphere_m3,
+             "mass": 1 / facts.density_kg_m3, "mass_in_region": 1 / facts.density_kg_m3,
+             "volumefraction_region": region.volume if region else math.nan}  # fmt: skip
+    for name in (name for name in units if name in fix.words):
+        return (fix.number(name) or math.nan) * units[name]
+    return math.nan
 
 
 def _refused_value(facts: Facts) -> Hits:
