@@ -136,17 +136,21 @@ class Report:
         pair = next(pairs, None)
         if pair is not None and not {*columns} <= pair.columns.keys():
             pair, columns = None, []
+        lacking: set[str] = set()
         for frame in self._frames(dump):
-            lacking = {"id", "x", "y", "z"} - frame.columns.keys()
-            if lacking or not {"radius", "diameter"} & frame.columns.keys():
-                names = ", ".join(sorted(lacking)) or "radius"
-                self.add(findings("DK201", [unknown(f"{source} has no column {names}")]))
-                return
+            columns_there = {"radius" if name == "diameter" else name for name in frame.columns}
+            lacking = {"id", "x", "y", "z", "radius"} - columns_there
+            if lacking:
+                continue  # another dump, of contacts for example
             run.add(frame)
             while pair is not None and pair.step < frame.step:
                 pair = next(pairs, None)
             if pair is not None and pair.step == frame.step:
                 run.add_contacts(pair, columns[:2], columns[2:])
+        if not run.frames:
+            names = ", ".join(sorted(lacking)) or "frame"
+            self.add(findings("DK201", [unknown(f"{source} has no {names}")]))
+            return
         run.left_out = self._left_out(dump)
         for rule, measure in RULES.items():
             self.add(findings(rule, measure(run), source), rule)
@@ -162,7 +166,9 @@ class Report:
         """The frames of all files, in the order of the numbers in their names."""
         from dragdeck.dumps.reader import dump_files, layout_of, read_frames
 
-        files = [file for pattern in patterns for file in dump_files(pattern)]
+        named = [(sorted(Path(pattern).parent.glob(Path(pattern).name)), pattern)
+                 for pattern in patterns]  # fmt: skip
+        files = [file for there, pattern in named for file in there or dump_files(pattern)]
         for file in sorted(files, key=lambda file: [*map(int, re.findall(r"\d+", file.name))]):
             words = self._dump_of(file.name) if ".bin" in file.suffixes[-2:] else []
             yield from read_frames([file], layout_of(file, words[6:] or None))

@@ -145,7 +145,8 @@ def _refused_value(facts: Facts) -> Hits:
     soft = 0.0 if "soft_particles" in yes else ENGINE_SOFTEST_PA
     hard = math.inf if "hard_particles" in yes else ENGINE_HARD_PA
     limits = {"coefficientRestitution": (math.nextafter(0.05, 1), 1.0)}
-    if facts.last("units")[:1] == ["si"]:
+    models = {law.word("model") for law in (*facts.laws, *facts.walls)}
+    if facts.last("units")[:1] == ["si"] and not all(m.endswith("/stiffness") for m in models):
         limits["youngsModulus"] = soft, hard
     for fix, seed, refused in facts.seeds:
         if refused:
