@@ -114,6 +114,15 @@ def test_rows_that_have_diverged_are_counted_and_left_out(
     assert (values["rows"], values["missing"]) == (1, 1)
 
 
+def test_a_second_dump_of_a_group_is_left_out(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    dump(tmp_path, rows(REST), rows(REST), rows(REST))
+    dump(tmp_path, rows(REST[:1]), rows(REST[:1]), name="upper")
+    document = report(tmp_path, capsys, "--dump", str(tmp_path / "post" / "*.dump"))
+    assert hits(document) == {} and document["known"]["frames left out"] == 2
+
+
 def test_types_and_columns_that_the_script_does_not_have(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -90,6 +90,11 @@ def rule_text(id: str) -> str:
     )
 
 
+def _order(file: Path) -> tuple[str, list[int]]:
+    """The name of a file without its numbers, and these."""
+    return re.sub(r"\d+", "", file.name), [*map(int, re.findall(r"\d+", file.name))]
+
+
 class Report:
     """The findings on a script and a run.
 
@@ -136,12 +141,14 @@ class Report:
         pair = next(pairs, None)
         if pair is not None and not {*columns} <= pair.columns.keys():
             pair, columns = None, []
-        lacking: set[str] = set()
+        lacking, step, left_out = set[str](), -1, 0
         for frame in self._frames(dump):
             columns_there = {"radius" if name == "diameter" else name for name in frame.columns}
             lacking = {"id", "x", "y", "z", "radius"} - columns_there
-            if lacking:
-                continue  # another dump, of contacts for example
+            if lacking or frame.step <= step:  # another dump, of contacts or of a group
+                left_out += 1
+                continue
+            step = frame.step
             run.add(frame)
             while pair is not None and pair.step < frame.step:
                 pair = next(pairs, None)
@@ -154,7 +161,7 @@ class Report:
         run.left_out = self._left_out(dump)
         for rule, measure in RULES.items():
             self.add(findings(rule, measure(run), source), rule)
-        self.known |= run.known
+        self.known |= run.known | ({"frames left out": left_out} if left_out else {})
         if contacts and not columns:
             why = "no compute pair/gran/local with id and force, or other columns in its dump"
             self.add(findings("DK207", [unknown(why)]))
@@ -163,13 +170,14 @@ class Report:
             self.known["contacts above Coulomb's limit"] = f"{run.n_beyond} of {run.n_contacts}"
 
     def _frames(self, patterns: Sequence[str]) -> "Iterator[Frame]":
-        """The frames of all files, in the order of the numbers in their names."""
+        """The frames of all files, in the order of their names and of the numbers in these."""
         from dragdeck.dumps.reader import dump_files, layout_of, read_frames
 
-        named = [(sorted(Path(pattern).parent.glob(Path(pattern).name)), pattern)
-                 for pattern in patterns]  # fmt: skip
-        files = [file for there, pattern in named for file in there or dump_files(pattern)]
-        for file in sorted(files, key=lambda file: [*map(int, re.findall(r"\d+", file.name))]):
+        files: list[Path] = []
+        for pattern in patterns:
+            matching = [*Path(pattern).parent.glob(Path(pattern).name)] or dump_files(pattern)
+            files += sorted(matching, key=_order)
+        for file in files:
             words = self._dump_of(file.name) if ".bin" in file.suffixes[-2:] else []
             yield from read_frames([file], layout_of(file, words[6:] or None))
 
