@@ -15,8 +15,8 @@ from dragdeck.script.facts import Facts
 from dragdeck.script.findings import (
     NOT_APPLIED,
     Finding,
+    as_findings,
     check_ids,
-    findings,
     rules,
     unknown,
     without_accepted,
@@ -67,7 +67,7 @@ def audit(
         if engine:
             from dragdeck.audit.zero_steps import engine_findings
 
-            report.add(findings("DK300", engine_findings(followed)), "DK3")
+            report.add(as_findings("DK300", engine_findings(followed)), "DK3")
         if dump:
             report.add_dumps(dump, contacts)
         if log is not None:
@@ -128,7 +128,7 @@ class Report:
         if log.last is not None:
             self.known |= {"inserted or there": log.expected, "at the end": log.last}
         hits = {"DK208": log.warnings(), "DK206": log.rest(), "DK203": log.balance()}
-        self.add((each for rule in hits for each in findings(rule, hits[rule], str(file))),
+        self.add((each for rule in hits for each in as_findings(rule, hits[rule], str(file))),
                  "DK203", "DK208")  # fmt: skip
 
     def add_dumps(self, dump: Sequence[str], contacts: Sequence[str]) -> None:
@@ -156,17 +156,17 @@ class Report:
                 run.add_contacts(pair, columns[:2], columns[2:])
         if not run.frames:
             names = ", ".join(sorted(lacking)) or "frame"
-            self.add(findings("DK201", [unknown(f"{source} has no {names}")]))
+            self.add(as_findings("DK201", [unknown(f"{source} has no {names}")]))
             return
         run.left_out = self._left_out(dump)
         for rule, measure in RULES.items():
-            self.add(findings(rule, measure(run), source), rule)
+            self.add(as_findings(rule, measure(run), source), rule)
         self.known |= run.known | ({"frames left out": left_out} if left_out else {})
         if contacts and not columns:
             why = "no compute pair/gran/local with id and force, or other columns in its dump"
-            self.add(findings("DK207", [unknown(why)]))
+            self.add(as_findings("DK207", [unknown(why)]))
         elif contacts:
-            self.add(findings("DK207", run.limited(), ", ".join(contacts)), "DK207")
+            self.add(as_findings("DK207", run.limited(), ", ".join(contacts)), "DK207")
             self.known["contacts above Coulomb's limit"] = f"{run.n_beyond} of {run.n_contacts}"
 
     def _frames(self, patterns: Sequence[str]) -> "Iterator[Frame]":

@@ -36,7 +36,7 @@ def radii_of(frame: Frame) -> Floats:
     return frame.vectors("diameter")[:, 0] / 2 if diameter else frame.vectors("radius")[:, 0]
 
 
-class Materials:
+class ScriptMaterials:
     """What a script says of its materials.
 
     Attributes

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dragdeck.arrays import Floats, Ints
-from dragdeck.audit.materials import Materials, radii_of, types_of
+from dragdeck.audit.materials import ScriptMaterials, radii_of, types_of
 from dragdeck.audit.walls import WallAtStep, Walls, speeds
 from dragdeck.dumps.frame import Frame
 from dragdeck.physics.contact_mechanics import network_number, touching
@@ -45,15 +45,11 @@ _LARGEST, _SMALLEST = 2.0**53, 1e-12
 """Limits of the numbers in a dump, and of radii: what is beyond has diverged."""
 
 
-class Extreme(NamedTuple):
-    """A largest value, where it is, and the step."""
-
-    value: float = 0.0
-    what: str = ""
-    step: int = 0
+Extreme = tuple[float, str, int]
+"""A largest value, where it is, and the step."""
 
 
-class Scene(NamedTuple):
+class MeasuredFrame(NamedTuple):
     """A frame with its particles, the walls at its step, and the contacts of all these."""
 
     frame: Frame
@@ -82,8 +78,9 @@ class Measures:
     """
 
     def __init__(self, facts: Facts) -> None:
-        self.facts, self.walls, self.materials = facts, Walls(facts), Materials(facts)
-        self.overlap, self.speed = Extreme(), Extreme()
+        self.facts, self.walls, self.materials = facts, Walls(facts), ScriptMaterials(facts)
+        self.overlap: Extreme = 0.0, "", 0
+        self.speed: Extreme = 0.0, "", 0
         self.energies: list[tuple[float, float]] = []
         self.numbers: list[float | None] = []
         self.ids, self.last_ids = set[int](), set[int]()
@@ -93,22 +90,19 @@ class Measures:
         self.frames = self.n_unsound = self.n_contacts = self.n_beyond = 0
         self.every, self.first_speed = 1, 0.0
         self.force_sums = np.zeros(4)
-        self.last: Scene | None = None
+        self.last: MeasuredFrame | None = None
         self.left_out = ""
 
     @property
     def known(self) -> dict[str, float | str]:
         """Numbers for every report."""
-        known: dict[str, float | str] = {
-            "frames": self.frames, "contacts of": self.scope,
-            "largest overlap over radius": self.overlap.value,
-            "largest speed, m/s": self.speed.value,
+        last = [mean for mean, _ in self.energies[-1:]]
+        known: dict[str, float | str | None] = {
+            "frames": self.frames, "contacts of": self.scope, "largest speed, m/s": self.speed[0],
+            "largest overlap over radius": self.overlap[0], "stability number": self.stability,
+            "mean kinetic energy in the last frame, J/kg": last[0] if last else None,
         }  # fmt: skip
-        if self.stability is not None:
-            known["stability number"] = self.stability
-        for mean, _ in self.energies[-1:]:
-            known["mean kinetic energy in the last frame, J/kg"] = mean
-        return known
+        return {name: value for name, value in known.items() if value is not None}
 
     @property
     def scope(self) -> str:
@@ -137,7 +131,7 @@ class Measures:
         centre, radius = frame.vectors(*_PLACE), radii_of(frame)
         walls = self.walls.at(frame.step, float(radius.max()))
         contacts = touching(centre, radius, *([wall] for wall in walls))
-        self.last = scene = Scene(frame, centre, radius, walls, contacts)
+        self.last = scene = MeasuredFrame(frame, centre, radius, walls, contacts)
         self.bounds = np.stack([np.minimum(self.bounds[0], centre.min(axis=0)),
                                 np.maximum(self.bounds[1], centre.max(axis=0))])  # fmt: skip
         self._add_overlap(scene)
@@ -149,17 +143,17 @@ class Measures:
             if len(self.numbers) > 2 * _FRAMES:
                 self.numbers, self.every = self.numbers[::2], 2 * self.every
 
-    def _add_overlap(self, scene: Scene) -> None:
+    def _add_overlap(self, scene: MeasuredFrame) -> None:
         (first, second), _, overlap = scene.contacts
         radii = np.append(scene.radius, np.full(len(scene.walls), np.inf))
         fractions = overlap / np.minimum(radii[first], radii[second])
-        if len(fractions) and fractions.max() > self.overlap.value:
+        if len(fractions) and fractions.max() > self.overlap[0]:
             at = int(fractions.argmax())
             ids = [*scene.frame.ids("id").tolist(), *(f"a wall, {w.name}" for w in scene.walls)]
             pair = f"particle {ids[first[at]]} with {ids[second[at]]}"
-            self.overlap = Extreme(float(fractions[at]), pair, scene.frame.step)
+            self.overlap = float(fractions[at]), pair, scene.frame.step
 
-    def _add_sides(self, scene: Scene, before: set[int]) -> None:
+    def _add_sides(self, scene: MeasuredFrame, before: set[int]) -> None:
         """Particles that were on the other side of a plane or cylinder in the frame before."""
         ids, below = scene.frame.ids("id"), {}
         for wall in scene.walls if "p" not in "".join(self.facts.last("boundary")) else ():
@@ -169,20 +163,20 @@ class Measures:
                 self.through.setdefault(wall.name, set()).update(crossed)
         self.below = below
 
-    def _add_speed(self, scene: Scene) -> None:
+    def _add_speed(self, scene: MeasuredFrame) -> None:
         speed = np.linalg.norm(scene.frame.vectors(*_VELOCITY), axis=1)
         fastest = int(speed.argmax())
         if self.frames == 1:
             self.first_speed = float(speed[fastest])
-        if speed[fastest] > self.speed.value:
+        if speed[fastest] > self.speed[0]:
             particle = f"particle {scene.frame.ids('id')[fastest]}"
-            self.speed = Extreme(float(speed[fastest]), particle, scene.frame.step)
+            self.speed = float(speed[fastest]), particle, scene.frame.step
         weight = scene.radius**3 / (scene.radius**3).sum()
         unit = math.hypot(*self.facts.gravity or ()) * 2 * scene.radius
         energy = 0.5 * speed**2 + _of_spin(scene)
         self.energies.append((float(weight @ energy), float(weight @ unit)))
 
-    def _stability(self, scene: Scene) -> float | None:
+    def _stability(self, scene: MeasuredFrame) -> float | None:
         mass, step_s = self.materials.masses(scene.frame), self.facts.timestep_s
         types = np.append(types_of(scene.frame), [wall.type for wall in scene.walls])
         types = types.astype(np.int64)
@@ -222,7 +216,7 @@ class Measures:
         if {*_FORCE} <= frame.columns.keys() and not self.walls.unknown and mass is not None:
             self._add_closure(self.last, pair, force, mass[:, None] * np.array(gravity or np.nan))
 
-    def _add_closure(self, scene: Scene, pair: Ints, force: Floats, totals: Floats) -> None:
+    def _add_closure(self, scene: MeasuredFrame, pair: Ints, force: Floats, totals: Floats) -> None:
         """Add forces of particles without a wall: errors of their sums, and magnitudes."""
         count, (first, second) = len(totals), scene.contacts[0]
         magnitudes = np.zeros(count)
@@ -238,7 +232,7 @@ class Measures:
         """Overlaps beyond the range of the contact law (DK201)."""
         if is_clumped(self.facts):
             yield unknown("particles are clumps, whose spheres overlap")
-        elif self.overlap.value > _MOST_OVERLAP:
+        elif self.overlap[0] > _MOST_OVERLAP:
             overlap, what, step = self.overlap
             yield hit("overlap", overlap=overlap, what=what, step=step)
 
@@ -258,7 +252,7 @@ class Measures:
         limit = thrown_speed(size, height, speed)
         energy = run_limits(len(self.ids), 1.0, size, height, speed).mean_kinetic_energy_j
         mean = max(mean for mean, _ in self.energies)
-        if self.speed.value > limit > 0:
+        if self.speed[0] > limit > 0:
             fastest, what, step = self.speed
             yield hit("speed", speed_m_s=fastest, what=what, step=step, limit_m_s=limit)
         elif mean > energy > 0:
@@ -366,7 +360,7 @@ def is_driven(facts: Facts) -> bool:
     )  # fmt: skip
 
 
-def _of_spin(scene: Scene) -> Floats:
+def _of_spin(scene: MeasuredFrame) -> Floats:
     """Energy of rotation over mass, (N,), J/kg; 0 without spins."""
     if not {*_SPIN} <= scene.frame.columns.keys():
         return np.zeros(scene.frame.rows)

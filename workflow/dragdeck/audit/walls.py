@@ -139,7 +139,7 @@ def _turned(points: Floats, axis: Sequence[float], angle: float) -> Floats:
 def _place(facts: Facts, mesh: str) -> Place | None:
     """Where a mesh is; None where its motion cannot be followed."""
     motions = [fix for fix in facts.present("move/mesh") if mesh in fix.words]
-    acts = sorted(((*_span(facts, fix), motion_of(fix, facts.timestep_s)) for fix in motions),
+    acts = sorted(((*_span(facts, fix), _motion(fix, facts.timestep_s)) for fix in motions),
                   key=lambda act: act[:2])  # fmt: skip
     apart = all(first[1] <= second[0] for first, second in pairwise(acts))
     if not apart or any(act is None or math.isnan(begin) for begin, _, act in acts):
@@ -153,7 +153,7 @@ def _place(facts: Facts, mesh: str) -> Place | None:
     return place
 
 
-def motion_of(motion: Fix, timestep_s: float | None) -> Place | None:
+def _motion(motion: Fix, timestep_s: float | None) -> Place | None:
     """Points after so many steps of a motion; None where it cannot be followed."""
     kind, period = "".join(motion.words[3:4]), motion.number("period")
     way = motion.vector("linear") or motion.vector("amplitude")
@@ -187,7 +187,7 @@ def speeds(facts: Facts, bounds_m: Floats) -> Iterator[float | None]:
     """
     corners = np.array(np.meshgrid(*bounds_m.T)).reshape(3, -1).T
     for fix in facts.present(""):
-        style, act = fix.words[0], motion_of(fix, facts.timestep_s)
+        style, act = fix.words[0], _motion(fix, facts.timestep_s)
         if style == "move/mesh" and act and facts.timestep_s:
             away = act(corners, 1.0) - act(corners, 0.0)
             yield float(np.linalg.norm(away, axis=1).max()) / facts.timestep_s

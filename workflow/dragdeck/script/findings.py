@@ -91,7 +91,7 @@ class Finding(NamedTuple):
         return f"{where}: {self.rule} {self.severity}: {self.message}"
 
 
-def findings(rule: str, hits: Iterable[Hit], source: str = "") -> Iterator[Finding]:
+def as_findings(rule: str, hits: Iterable[Hit], source: str = "") -> Iterator[Finding]:
     """The hits of a rule, as findings on a script or on another file."""
     for name, values, command, severity in hits:
         message = _messages().get((rule, name), "").format(**values) or name

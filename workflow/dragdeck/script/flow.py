@@ -140,7 +140,7 @@ def script_text(file: Path) -> str:
     elif template := _TEMPLATE.search("\n".join(line for _, line in lines_of(text))):
         problem = f"this is a template, not an input script: {template[0]}"
     if problem:
-        raise InputError(problem, file=file, remedy="give the input script of LIGGGHTS, with all values")
+        raise InputError(problem, file=file, remedy="give the input script, with all values")
     return text
 
 

@@ -8,7 +8,7 @@ from itertools import combinations
 from dragdeck.physics.run_limits import ENGINE_HARD_PA, ENGINE_SOFTEST_PA
 from dragdeck.script.commands import names_read
 from dragdeck.script.facts import Facts, Fix, as_number, as_numbers
-from dragdeck.script.findings import Finding, Hits, findings, hit, unknown
+from dragdeck.script.findings import Finding, Hits, as_findings, hit, unknown
 from dragdeck.script.flow import Script
 
 _MOST_BINS = 2e7
@@ -38,7 +38,7 @@ _NEEDS = {
 def script_findings(script: Script) -> list[Finding]:
     """What the rules DK101 to DK112 say of a script, in the order of its lines."""
     facts = Facts(script)
-    results = [each for rule, hits in _RULES.items() for each in findings(rule, hits(facts))]
+    results = [each for rule, hits in _RULES.items() for each in as_findings(rule, hits(facts))]
     order = {file: place for place, file in enumerate([*script.texts, ""])}
     return sorted(results, key=lambda result: (order[result.file], result.line))
 
