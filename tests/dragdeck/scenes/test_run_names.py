@@ -84,7 +84,8 @@ RICH: dict[str, dict[str, Any]] = {
             "kind": "mesh", "file": "hex_bar.stl", "unit": "mm", "axis": "-z",
             "offset_m": [0.0, 0.0005]},
         "workpieces": [{"angle_deg": 0}, {"angle_deg": 120, "shape": {
-            "kind": "cylinder", "radius_m": 0.003, "facet_size_m": 0.002}}, {"angle_deg": 240, "immersion_depth_m": 0.01}],
+            "kind": "cylinder", "radius_m": 0.003, "facet_size_m": 0.002}},
+            {"angle_deg": 240, "immersion_depth_m": 0.01}],
         "bowl.radius_m": 0.05, "bowl.facet_size_m": 0.008,
         "motion.path": {"kind": "circle", "radius_m": 0.02, "revolutions": 1.5, "start_deg": 3},
         "motion.tilt_deg": 4.0, "motion.spin": {"rpm": 60, "ramp_s": 0.02},

@@ -5,58 +5,25 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from audit_decks import FOLDER, cases, followed, words_of
 
 from dragdeck.engine.process import find_engine, plain_command
 from dragdeck.errors import InputError
-from dragdeck.script.flow import Script, read_script
+from dragdeck.script.flow import read_script
 from dragdeck.script.formula import value_of
 
-FLOW = """variable a index 3 4
-variable a index 7
-variable half equal v_a/2
-variable text string 7
-variable n loop 3
-label again
-print "pass"   # a comment
-variable b$n equal ${half}+$(2*(1+1))
-next n
-jump SELF again
-if "${a} == 3" then "print yes" else "quit"
-include more.in
-if "${text} == 8" then "print wrong"
-timestep 1e-5 &
-   # still a comment &
-   print no
-variable d equal dt*2
-variable c equal ${half}
-run 0
-variable now equal step
-if "${now} < 5" then "jump SELF end"
-print skipped
-label end
-print done
-"""
-
-
-def followed(folder: Path, text: str, **variables: str) -> Script:
-    file = folder / "in.deck"
-    file.write_text(text)
-    return read_script(file, {name: [value] for name, value in variables.items()})
-
-
-def words(script: Script, *names: str) -> list[str]:
-    return [" ".join(c.words) for c in script.commands if c.words[0] in names]
+FLOW = (FOLDER / "flow.in").read_text()
 
 
 def test_variables_loops_branches_and_includes(tmp_path: Path) -> None:
     (tmp_path / "more.in").write_text("variable e equal v_half*4\n")
     script = followed(tmp_path, FLOW)
-    assert words(script, "print") == ["print pass"] * 3 + ["print yes", "print done"]
-    assert "variable b3 equal 1.5+4" in words(script, "variable")
-    assert "variable c equal 1.5" in words(script, "variable")
-    assert "variable e equal v_half*4" in words(script, "variable")
-    assert not script.not_followed and not script.undefined and not script.absent
-    assert words(followed(tmp_path, FLOW, a="8"), "quit") == ["quit"]
+    assert words_of(script, "print") == ["print pass"] * 3 + ["print yes", "print done"]
+    assert "variable b3 equal 1.5+4" in words_of(script, "variable")
+    assert "variable c equal 1.5" in words_of(script, "variable")
+    assert "variable e equal v_half*4" in words_of(script, "variable")
+    assert not script.not_followed and not script.missing
+    assert words_of(followed(tmp_path, FLOW, a="8"), "quit") == ["quit"]
 
 
 @pytest.mark.engine
@@ -108,15 +75,7 @@ def test_what_is_no_script_is_refused(tmp_path: Path, content: bytes, problem: s
         read_script(file)
 
 
-@pytest.mark.parametrize(
-    ("formula", "value"),
-    [
-        ("2^3^1", 8), ("-(1+2)*PI", -9.42477796), ("sqrt(16)+ln(1)", 4), ("1e-5*2", 2e-5),
-        ("(1<2)&&!(3==3)", 0), ("ceil(1.2)+floor(-0.5)", 1), ("007+1", 8), ("ke+1", None),
-        ("1/0", None), ("10^10^100", None), ("2^3^2", 64), ("-2^2", 4), ("ke==pe", None),
-        ("f_x[1]", None), ("((", None),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("formula", "value"), cases("formulas"))
 def test_formulas(formula: str, value: float | None) -> None:
     result = value_of(formula, lambda word: 3.14159265 if word == "PI" else None)
     assert result == (None if value is None else pytest.approx(value))

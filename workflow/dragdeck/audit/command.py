@@ -10,18 +10,24 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dragdeck.errors import DragdeckError, InputError
-from dragdeck.script.commands import EngineCommand, words_of
+from dragdeck.script.commands import words_of
 from dragdeck.script.facts import Facts
-from dragdeck.script.findings import Finding, NotApplied, check_ids, rules, without_accepted
-from dragdeck.script.flow import read_script
+from dragdeck.script.findings import (
+    NOT_APPLIED,
+    Finding,
+    as_findings,
+    check_ids,
+    rules,
+    unknown,
+    without_accepted,
+)
+from dragdeck.script.flow import Script, read_script
 from dragdeck.script.rules import script_findings
 
 if TYPE_CHECKING:
     from dragdeck.dumps.frame import Frame
 
 _SEVERITIES = ("error", "warning", "note")
-_OF_CONTACTS = ("pos", "vel")
-"""What `pair/gran/local` writes before ids and forces, six columns each."""
 
 
 def audit(
@@ -51,12 +57,17 @@ def audit(
             return 0
         if script is None:
             raise InputError("no input script is given", remedy="give SCRIPT, or --explain ID")
-        report = Report(script, {name: values for name, *values in var}, after, select, ignore)
-        report.add(script_findings(report.script), "DK1")
+        chosen = [tuple(filter(None, ids.split(","))) for ids in (select, ignore)]
+        check_ids(id for ids in chosen for id in ids)
+        wanted = {id for id in rules() if id.startswith(chosen[0])
+                  and not (chosen[1] and id.startswith(chosen[1]))}  # fmt: skip
+        followed = read_script(script, {name: values for name, *values in var}, after=after)
+        report = Report(followed, wanted, str(after))
+        report.add(script_findings(followed), "DK1")
         if engine:
             from dragdeck.audit.zero_steps import engine_findings
 
-            report.add(engine_findings(report.script), "DK3")
+            report.add(as_findings("DK300", engine_findings(followed)), "DK3")
         if dump:
             report.add_dumps(dump, contacts)
         if log is not None:
@@ -65,7 +76,7 @@ def audit(
     except (DragdeckError, OSError) as error:
         print(f"dragdeck: {error}", file=sys.stderr)
         return 2
-    return int(any(finding.graded != "note" for finding in report.judged[0]))
+    return int(any(finding.severity != "note" for finding in report.judged[0]))
 
 
 def rule_text(id: str) -> str:
@@ -79,50 +90,34 @@ def rule_text(id: str) -> str:
     )
 
 
+def _order(file: Path) -> tuple[str, list[int]]:
+    """The name of a file without its numbers, and these."""
+    return re.sub(r"\d+", "", file.name), [*map(int, re.findall(r"\d+", file.name))]
+
+
 class Report:
     """The findings on a script and a run.
 
     Parameters
     ----------
-    file : Path
-    variables : dict
-        Values of ``-var``.
-    after : Path or None
-        Script of the restart file.
-    select, ignore : str
-        Beginnings of ids, separated by commas.
+    script : Script
+    wanted : set of str
+        Ids of the rules to apply.
+    after : str
+        Script of the restart file, which is not judged.
     """
 
-    def __init__(
-        self,
-        file: Path,
-        variables: dict[str, list[str]],
-        after: Path | None,
-        select: str,
-        ignore: str,
-    ) -> None:
-        chosen = [tuple(filter(None, ids.split(","))) for ids in (select, ignore)]
-        check_ids(id for ids in chosen for id in ids)
-        self.wanted = [id for id in rules() if id.startswith(chosen[0])
-                       and not (chosen[1] and id.startswith(chosen[1]))]  # fmt: skip
-        self.script = read_script(file, variables, after=after)
-        self.facts = Facts(self.script)
-        self.after = str(after)
+    def __init__(self, script: Script, wanted: set[str], after: str = "") -> None:
+        self.script, self.facts, self.wanted, self.after = script, Facts(script), wanted, after
         self.every: list[Finding] = []
-        self.skipped: list[NotApplied] = []
         self.applied: set[str] = set()
         self.known: dict[str, float | str] = {}
 
-    def add(self, results: Iterable[Finding | NotApplied], *ids: str) -> None:
+    def add(self, results: Iterable[Finding], *ids: str) -> None:
         """Add what rules say whose ids begin so."""
-        for result in results:
-            if result.rule not in self.wanted or result.file == self.after:
-                continue
-            if isinstance(result, NotApplied):
-                self.skipped.append(result)
-            else:
-                self.every.append(result)
-        skipped = {skip.rule for skip in self.skipped}
+        added = [each for each in results if each.rule in self.wanted and each.file != self.after]
+        self.every += added
+        skipped = {each.rule for each in added if each.severity == NOT_APPLIED}
         self.applied |= {id for id in self.wanted if id.startswith(ids)} - skipped
 
     def add_log(self, file: Path) -> None:
@@ -132,78 +127,81 @@ class Report:
         log = RunLog(file, self.facts)
         if log.last is not None:
             self.known |= {"inserted or there": log.expected, "at the end": log.last}
-        self.add(log.results(), "DK203", "DK208")
+        hits = {"DK208": log.warnings(), "DK206": log.rest(), "DK203": log.balance()}
+        self.add((each for rule in hits for each in as_findings(rule, hits[rule], str(file))),
+                 "DK203", "DK208")  # fmt: skip
 
     def add_dumps(self, dump: Sequence[str], contacts: Sequence[str]) -> None:
         """Apply the rules on the dumps."""
-        from dragdeck.audit.measures import Measures
+        from dragdeck.audit.measures import RULES, Measures
 
-        run = Measures(self.facts, source := ", ".join(dump))
+        run, source = Measures(self.facts), ", ".join(dump)
         columns = self._contact_columns() if contacts else []
         pairs = self._frames(contacts) if columns else iter(())
         pair = next(pairs, None)
         if pair is not None and not {*columns} <= pair.columns.keys():
             pair, columns = None, []
+        lacking, step, left_out = set[str](), -1, 0
         for frame in self._frames(dump):
-            lacking = {"id", "x", "y", "z"} - frame.columns.keys()
-            if lacking or not {"radius", "diameter"} & frame.columns.keys():
-                names = ", ".join(sorted(lacking)) or "radius"
-                self.add([NotApplied("DK201", f"{source} has no column {names}")])
-                return
+            columns_there = {"radius" if name == "diameter" else name for name in frame.columns}
+            lacking = {"id", "x", "y", "z", "radius"} - columns_there
+            if lacking or frame.step <= step:  # another dump, of contacts or of a group
+                left_out += 1
+                continue
+            step = frame.step
             run.add(frame)
             while pair is not None and pair.step < frame.step:
                 pair = next(pairs, None)
             if pair is not None and pair.step == frame.step:
                 run.add_contacts(pair, columns[:2], columns[2:])
-        self.add(run.results(self._left_out(dump)), *(f"DK20{n}" for n in range(1, 7)))
-        self.known |= {
-            "frames": run.frames,
-            "contacts of": run.scope,
-            "largest overlap over radius": run.overlap.value,
-            "largest speed, m/s": run.speed.value,
-        }
-        if run.stability is not None:
-            self.known["stability number"] = run.stability
-        if run.energies:
-            self.known["mean kinetic energy in the last frame, J/kg"] = run.energies[-1].mean
+        if not run.frames:
+            names = ", ".join(sorted(lacking)) or "frame"
+            self.add(as_findings("DK201", [unknown(f"{source} has no {names}")]))
+            return
+        run.left_out = self._left_out(dump)
+        for rule, measure in RULES.items():
+            self.add(as_findings(rule, measure(run), source), rule)
+        self.known |= run.known | ({"frames left out": left_out} if left_out else {})
         if contacts and not columns:
             why = "no compute pair/gran/local with id and force, or other columns in its dump"
-            self.add([NotApplied("DK207", why)])
+            self.add(as_findings("DK207", [unknown(why)]))
         elif contacts:
-            self.add(run.contact_results(", ".join(contacts)), "DK207")
+            self.add(as_findings("DK207", run.limited(), ", ".join(contacts)), "DK207")
             self.known["contacts above Coulomb's limit"] = f"{run.n_beyond} of {run.n_contacts}"
 
     def _frames(self, patterns: Sequence[str]) -> "Iterator[Frame]":
-        """The frames of all files, in the order of the numbers in their names."""
+        """The frames of all files, in the order of their names and of the numbers in these."""
         from dragdeck.dumps.reader import dump_files, layout_of, read_frames
 
-        files = [file for pattern in patterns for file in dump_files(pattern)]
-        for file in sorted(files, key=lambda file: [*map(int, re.findall(r"\d+", file.name))]):
-            command = self._dump_of(file.name) if ".bin" in file.suffixes[-2:] else None
-            columns = command.words[6:] if command else None
-            yield from read_frames([file], layout_of(file, columns))
+        files: list[Path] = []
+        for pattern in patterns:
+            matching = [*Path(pattern).parent.glob(Path(pattern).name)] or dump_files(pattern)
+            files += sorted(matching, key=_order)
+        for file in files:
+            words = self._dump_of(file.name) if ".bin" in file.suffixes[-2:] else []
+            yield from read_frames([file], layout_of(file, words[6:] or None))
 
-    def _dump_of(self, name: str) -> EngineCommand | None:
-        """The last dump of the script that writes files of such a name."""
-        dumps = [*self.facts.named("dump")]
-        named = [re.sub(r"\$\{\w+\}|\$\w", "*", "".join(words_of(c.text)[5:6])) for c in dumps]
-        of_name = [command for command, pattern in zip(dumps, named, strict=True)
-                   if fnmatch(Path(name).name, Path(pattern).name)]  # fmt: skip
-        return of_name[-1] if of_name else None
+    def _dump_of(self, name: str) -> list[str]:
+        """The words of the last dump of the script that writes files of such a name."""
+        words: list[str] = []
+        for command in self.facts.named("dump"):
+            pattern = re.sub(r"\$\{\w+\}|\$\w", "*", "".join(words_of(command.text)[5:6]))
+            if fnmatch(Path(name).name, Path(pattern).name):
+                words = command.words
+        return words
 
     def _left_out(self, patterns: Sequence[str]) -> str:
         """Why the dumps need not contain all particles; empty if they must."""
-        ids = {command.words[1] for name in patterns if (command := self._dump_of(name))}
+        ids = {id for name in patterns for id in self._dump_of(name)[1:2]}
         partial = [c.words[1] for c in self.facts.named("dump_modify")
                    if ids & {*c.words[1:2]} and {"thresh", "region"} & {*c.words}]  # fmt: skip
         return f"the dump {partial[0]} leaves particles out" if partial else ""
 
     def _contact_columns(self) -> list[str]:
         """Columns with ids and forces of contacts between particles; none if not known."""
-        for compute in self.facts.named("compute"):
-            words = compute.words
+        for words in (command.words for command in self.facts.named("compute")):
             if words[3:4] == ["pair/gran/local"] and {"id", "force"} <= set(words):
-                begin = 6 * sum(name in words for name in _OF_CONTACTS)
+                begin = 6 * len({"pos", "vel"} & {*words})  # six columns each come first
                 return [f"c_{words[1]}[{begin + n}]" for n in (1, 2, 4, 5, 6)]
         return []
 
@@ -213,34 +211,36 @@ class Report:
         return without_accepted(self.every, self.script, self.applied)
 
     @property
+    def skipped(self) -> list[Finding]:
+        """The rules that were not applied."""
+        return [finding for finding in self.every if finding.severity == NOT_APPLIED]
+
+    @property
     def text(self) -> str:
         """A line for each finding with its remedy, and what was not checked."""
-        findings, unused = self.judged
+        judged, unused = self.judged
         measured = [f"{name} {value:.4g}" if isinstance(value, float) else f"{name} {value}"
                     for name, value in self.known.items()]  # fmt: skip
-        counts = {grade: sum(f.graded == grade for f in findings) for grade in _SEVERITIES}
+        counts = {grade: sum(f.severity == grade for f in judged) for grade in _SEVERITIES}
         counted = [f"{count} {severity}(s)" for severity, count in counts.items() if count]
         return "\n".join([
-            *(f"{finding}\n    {rules()[finding.rule].remedy}" for finding in findings),
+            *(f"{finding}\n    {rules()[finding.rule].remedy}" for finding in judged),
             *(f"{note} (unused comment)" for note in unused),
             *(["measured: " + "; ".join(measured)] if measured else []),
             *([f"dialect: {self.facts.dialect}"] if self.facts.dialect else []),
             *(f"not followed: {note}" for note in self.script.not_followed),
-            *(f"not applied: {skip.rule}: {skip.why}" for skip in self.skipped),
+            *(f"not applied: {skip.rule}: {skip.message}" for skip in self.skipped),
             ", ".join(counted) or "no findings",
         ])  # fmt: skip
 
     @property
     def document(self) -> dict[str, Any]:
         """The same for programs."""
-        findings, unused = self.judged
+        judged, unused = self.judged
         return {
             "version": 1, "file": str(self.script.file), "dialect": self.facts.dialect,
-            "findings": [
-                {"rule": f.rule, "severity": f.graded, "file": f.file, "line": f.line,
-                 "message": f.message, "remedy": rules()[f.rule].remedy, "values": dict(f.values)}
-                for f in findings
-            ],
+            "findings": [{**finding._asdict(), "remedy": rules()[finding.rule].remedy}
+                         for finding in judged],
             "unused": unused, "known": self.known, "not_followed": [*self.script.not_followed],
-            "not_applied": [{"rule": skip.rule, "why": skip.why} for skip in self.skipped],
+            "not_applied": [{"rule": skip.rule, "why": skip.message} for skip in self.skipped],
         }  # fmt: skip

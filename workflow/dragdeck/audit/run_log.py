@@ -7,15 +7,10 @@ from dragdeck.audit.measures import is_clumped, removal
 from dragdeck.engine.log import engine_errors, never_settled
 from dragdeck.files import text_of
 from dragdeck.script.facts import Facts, as_numbers
-from dragdeck.script.findings import Finding, NotApplied, Results
+from dragdeck.script.findings import Hits, hit, unknown
 
 _INSERTED = re.compile(r"INFO: Particle insertion \S+: inserted (\d+) particle templates")
-_WARNINGS = {
-    "Less insertions than requested": "fewer particles were inserted than requested",
-    "timestep is > ": "the check of the time step failed",
-}
-
-
+_WARNINGS = ("Less insertions than requested", "timestep is > ")
 _NO_NUMBERS = {"nan", "-nan", "inf", "-inf"}
 
 
@@ -39,53 +34,48 @@ class RunLog:
         self.not_finite, self.table = "", list[str]()
         for line in self.text.split("\n"):
             words = line.split()
-            row = dict(zip(self.table, words, strict=False)) if words[:1] != ["Step"] else {}
+            row = (
+                dict(zip(self.table, words, strict=False)) if len(words) == len(self.table) else {}
+            )
             if words[:1] == ["Step"] or line.startswith("Loop time of"):
                 self.table = words if words[0] == "Step" else []
             elif match := _INSERTED.search(line):
                 inserted += int(match[1])
-            elif len(words) == len(self.table) and _NO_NUMBERS & set(words):
+            elif row and _NO_NUMBERS & {*words}:
                 self.not_finite = self.not_finite or line.strip()
-            elif len(words) == len(self.table) and row.get("Atoms", "").isdecimal():
+            elif row.get("Atoms", "").isdecimal():
                 last = int(row["Atoms"])
                 self.expected += last if self.last is None else inserted
                 counts = as_numbers([row[name] for name in self.outlets if name in row])
                 self.last, inserted, self.counted = last, 0, round(sum(counts or ()))
 
-    def results(self) -> Results:
-        """What DK203, DK206 and DK208 say of it."""
-        errors = [f"LIGGGHTS ended with {error}" for error in engine_errors(self.text)]
+    def warnings(self) -> Hits:
+        """Errors and warnings of LIGGGHTS (DK208)."""
+        errors = engine_errors(self.text)
+        yield from (hit("error", None, "error", what=error) for error in errors)
         if self.not_finite:
-            errors.append(f"the thermo table contains a number that is none: {self.not_finite}")
-        if self.table and not errors:
-            errors.append("the log ends within a run")
-        for message in errors:
-            yield Finding("DK208", message, str(self.file), severity="error")
-        for part, meaning in _WARNINGS.items():
+            yield hit("number", None, "error", what=self.not_finite)
+        elif self.table and not errors:
+            yield hit("end", None, "error")
+        for part in _WARNINGS:
             lines = [line.strip() for line in self.text.split("\n") if part in line]
             if lines:
-                message = f"{meaning}, {len(lines)} times: {lines[0][:120]}"
-                yield self._finding("DK208", message, lines=len(lines))
+                yield hit(part, lines=len(lines), what=lines[0][:120])
         builds = sum(map(int, re.findall(r"^Dangerous builds = (\d+)", self.text, re.MULTILINE)))
         if builds:
-            message = f"{builds} neighbour lists were rebuilt too late (dangerous builds)"
-            yield self._finding("DK208", message, builds=builds)
+            yield hit("builds", builds=builds)
+
+    def rest(self) -> Hits:
+        """Whether a filling of dragdeck came to rest (DK206)."""
         if never_settled(self.text):
-            yield self._finding("DK206", "the bed did not come to rest in time")
-        yield from self._balance()
+            yield hit("log")
 
-    def _finding(self, rule: str, message: str, **values: float) -> Finding:
-        return Finding(rule, message, str(self.file), values=values)
-
-    def _balance(self) -> Results:
-        unknown = "" if self.counted else removal(self.facts)
-        if is_clumped(self.facts):
-            unknown = "particles are clumps"
-        if unknown or self.last is None:
-            why = unknown or f"no thermo column Atoms in {self.file.name}"
-            yield NotApplied("DK203", why)
+    def balance(self) -> Hits:
+        """Particles that were lost (DK203)."""
+        clumped = "particles are clumps" if is_clumped(self.facts) else ""
+        unused = clumped or ("" if self.counted else removal(self.facts))
+        if unused or self.last is None:
+            yield unknown(unused or f"no thermo column Atoms in {self.file.name}")
         elif (missing := self.expected - self.counted - self.last) > 0:
-            counted = f", {self.counted} counted at outlets" if self.outlets else ""
-            message = f"{missing} particles are missing: {self.expected} were there or inserted"
-            message += f"{counted}, {self.last} at the end"
-            yield self._finding("DK203", message, missing=missing)
+            yield hit("log", missing=missing, there=self.expected, counted=self.counted,
+                      last=self.last)  # fmt: skip

@@ -8,7 +8,6 @@ import numpy as np
 from dragdeck.errors import InputError
 from dragdeck.mesh.clump import SPHERE, Clump, fit_clump
 from dragdeck.physics.contact_mechanics import (
-    ENGINE_SOFTEST_PA,
     bed_pressure,
     effective_modulus,
     hertz_contact_time,
@@ -17,6 +16,7 @@ from dragdeck.physics.contact_mechanics import (
     stiffness_number,
 )
 from dragdeck.physics.rounding import round_to, rounded, timestep
+from dragdeck.physics.run_limits import ENGINE_SOFTEST_PA
 from dragdeck.records.bed import BodiesOfRun
 from dragdeck.study.media import LEVELS, Array, Media, few_sizes
 from dragdeck.study.model import Study

@@ -7,9 +7,9 @@ from typing import Generic, Self, TypeVar
 from dragdeck import __version__
 from dragdeck.decks.outputs import Output
 from dragdeck.errors import Caution
-from dragdeck.physics.contact_mechanics import ENGINE_HARD_PA, ENGINE_NEIGHBOURS
 from dragdeck.physics.domain_split import ENGINE_CHOOSES
 from dragdeck.physics.rounding import round_to
+from dragdeck.physics.run_limits import ENGINE_HARD_PA, ENGINE_NEIGHBOURS
 from dragdeck.records.run import CaseFile
 from dragdeck.study.contact_law import (
     Contact,

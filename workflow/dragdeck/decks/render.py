@@ -159,8 +159,7 @@ def of_its_templates(
 def findings_on(text: str) -> list[Finding]:
     """What the rules on scripts say of a deck; see `dragdeck.script.rules`."""
     script = read_script(Path(DECK_FILE), text=text)
-    findings = [result for result in script_findings(script) if isinstance(result, Finding)]
-    return without_accepted(findings, script, ())[0]
+    return without_accepted(script_findings(script), script, ())[0]
 
 
 def changed_scripts(text: str, scene: AnyScene, templates: jinja2.Environment) -> tuple[str, ...]:

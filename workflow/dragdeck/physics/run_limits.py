@@ -1,7 +1,16 @@
-"""Energies and speeds that no run of a scene can have."""
+"""Energies and speeds that no run of a scene can have, and limits of LIGGGHTS itself."""
 
 import math
 from dataclasses import dataclass
+
+ENGINE_SOFTEST_PA = 5e6
+"""`units si` of LIGGGHTS refuses a softer Young's modulus."""
+
+ENGINE_NEIGHBOURS = 2000
+"""Neighbours of a particle for which LIGGGHTS has room by itself (`neigh_modify one`)."""
+
+ENGINE_HARD_PA = 1e9
+"""Above this LIGGGHTS wants `hard_particles yes`."""
 
 ENERGY_FACTOR = 4.0
 """How far above the energy that a particle can have at all a run is stopped. An

@@ -26,10 +26,11 @@ from dragdeck.mesh.files import stl_text
 from dragdeck.mesh.shapes import tube
 from dragdeck.mesh.surface import surface
 from dragdeck.parts import Part
-from dragdeck.physics.contact_mechanics import ENGINE_SOFTEST_PA, fall_time
+from dragdeck.physics.contact_mechanics import fall_time
 from dragdeck.physics.estimates import SOLID_FRACTION_ESTIMATE
 from dragdeck.physics.packing import pour
 from dragdeck.physics.rounding import rounded
+from dragdeck.physics.run_limits import ENGINE_SOFTEST_PA
 from dragdeck.physics.walls import round_container
 from dragdeck.records.case import CaseOfRun
 from dragdeck.scenes.scene import case_of_study, material_table

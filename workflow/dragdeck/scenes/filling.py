@@ -37,7 +37,6 @@ from dragdeck.decks.deck import Body, Deck, LeftOut, Scene, data_file
 from dragdeck.errors import Caution, InputError
 from dragdeck.mesh.files import stl_text
 from dragdeck.physics.contact_mechanics import (
-    ENGINE_NEIGHBOURS,
     bed_overlap,
     effective_modulus,
     fall_energy,
@@ -51,7 +50,7 @@ from dragdeck.physics.contact_mechanics import (
 from dragdeck.physics.domain_split import FilledBowl, Split, rank_warnings, split
 from dragdeck.physics.packing import Bed, Particles, pour, primes, room_to_insert
 from dragdeck.physics.rounding import rounded
-from dragdeck.physics.run_limits import RunLimits, run_limits
+from dragdeck.physics.run_limits import ENGINE_NEIGHBOURS, RunLimits, run_limits
 from dragdeck.physics.walls import Container
 from dragdeck.records.case import FillingCase
 from dragdeck.records.run import SettlingCriterion

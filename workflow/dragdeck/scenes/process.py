@@ -13,11 +13,10 @@ from dragdeck.decks.outputs import Output
 from dragdeck.errors import Caution
 from dragdeck.files import file_checksum
 from dragdeck.mesh.files import stl_text
-from dragdeck.physics.contact_mechanics import ENGINE_NEIGHBOURS
 from dragdeck.physics.domain_split import rank_warnings
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import round_to
-from dragdeck.physics.run_limits import RunLimits, thrown_speed
+from dragdeck.physics.run_limits import ENGINE_NEIGHBOURS, RunLimits, thrown_speed
 from dragdeck.records.bed import BowlOfRun
 from dragdeck.records.case import AssumptionOfRun, ProcessCase, StatisticsOfRun, WorkpieceOfRun
 from dragdeck.records.run import Phase, SteadyCriterion

@@ -14,14 +14,10 @@ from dragdeck.cases.bed import bed_classes, bed_density, body_sizes, particle_ma
 from dragdeck.cases.case import Case, digest, slug
 from dragdeck.decks.deck import NOT_OF_LIQUID, LeftOut, Liquid, Materials, Scene, contact_law
 from dragdeck.errors import InputError
-from dragdeck.physics.contact_mechanics import (
-    ENGINE_SOFTEST_PA,
-    ContactConstants,
-    effective_modulus,
-    effective_shear,
-)
+from dragdeck.physics.contact_mechanics import ContactConstants, effective_modulus, effective_shear
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import round_to
+from dragdeck.physics.run_limits import ENGINE_SOFTEST_PA
 from dragdeck.records.bed import BowlOfRun, ClassOfRun, MediaOfRun
 from dragdeck.records.case import AssumptionOfRun, CaseOfRun, FidelityOfRun
 from dragdeck.records.packing import Packing

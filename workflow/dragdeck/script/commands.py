@@ -1,7 +1,7 @@
 """The commands of an input script: what they reach, whether they end, the contact law they set."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -87,7 +87,7 @@ def _commands(text: str, within: str, line: int) -> Iterator[EngineCommand]:
     if words:
         yield EngineCommand(text, words, within, line)
         for inner in inner_commands(words):
-            yield from _commands(without_comment(inner), within or words[0], line)
+            yield from _commands(inner, within or words[0], line)
 
 
 def leaving_folder(deck: str, source: str) -> Iterator[tuple[str, str]]:
@@ -142,14 +142,16 @@ def names_read(words: list[str]) -> list[str]:
 def endless(deck: str) -> Iterator[tuple[str, str]]:
     """Jumps back of a deck between whose label and itself nothing can end the loop."""
     every = list(commands(deck))
-    labels = {
-        command.words[1]: at for at, command in reversed([*enumerate(every)]) if _is_label(command)
-    }
+    labels = {c.words[1]: at for at, c in reversed([*enumerate(every)])
+              if c.words[0] == "label" and len(c.words) > 1}  # fmt: skip
     for at, command in enumerate(every):
         if command.words[:2] != ["jump", "SELF"] or command.within == "if":
             continue
         start = labels.get(command.words[2], at) if command.words[2:] else 0
-        if start < at and not any(map(_ends_loop, every[start:at])):
+        ways_out = {"next", "quit"}, {"next", "quit", "jump"}
+        if start < at and not any(
+            c.words[0] in ways_out[c.within == "if"] for c in every[start:at]
+        ):
             yield command.text, "run for ever: no `next` and no `if` ends this loop"
 
 
@@ -165,15 +167,6 @@ def late_lists(deck: str) -> Iterator[tuple[str, str]]:
             for name, value in pairwise(command.words):
                 if allowed.get(name, value) != value:
                     yield command.text, "rebuild neighbour lists too late, and miss contacts"
-
-
-def _is_label(command: EngineCommand) -> bool:
-    return command.words[0] == "label" and len(command.words) > 1
-
-
-def _ends_loop(command: EngineCommand) -> bool:
-    way_out = command.words[0] in ("jump", "quit") and command.within == "if"
-    return way_out or command.words[0] in ("next", "quit")
 
 
 def contact_laws(deck: str) -> Iterator[list[str]]:
@@ -201,14 +194,21 @@ def law_commands(deck: str) -> list[str]:
     return list(dict.fromkeys(law_lines))
 
 
-def inner_commands(words: list[str]) -> Iterator[str]:
+def branches(words: Sequence[str]) -> Iterator[tuple[str, list[str]]]:
+    """The conditions of an ``if``, each with its commands; that of ``else`` is 1."""
+    parts: list[list[str]] = [[]]
+    for word in words[1:]:
+        if word in ("elif", "else"):
+            parts.append(["1"] if word == "else" else [])
+        else:
+            parts[-1].append(word)
+    for condition, *inner in filter(None, parts):
+        yield condition, [without_comment(command) for command in inner if command != "then"]
+
+
+def inner_commands(words: Sequence[str]) -> Sequence[str]:
     """The commands that ``if`` and ``run every`` carry as words."""
     if words[0] == "if":
-        before = ["", *words]
-        yield from (
-            word
-            for last, word in zip(before[3:], words[3:], strict=False)
-            if word not in ("else", "elif") and last != "elif"
-        )
-    elif words[0] == "run" and "every" in words:
-        yield from words[words.index("every") + 2 :]
+        return [command for _, inner in branches(words) for command in inner]
+    carried = words[words.index("every") + 2 :] if words[0] == "run" and "every" in words else ()
+    return [without_comment(command) for command in carried]

@@ -4,7 +4,6 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 from typing import NamedTuple
 
 from dragdeck.physics.rounding import is_prime
@@ -19,6 +18,7 @@ _SMALLEST_SEED, _LARGEST_SEED = 10_000, 2**31
 _ELSEWHERE = {
     "nve/nonspherical", "check/timestep/bond", "hybrid/gran", "nve/sphere/omp", "gran/omp",
     "mesh/surface/deform", "cfd/coupling/force/implicit/accumulated", "bond/gran",
+    "incremental_history",
 }  # fmt: skip
 _SIZES = {"block": slice(1, 7), "cylinder": slice(2, 7), "sphere": slice(1, 5)}
 """Words of a region that are its sizes."""
@@ -39,42 +39,40 @@ def as_numbers(words: Sequence[str], count: int = 0) -> list[float] | None:
     return values if len(values) == len(words) >= count else None
 
 
-def certain(commands: Iterable[EngineCommand]) -> EngineCommand | None:
-    """The last of some commands; None where that depends on a condition that is not known."""
-    last = None
+def certain(commands: Iterable[EngineCommand]) -> list[str]:
+    """The words of the last of some commands; none where that depends on what is not known."""
+    last: list[str] = []
     for command in reversed([*commands]):
-        if last and command.words != last.words:
-            return None
-        last = command
+        if last and command.words != last:
+            return []
+        last = command.words
         if not command.uncertain:
             return last
-    return None
+    return []
 
 
-@dataclass
+@dataclass(eq=False)
 class Fix:
-    """A fix: where it is set and, as places in the script, until when.
+    """A fix or a pair style, and where it is set.
 
     Attributes
     ----------
     command : EngineCommand
+    words : sequence of str
+        From its style on.
     begin, end : float
-        Places among the commands; infinite if it stays.
+        Places in the script; the end is infinite if it stays.
     """
 
     command: EngineCommand
-    begin: float
+    words: Sequence[str]
+    begin: float = 0
     end: float = math.inf
 
     @property
     def id(self) -> str:
         """Its name."""
         return self.command.words[1]
-
-    @property
-    def words(self) -> Sequence[str]:
-        """Its words from the style on."""
-        return self.command.words[3:]
 
     def after(self, word: str, count: int = 1) -> Sequence[str]:
         """So many words after a keyword; none without it."""
@@ -85,33 +83,17 @@ class Fix:
         """The word after a keyword; empty without."""
         return "".join(self.after(keyword))
 
+    def number(self, keyword: str) -> float | None:
+        """The number after a keyword; None if there is none."""
+        return as_number(self.word(keyword))
+
     def vector(self, keyword: str) -> list[float] | None:
         """The three numbers after a keyword; none without it, None if they are not known."""
         return as_numbers(self.after(keyword, 3), 3) if keyword in self.words else []
 
-
-@dataclass(frozen=True)
-class ContactModel:
-    """The contact model of the particles, or of a wall.
-
-    Attributes
-    ----------
-    wall : Fix or None
-    command : EngineCommand
-    normal : str
-        Model of the normal force.
-    settings : dict of str to str
-        Each word after that with the next one.
-    """
-
-    wall: Fix | None
-    command: EngineCommand
-    normal: str
-    settings: dict[str, str]
-
     def has(self, keyword: str) -> str:
-        """The model or setting of this keyword; empty where it is off."""
-        model = self.settings.get(keyword, "off")
+        """Which model of this kind its contact law has; empty where it is off."""
+        model = self.word(keyword)
         return "" if model in ("off", "no", "none") else model
 
 
@@ -142,7 +124,7 @@ class Facts:
                 fix.end = place
             if words[0] == "fix" and len(words) > 3:
                 key = (str(place > self._begin), *words)
-                active[words[1]] = fixes.setdefault(key, Fix(command, place))
+                active[words[1]] = fixes.setdefault(key, Fix(command, words[3:], place))
                 active[words[1]].end = math.inf
         return list(fixes.values())
 
@@ -160,21 +142,19 @@ class Facts:
 
     def last(self, name: str) -> list[str]:
         """The words after the last command of this name; none without, or if not known."""
-        command = certain(self.named(name))
-        return command.words[1:] if command else []
+        return certain(self.named(name))[1:]
 
     @cached_property
-    def models(self) -> list[ContactModel]:
-        """Contact models that are written as ``model ...``; those of the particles are first."""
-        particles = [(None, c) for c in self.named("pair_style") if c.words[1:2] == ["gran"]]
-        walls = [(fix, fix.command) for fix in self.styled("wall/gran")
-                 if fix.words[0] == "wall/gran"]  # fmt: skip
-        models = []
-        for wall, command in [*particles, *walls]:
-            if "model" in command.words[:-1]:
-                normal, *rest = command.words[command.words.index("model") + 1 :]
-                models.append(ContactModel(wall, command, normal, dict(pairwise(rest))))
-        return models
+    def laws(self) -> list[Fix]:
+        """Contact laws of particles that are written as ``model ...``."""
+        pairs = [Fix(command, command.words[1:]) for command in self.named("pair_style")]
+        return [pair for pair in pairs if pair.words[:1] == ["gran"] and pair.word("model")]
+
+    @cached_property
+    def walls(self) -> list[Fix]:
+        """The same of walls."""
+        walls = self.styled("wall/gran")
+        return [wall for wall in walls if wall.words[0] == "wall/gran" and wall.word("model")]
 
     def properties(self, name: str) -> list[Fix]:
         """The fixes that set a property."""
@@ -182,8 +162,7 @@ class Facts:
 
     def values(self, name: str) -> list[float]:
         """The values of a property at last, by type or by pair of types; none if not known."""
-        command = certain(fix.command for fix in self.properties(name))
-        words = command.words[5:] if command else []
+        words = certain(fix.command for fix in self.properties(name))[5:]
         return as_numbers(words[2 if words[:1] == ["peratomtypepair"] else 1 :]) or []
 
     def matrix(self, name: str) -> list[list[float]]:
@@ -201,12 +180,12 @@ class Facts:
     def wall_types(self, wall: Fix) -> list[int]:
         """The types of a wall's materials, from 1."""
         meshes = [self.meshes[name] for name in self.meshes_of(wall) if name in self.meshes]
-        types = [as_number(fix.word("type")) for fix in meshes or [wall]]
+        types = [fix.number("type") for fix in meshes or [wall]]
         return [int(number) for number in types if number and 0 < number < _MOST_TYPES]
 
     def meshes_of(self, wall: Fix) -> Sequence[str]:
         """Names of the meshes of a wall."""
-        return wall.after("meshes", int(as_number(wall.word("n_meshes")) or 0))
+        return wall.after("meshes", int(wall.number("n_meshes") or 0))
 
     @cached_property
     def radii(self) -> list[float] | None:
@@ -217,13 +196,23 @@ class Facts:
         return None if others else values or None
 
     @cached_property
+    def sphere_m3(self) -> float:
+        """Volume of the smallest template; NaN if not known."""
+        return 4 / 3 * math.pi * min(self.radii or [math.nan]) ** 3 or math.nan
+
+    @cached_property
+    def density_kg_m3(self) -> float:
+        """Smallest density of a template; NaN if not known."""
+        words = ["".join(fix.after("density", 2)[1:]) for fix in self.styled("particletemplate/")]
+        return min(as_numbers(words) or [math.nan]) or math.nan
+
+    @cached_property
     def regions(self) -> dict[str, Region | None]:
         """Blocks, cylinders and spheres by their names; None for one that is not known."""
         commands: dict[str, list[EngineCommand]] = {}
         for command in self.named("region"):
             commands.setdefault("".join(command.words[1:2]), []).append(command)
-        last = {name: certain(of_name) for name, of_name in commands.items()}
-        return {name: _region(command.words[2:]) for name, command in last.items() if command}
+        return {name: _region(certain(of_name)[2:]) for name, of_name in commands.items()}
 
     @cached_property
     def box(self) -> Region | None:
@@ -242,36 +231,31 @@ class Facts:
         if not fixes:
             return [0.0, 0.0, 0.0]
         size, vector = as_number("".join(fixes[-1].words[1:2])), fixes[-1].vector("vector")
-        length = math.hypot(*vector) if vector else 0.0
-        known = size is not None and length and certain(fix.command for fix in fixes)
-        return [(size or 0.0) * part / length for part in vector or ()] if known else None
+        if size is None or not vector or not any(vector) or not certain(f.command for f in fixes):
+            return None
+        return [size * part / math.hypot(*vector) for part in vector]
 
     @cached_property
     def dialect(self) -> str:
         """Which LIGGGHTS the script is for, as far as it shows: empty for the public 3.8."""
-        for command in self.named("pair_style"):
-            if command.words[1:2] == ["gran"] and "model" not in command.words:
+        for words in (command.words for command in self.named("pair_style")):
+            style = "".join(words[1:2])
+            if style.startswith("gran/") or (style == "gran" and "model" not in words):
                 return "a fork, or a version before 3.0: a contact law without `model`"
-            if "".join(command.words[1:2]).startswith("gran/"):
-                return "a version before 3.0: contact laws as styles of their own"
-        for command in self.script.commands:
-            for word in sorted(_ELSEWHERE.intersection(command.words)):
-                return f"PFM or a commercial or bonded fork: {word}"
-        if self.seeds and len(self.refused_seeds()) == len(self.seeds):
-            return "PFM, or a version before 3.4: seeds that the public 3.8 refuses"
-        return ""
+        every = {word for command in self.script.commands for word in command.words}
+        if elsewhere := _ELSEWHERE & every:
+            return f"PFM or a commercial or bonded fork: {min(elsewhere)}"
+        refused = sum(refused for *_, refused in self.seeds) > 1  # 3.8 stops at the first
+        return "PFM, or a version before 3.4: seeds that 3.8 refuses" if refused else ""
 
     @cached_property
-    def seeds(self) -> list[tuple[Fix, int]]:
-        """Seeds of templates, distributions and insertions."""
+    def seeds(self) -> list[tuple[Fix, int, bool]]:
+        """Seeds of templates, distributions and insertions, and whether 3.8 refuses each."""
         fixes = self.styled("particletemplate/", "particledistribution/", "insert/")
         words = [(fix, fix.word("seed") or "".join(fix.words[1:2])) for fix in fixes]
-        return [(fix, int(word)) for fix, word in words if word.isdecimal() and len(word) < 20]
-
-    def refused_seeds(self) -> list[tuple[Fix, int]]:
-        """Seeds that the public 3.8 refuses."""
-        return [(fix, seed) for fix, seed in self.seeds
-                if not _SMALLEST_SEED < seed < _LARGEST_SEED or not is_prime(seed)]  # fmt: skip
+        seeds = [(fix, int(word)) for fix, word in words if word.isdecimal() and len(word) < 20]
+        return [(fix, seed, not _SMALLEST_SEED < seed < _LARGEST_SEED or not is_prime(seed))
+                for fix, seed in seeds]  # fmt: skip
 
 
 def _region(words: Sequence[str]) -> Region | None:

@@ -1,11 +1,10 @@
 """Findings on a script: rules as a table, where each was met, and comments that accept one."""
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
-from typing import ClassVar
+from typing import NamedTuple
 
 from dragdeck.errors import InputError, choices
 from dragdeck.files import table_rows
@@ -13,10 +12,11 @@ from dragdeck.script.commands import EngineCommand
 from dragdeck.script.flow import Script
 
 _ACCEPTS = re.compile(r"#\s*dragdeck:\s*ignore((?:[\s,]+DK\d+)+)(.*)")
+NOT_APPLIED = "not applied"
+"""Severity of a rule that could not be applied."""
 
 
-@dataclass(frozen=True)
-class Rule:
+class Rule(NamedTuple):
     """A rule: severity ``error`` (results are wrong), ``warning`` or ``note``, and texts."""
 
     id: str
@@ -33,77 +33,88 @@ def rules() -> Mapping[str, Rule]:
     return {row["id"]: Rule(**row) for row in rows}
 
 
-@dataclass(frozen=True)
-class Finding:
+@cache
+def _messages() -> Mapping[tuple[str, str], str]:
+    """The message of each hit, by rule and name."""
+    rows = table_rows(Path(__file__).with_name("messages.csv"))
+    return {(row["rule"], row["name"]): row["message"] for row in rows}
+
+
+class Hit(NamedTuple):
+    """What a rule says: name of its message, or why it is not applied; numbers and words in it."""
+
+    name: str
+    values: Mapping[str, float | str]
+    command: EngineCommand | None = None
+    severity: str = ""
+
+
+Hits = Iterator[Hit]
+
+
+def hit(
+    name: str, command: EngineCommand | None = None, severity: str = "", **values: float | str
+) -> Hit:
+    """A hit of a rule, at a command."""
+    return Hit(name, values, command, severity)
+
+
+def unknown(why: str) -> Hit:
+    """A rule could not be applied."""
+    return Hit(why, {}, severity=NOT_APPLIED)
+
+
+class Finding(NamedTuple):
     """What a rule says of a script or a run.
 
     Attributes
     ----------
-    rule : str
-    message : str
-        What is the case here, in one sentence without a full stop.
+    rule, message : str
     file : str
     line : int
         0 if it is about the whole file.
     values : mapping of str to float
-        The numbers of the message.
+        The numbers of the message, which is one sentence without a full stop.
     severity : str
-        That of the rule, unless it is given.
+        That of the rule or of the hit, or `NOT_APPLIED`.
     """
 
     rule: str
     message: str
     file: str = ""
     line: int = 0
-    values: Mapping[str, float] = field(default_factory=dict)
+    values: Mapping[str, float] = {}
     severity: str = ""
 
     def __str__(self) -> str:
         where = f"{self.file}:{self.line}" if self.line else self.file
-        return f"{where}: {self.rule} {self.graded}: {self.message}"
-
-    @property
-    def graded(self) -> str:
-        """Its severity."""
-        return self.severity or rules()[self.rule].severity
+        return f"{where}: {self.rule} {self.severity}: {self.message}"
 
 
-@dataclass(frozen=True)
-class NotApplied:
-    """A rule that could not be applied, and why."""
-
-    rule: str
-    why: str
-    file: ClassVar[str] = ""
-    line: ClassVar[int] = 0
-
-
-Results = Iterator[Finding | NotApplied]
+def as_findings(rule: str, hits: Iterable[Hit], source: str = "") -> Iterator[Finding]:
+    """The hits of a rule, as findings on a script or on another file."""
+    for name, values, command, severity in hits:
+        message = _messages().get((rule, name), "").format(**values) or name
+        file, line = (command.file, command.line) if command else (source, 0)
+        numbers = {key: value for key, value in values.items() if not isinstance(value, str)}
+        yield Finding(rule, message, file, line, numbers, severity or rules()[rule].severity)
 
 
-def at(
-    rule: str, command: EngineCommand, message: str, severity: str = "", **values: float
-) -> Finding:
-    """A finding at a command."""
-    return Finding(rule, message, command.file, command.line, values, severity)
-
-
-@dataclass(frozen=True)
-class Acceptance:
-    """A comment that accepts findings: on the line of a command, or on a line before it."""
+class Acceptance(NamedTuple):
+    """A comment that accepts a finding: on the line of a command, or on a line before it."""
 
     file: str
     lines: range
-    ids: frozenset[str]
+    rule: str
 
     def holds(self, finding: Finding) -> bool:
         """Whether it accepts a finding; those from dumps have no line."""
         there = finding.file == self.file and finding.line in self.lines
-        return finding.rule in self.ids and (there or finding.rule >= "DK2")
+        return finding.rule == self.rule and (there or finding.rule >= "DK2")
 
 
 def acceptances(script: Script) -> list[Acceptance]:
-    """Comments ``# dragdeck: ignore ID REASON`` of a script.
+    """Comments ``# dragdeck: ignore ID REASON`` of a script, by id.
 
     Raises
     ------
@@ -116,16 +127,14 @@ def acceptances(script: Script) -> list[Acceptance]:
         for number, line in reversed([*enumerate(text.split("\n"), start=1)]):
             last = last if last and line.lstrip().startswith("#") else number
             if comment := _ACCEPTS.search(line):
-                ids = frozenset(re.findall(r"DK\d+", comment[1]))
+                ids = sorted({*re.findall(r"DK\d+", comment[1])})
                 check_ids(ids, file, number)
                 if not comment[2].strip():
-                    raise InputError(
-                        "a comment that accepts a finding gives no reason",
-                        file=file, line=number, value=comment[0],
-                        remedy=f"write the reason after {' '.join(sorted(ids))}",
-                    )  # fmt: skip
-                accepted.append(Acceptance(file, range(number, last + 1), ids))
-    return accepted[::-1]
+                    problem = "a comment that accepts a finding gives no reason"
+                    raise InputError(problem, file=file, line=number, value=comment[0],
+                                     remedy=f"write it after {ids[-1]}")  # fmt: skip
+                accepted += [Acceptance(file, range(number, last + 1), rule) for rule in ids]
+    return accepted
 
 
 def check_ids(ids: Iterable[str], file: str | None = None, line: int | None = None) -> None:
@@ -137,22 +146,21 @@ def check_ids(ids: Iterable[str], file: str | None = None, line: int | None = No
 
 
 def without_accepted(
-    findings: Sequence[Finding], script: Script, applied: Iterable[str]
+    every: Iterable[Finding], script: Script, applied: Collection[str]
 ) -> tuple[list[Finding], list[str]]:
     """The findings that no comment accepts, and notes on comments that accept nothing.
 
-    Parameters
-    ----------
-    findings : sequence of Finding
-    script : Script
-    applied : iterable of str
-        Ids of the rules that were applied: only those can be unused.
+    Only those for a rule whose id is in `applied` can be unused.
     """
-    accepted = acceptances(script)
-    left = [f for f in findings if not any(comment.holds(f) for comment in accepted)]
-    notes, known = [], set(applied)
-    for comment in accepted:
-        used = {finding.rule for finding in findings if comment.holds(finding)}
-        for name in sorted((comment.ids & known) - used):
-            notes.append(f"{comment.file}:{comment.lines[0]}: nothing to ignore for {name}")
-    return left, notes
+    accepted, used = acceptances(script), set[Acceptance]()
+    left = []
+    for finding in every:
+        holding = [comment for comment in accepted if comment.holds(finding)]
+        used.update(holding)
+        if not holding and finding.severity != NOT_APPLIED:
+            left.append(finding)
+    return left, [
+        f"{comment.file}:{comment.lines[0]}: nothing to ignore for {comment.rule}"
+        for comment in accepted
+        if comment.rule in applied and comment not in used
+    ]

@@ -1,20 +1,22 @@
 """An input script followed command by command, as far as that can be done without running it."""
 
 import math
+import os.path
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from pathlib import Path
 
 from dragdeck.errors import InputError
 from dragdeck.files import text_of
 from dragdeck.script.commands import (
     EngineCommand,
+    branches,
     inner_commands,
     is_quoted_in_full,
     lines_of,
-    without_comment,
     words_of,
 )
 from dragdeck.script.formula import value_of
@@ -48,17 +50,16 @@ class Script:
     file : Path
     in_memory : bool
         Whether it is no file, and has no folder.
-    texts : mapping of str to str
-        Content of every file that was read, by name; the script itself is first.
+    texts : dict of str to str
+        Content of every file that was read, by name, in order.
     commands : list of EngineCommand
         In the order of execution, with the values of variables. A word with ``$`` has one that is
         not known.
     not_followed : dict of str
         What could not be followed, in order.
-    undefined : mapping of str to EngineCommand
-        Variables that nothing defines, with the first command that uses each.
-    absent : list of (EngineCommand, str)
-        Scripts that it includes, or jumps to, and that are not there.
+    missing : list of (EngineCommand, str, str)
+        First command that uses each ``variable`` that nothing defines, or ``script`` that is not
+        there, which of the two, and its name.
     changes_files : bool
         Whether it makes or moves files itself, so that nobody knows which are there.
     """
@@ -68,29 +69,16 @@ class Script:
     texts: dict[str, str] = field(default_factory=dict)
     commands: list[EngineCommand] = field(default_factory=list)
     not_followed: dict[str, None] = field(default_factory=dict)
-    undefined: dict[str, EngineCommand] = field(default_factory=dict)
-    absent: list[tuple[EngineCommand, str]] = field(default_factory=list)
+    missing: list[tuple[EngineCommand, str, str]] = field(default_factory=list)
     changes_files: bool = False
-
-    @property
-    def folder(self) -> Path:
-        """Where it finds its files."""
-        return self.file.parent
 
     def note(self, command: EngineCommand, what: str) -> None:
         """Note what could not be followed, and where."""
         self.not_followed[f"{command.file}:{command.line}: {what}"] = None
 
 
-@dataclass
-class _Variable:
-    style: str
-    values: Sequence[str] = ()
-    at: int = 0
-
-
-_UNKNOWN = "unknown"
-_NOWHERE = EngineCommand("", [], uncertain=True)
+_UNKNOWN: tuple[str, list[str]] = ("unknown", [])
+"""Style and values of a variable; the first value is the present one."""
 
 
 def read_script(
@@ -117,9 +105,14 @@ def read_script(
         A file cannot be read, or is no input script.
     """
     script = Script(file, text is not None)
-    for source in [after, file] if after else [file]:
-        _Reader(script, source, variables or {}, text if source is file else None).follow()
-        if source is not file:
+    for source in filter(None, (after, file)):
+        name, before = str(source), len(script.commands) + len(script.not_followed)
+        script.texts[name] = text if text is not None and source is file else script_text(source)
+        _Reader(script, source.parent, variables or {}).follow(name)
+        if len(script.commands) + len(script.not_followed) == before and text is None:
+            raise InputError("the file contains no command", file=source,
+                             remedy="give the input script of LIGGGHTS")  # fmt: skip
+        if source is after:
             script.commands.append(EngineCommand("clear", ["clear"]))
     return script
 
@@ -132,87 +125,87 @@ def script_text(file: Path) -> str:
     InputError
         It is not there, too large, not text, or a template.
     """
-    remedy = "give the input script of LIGGGHTS"
+    problem, template = "", None
     try:
-        if file.is_fifo():
-            raise InputError("a pipe is no file", file=file, remedy=remedy)
-        with file.open("rb") as stream:
-            content = stream.read(_LARGEST_FILE + 1)
+        size = file.stat().st_size
+        text = text_of(file.read_bytes()) if file.is_file() and size <= _LARGEST_FILE else ""
     except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}", file=file, remedy=remedy) from None
-    text = text_of(content)
-    if len(content) > _LARGEST_FILE:
-        raise InputError("the file is too large for an input script", file=file, remedy=remedy)
-    if "\0" in text:
-        raise InputError("the file is not text", file=file, remedy=remedy)
-    if template := _TEMPLATE.search("\n".join(line for _, line in lines_of(text))):
-        raise InputError("this is a template, not an input script", file=file, value=template[0],
-                         remedy="fill in its values, and give the script that results")  # fmt: skip
+        problem, text, size = f"cannot be read: {error.strerror}", "", 0
+    if not problem and not file.is_file():
+        problem = "this is no file"
+    elif size > _LARGEST_FILE:
+        problem = "the file is too large for an input script"
+    elif "\0" in text:
+        problem = "the file is not text"
+    elif template := _TEMPLATE.search("\n".join(line for _, line in lines_of(text))):
+        problem = f"this is a template, not an input script: {template[0]}"
+    if problem:
+        raise InputError(problem, file=file, remedy="give the input script, with all values")
     return text
+
+
+@lru_cache(16)
+def _lines(text: str) -> tuple[list[tuple[int, str]], dict[str, int]]:
+    """The numbered lines of a script, and the places of its labels; without a name, its begin."""
+    lines = [*lines_of(text)]
+    words = [(words_of(line), at) for at, (_, line) in enumerate(lines) if "label" in line]
+    labels = {w[1]: at for w, at in reversed(words) if w[:1] == ["label"] and len(w) > 1}
+    return lines, {"": 0, **labels}
 
 
 class _Reader:
     """Follows one script into the record of what it does."""
 
     def __init__(
-        self, script: Script, file: Path, variables: Mapping[str, Sequence[str]], text: str | None
+        self, script: Script, folder: Path, variables: Mapping[str, Sequence[str]]
     ) -> None:
-        self.script, self.folder, self.name = script, file.parent, str(file)
-        self.variables = {name: _Variable("index", v) for name, v in variables.items()}
-        self.missing: dict[str, EngineCommand] = {}
+        self.script, self.folder = script, folder
+        self.variables = {name: ("index", [*values]) for name, values in variables.items()}
+        self.undefined: dict[str, EngineCommand] = {}
         self.times: Counter[object] = Counter()
-        self.lines: dict[str, tuple[list[tuple[int, str]], dict[str, int]]] = {}
-        self.stack: list[tuple[str, int]] = []
+        self.target: tuple[str, str] | None = None
         self.timestep: float | None = None
         self.step: float | None = 0.0
-        self.skips_jump = self.ended = False
-        self.count = self.depth = 0
-        self.left_out: dict[str, None] = {}
-        script.texts[self.name] = script_text(file) if text is None else text
-        if text is None and not any(line.strip() for _, line in lines_of(script.texts[self.name])):
-            raise InputError("the file contains no command", file=file,
-                             remedy="give the input script of LIGGGHTS")  # fmt: skip
+        self.skips_jump = self.passed_jump = self.ended = False
+        self.count = self.depth = self.files = 0
 
-    def follow(self) -> None:
-        self._enter(self.name)
-        while self.stack and not self.ended:
-            file, at = self.stack.pop()
-            lines, _ = self.lines[file]
-            if at < len(lines):
-                self.stack.append((file, at + 1))
-                number, line = lines[at]
-                command = EngineCommand(line, [], line=number, file=file)
+    def follow(self, file: str) -> None:
+        """Execute a script, and say which variables nothing defines."""
+        self._file(file, "")
+        defined = {*re.findall(r"\bvariable\s+(\w+)", "\n".join(self.script.texts.values()))}
+        undefined = [name for name in self.undefined if name not in defined]
+        self.script.missing += [(self.undefined[name], "variable", name) for name in undefined]
+
+    def _file(self, name: str, label: str) -> None:
+        lines, labels = _lines(self.script.texts[name])
+        at, self.target, self.files = 0, (name, label), self.files + 1
+        while self.target or (at < len(lines) and not self.ended):
+            if self.target:
+                (file, label), self.target = self.target, None
+                if file != name:
+                    self._file(file, label)
+                    break
+                if label not in labels:
+                    command = EngineCommand("", [], line=at, file=name)
+                    self.script.note(command, f"jump to the label {label}, which is not there")
+                at = labels.get(label, at)
+            else:
+                command = EngineCommand(lines[at][1], [], line=lines[at][0], file=name)
+                at += 1
                 try:
                     self._execute(command)
                 except RecursionError:
                     self.script.note(command, "a command that contains itself")
                     self.ended = True
-        texts = "\n".join(self.script.texts.values())
-        defined = set(re.findall(r"\bvariable\s+(\w+)", texts))
-        for name, command in self.missing.items():
-            if name not in defined:
-                self.script.undefined.setdefault(name, command)
+        self.files -= 1
 
-    def _enter(self, file: str, label: str = "") -> bool:
-        """Go on in a file; whether it has the label."""
-        if file not in self.lines:
-            lines = [*lines_of(self.script.texts[file])]
-            every = [(words_of(line), at) for at, (_, line) in enumerate(lines) if "label" in line]
-            labels = {words[1]: at for words, at in reversed(every)
-                      if words[:1] == ["label"] and len(words) > 1}  # fmt: skip
-            self.lines[file] = lines, labels
-        at = self.lines[file][1].get(label) if label else 0
-        if at is not None:
-            self.stack.append((file, at))
-        return at is not None
-
-    def _read(self, command: EngineCommand, name: str) -> str:
+    def _other(self, command: EngineCommand, name: str) -> str:
         """Path of another script, whose content is then known; empty without."""
         file, problem = self.folder / name, ""
-        if "$" in name or len(self.stack) > _MOST_FILES:
+        if "$" in name or self.files > _MOST_FILES:
             problem = "its name is not known" if "$" in name else "too many within each other"
-        elif not is_there(file) and not self.script.changes_files:
-            self.script.absent.append((command, name))
+        elif not (os.path.exists(file) or self.script.changes_files):
+            self.script.missing.append((command, "script", name))
             return ""
         else:
             try:
@@ -236,41 +229,36 @@ class _Reader:
         if not words or self.ended:
             return
         command = replace(command, words=words, step=self.step)
+        self.script.commands.append(command)
         match words[0]:
             case "variable" if len(words) > 2:
                 self._define(words, command)
             case "timestep" if len(words) > 1:
                 step_s = value_of(words[1], self._word)
-                known = not command.uncertain or step_s == self.timestep
-                self.timestep = step_s if known else None
+                self.timestep = None if command.uncertain and step_s != self.timestep else step_s
             case "if":
                 self._branch(command)
             case "next":
                 self._next(words[1:], command)
             case "include" | "jump" | "quit" if command.uncertain:
                 self.script.note(command, f"{' '.join(words)}: its condition is not known")
-                if words[:2] == ["jump", "SELF"]:
-                    self.left_out.update(dict.fromkeys(words[2:3]))
+                self.passed_jump |= words[0] == "jump"
             case "include" if len(words) > 1:
-                if file := self._read(command, words[1]):
-                    self._enter(file)
+                if file := self._other(command, words[1]):
+                    self._file(file, "")
             case "jump" if len(words) > 1:
                 self._jump(command)
             case "quit":
-                self.ended = True
-                while self.left_out and self.ended:  # a jump may have led past it
-                    self.ended = not self._enter(self.name, self.left_out.popitem()[0])
+                self.ended = not self.passed_jump
             case "run" | "read_restart" | "reset_timestep":
                 self.step = None if command.uncertain else self._step_after(words)
+                for inner in inner_commands(words):
+                    self._execute(replace(command, text=inner, within="run"))
             case "shell":
                 self.script.changes_files |= words[1:2] not in (["mkdir"], ["rmdir"], ["echo"])
             case "partition" | "python":
                 self.script.note(command, command.text.strip())
                 self.script.changes_files = True
-        self.script.commands.append(command)
-        if words[0] == "run":
-            for inner in inner_commands(words):
-                self._execute(replace(command, text=without_comment(inner), within="run"))
 
     def _step_after(self, words: Sequence[str]) -> float | None:
         """The time step that is reached with a command."""
@@ -280,79 +268,65 @@ class _Reader:
         return None if words[0] == "read_restart" else count
 
     def _define(self, words: Sequence[str], command: EngineCommand) -> None:
-        name, style, values = words[1], words[2], words[3:]
-        if command.uncertain:
-            style, values = _UNKNOWN, ()
-        elif style == "delete":
-            self.variables.pop(name, None)
-            return
-        elif style in _KEPT_STYLES and name in self.variables:
-            return
-        elif style == "loop":
-            ends = [value_of(value, self._word) for value in values if value != "pad"]
-            first, last = [1.0, *ends][-2:] if ends else [None, None]
+        name, style, values = words[1], words[2], [*words[3:]]
+        if style == "loop":
+            ends = [1.0, *(value_of(value, self._word) for value in values if value != "pad")]
+            first, last = ends[-2:] if values else (None, None)
             if first is None or last is None:
                 self.script.note(command, f"variable {name}: the number of passes of a loop")
-                style, last, first = _UNKNOWN, 0, 0
-            values = [str(n) for n in range(int(first), min(int(last), int(first) + 999) + 1)]
-        self.times[name] += 1
-        self.variables[name] = _Variable(style, values)
+                style, values = _UNKNOWN
+            else:
+                last = min(int(last), int(first) + 999)
+                values = [str(number) for number in range(int(first), last + 1)]
+        if command.uncertain:
+            self.variables[name] = _UNKNOWN
+        elif style == "delete":
+            self.variables.pop(name, None)
+        elif style not in _KEPT_STYLES or name not in self.variables:
+            self.times[name] += 1
+            self.variables[name] = style, values
 
     def _next(self, names: Sequence[str], command: EngineCommand) -> None:
-        for name in names:
-            variable = self.variables.get(name)
-            if variable and command.uncertain:
-                self.variables[name] = _Variable(_UNKNOWN)
-            elif variable:
-                self.times[name] += 1
-                variable.at += 1
-                if variable.at >= len(variable.values):
-                    del self.variables[name]
-                    self.skips_jump = True
+        for name in self.variables.keys() & names:
+            _, values = self.variables[name]
+            self.times[name] += 1
+            if command.uncertain:
+                self.variables[name] = _UNKNOWN
+            elif len(values) > 1:
+                del values[0]
+            else:
+                del self.variables[name]
+                self.skips_jump = True
 
     def _jump(self, command: EngineCommand) -> None:
         if self.skips_jump:
             self.skips_jump = False
             return
         name, label = command.words[1], "".join(command.words[2:3])
-        file = self.stack[-1][0] if name == "SELF" else self._read(command, name)
+        file = command.file if name == "SELF" else self._other(command, name)
         key = command.file, command.line, file, label
         self.times[key] += 1
-        if self.times[key] > _MOST_PASSES:
-            self.script.note(command, f"a loop after its first {_MOST_PASSES} passes")
-            self.step = None
-            for changed, times in self.times.items():
-                if times > 1 and changed in self.variables:
-                    self.variables[str(changed)] = _Variable(_UNKNOWN)
-        elif file:
-            before = self.stack.pop()
-            if not self._enter(file, label):
-                self.script.note(command, f"jump to the label {label}, which is not there")
-                self.stack.append(before)
+        if self.times[key] <= _MOST_PASSES:
+            self.target = (file, label) if file else None
+            return
+        self.script.note(command, f"a loop after its first {_MOST_PASSES} passes")
+        self.step = None
+        for changed, times in self.times.items():
+            if times > 1 and changed in self.variables:
+                self.variables[str(changed)] = _UNKNOWN
 
     def _branch(self, command: EngineCommand) -> None:
         """Execute the commands of an ``if`` whose condition holds, or may hold."""
-        words, at, known = command.words, 1, True
-        while at < len(words):
-            holds = True if words[at] == "else" else self._holds(words[at], command)
-            begin = at + 1 if words[at] == "else" or words[at - 1] == "elif" else at + 2
-            end = next((n for n in range(begin, len(words)) if words[n] in ("elif", "else")),
-                       len(words))  # fmt: skip
-            known = known and holds is not None
-            if holds is not False:
-                carried = replace(command, within="if", uncertain=command.uncertain or not known)
-                for inner in words[begin:end]:
-                    self._execute(replace(carried, text=without_comment(inner)))
-            if holds and known:
+        uncertain = command.uncertain
+        for condition, inner in branches(command.words):
+            holds = value_of(self._resolved(condition, command), self._word)
+            if holds is None:
+                self.script.note(command, f"if {condition}: both ways are followed")
+                uncertain = True
+            for text in inner if holds != 0 else ():
+                self._execute(replace(command, text=text, within="if", uncertain=uncertain))
+            if holds and (command.uncertain or not uncertain):
                 return
-            at = end + (words[end : end + 1] == ["elif"])
-
-    def _holds(self, condition: str, command: EngineCommand) -> bool | None:
-        text = self._resolved(condition, command)
-        value = value_of(text, self._word)
-        if value is None:
-            self.script.note(command, f"if {condition}: both ways are followed")
-        return None if value is None else bool(value)
 
     def _resolved(self, text: str, command: EngineCommand) -> str:
         """A text with values in place of variables, but not in quotation marks."""
@@ -363,7 +337,8 @@ class _Reader:
             at = match.end()
             if match[4] and self.depth < _DEEPEST:
                 at = _closing(text, at)
-                number = value_of(self._resolved(text[match.end() : at - 1], command), self._word)
+                formula = self._resolved(text[match.end() : at - 1], command)
+                number = value_of(formula, self._word)
                 parts.append("$()" if number is None else f"{number:.15g}")
             else:
                 name = match[2] or match[3]
@@ -372,37 +347,23 @@ class _Reader:
         return "".join([*parts, text[at:]])
 
     def _value(self, name: str, command: EngineCommand) -> str:
-        variable = self.variables.get(name)
-        value = None
-        if variable is None:
-            if not command.uncertain:
-                self.missing.setdefault(name, command)
-        elif variable.style == "equal":
-            number = self._word(f"v_{name}")
-            value = None if number is None else f"{number:.15g}"
-        elif variable.style in ("index", "loop", "string") and variable.values:
-            value = variable.values[variable.at]
-        return f"${{{name}}}" if value is None or len(value) > _LONGEST_VALUE else value
+        style, values = self.variables.get(name, _UNKNOWN)
+        if name not in self.variables and not command.uncertain:
+            self.undefined.setdefault(name, command)
+        number = self._word(f"v_{name}") if style == "equal" else None
+        value = values[0] if values and style in ("index", "loop", "string") else ""
+        value = value if number is None else f"{number:.15g}"
+        return value if 0 < len(value) < _LONGEST_VALUE else f"${{{name}}}"
 
     def _word(self, word: str) -> float | None:
         """The value of a word in a formula."""
         known = {"PI": math.pi, "dt": self.timestep, "step": self.step}
-        if word in known:
-            return known[word]
-        variable = self.variables.get(word[2:]) if word.startswith("v_") else None
+        _, values = self.variables.get(word[2:] if word[:2] == "v_" else "", _UNKNOWN)
         self.count += 1
-        if not variable or not variable.values or self.depth > _DEEPEST or self.count > _MOST:
-            return None
-        value = variable.values[variable.at]
-        return value_of(self._resolved(value, _NOWHERE), self._word)
-
-
-def is_there(file: Path) -> bool:
-    """Whether a file is there, whatever its name is."""
-    try:
-        return file.exists()
-    except OSError:
-        return False
+        if word in known or not values or self.depth > _DEEPEST or self.count > _MOST:
+            return known.get(word)
+        nowhere = EngineCommand("", [], uncertain=True)
+        return value_of(self._resolved(values[0], nowhere), self._word)
 
 
 def _closing(text: str, at: int) -> int:

@@ -16,7 +16,6 @@ _BINARY: Mapping[str, tuple[int, Callable[[float, float], float]]] = {
 """Operators with their rank, as LIGGGHTS has them; those of the same rank from left to right."""
 
 _UNARY: Mapping[str, Callable[[float], float]] = {"-": operator.neg, "!": operator.not_}
-_UNARY_RANK = 8
 _FUNCTIONS: Mapping[str, Callable[..., float]] = {
     "sqrt": math.sqrt, "exp": math.exp, "ln": math.log, "log": math.log10, "abs": abs,
     "sin": math.sin, "cos": math.cos, "tan": math.tan, "asin": math.asin, "acos": math.acos,
@@ -25,16 +24,12 @@ _FUNCTIONS: Mapping[str, Callable[..., float]] = {
 }  # fmt: skip
 _LONGEST = 1000
 
+Names = Callable[[str], float | None]
+"""The value of a word such as ``PI`` or ``v_x``, or None."""
 
-def value_of(formula: str, name: Callable[[str], float | None]) -> float | None:
-    """The value of a formula; None where it needs what only a simulation knows.
 
-    Parameters
-    ----------
-    formula : str
-    name : callable
-        The value of a word such as ``PI`` or ``v_x``, or None.
-    """
+def value_of(formula: str, name: Names) -> float | None:
+    """The value of a formula; None where it needs what only a simulation knows."""
     tokens = _TOKEN.findall(formula)[::-1]
     if len(formula) > _LONGEST or "".join(formula.split()) != "".join(tokens[::-1]):
         return None
@@ -45,11 +40,11 @@ def value_of(formula: str, name: Callable[[str], float | None]) -> float | None:
     return value if math.isfinite(value) and not tokens else None
 
 
-def _value(tokens: list[str], name: Callable[[str], float | None], above: int = 0) -> float:
+def _value(tokens: list[str], name: Names, above: int = 0) -> float:
     """The value of tokens in reverse order up to an operator of this rank or a lower one."""
     token = tokens.pop()
     if token in _UNARY:
-        value = _UNARY[token](_value(tokens, name, _UNARY_RANK))
+        value = _UNARY[token](_value(tokens, name, 8))
     elif token == "(":
         (value,) = _bracket(tokens, name)
     elif tokens[-1:] == ["("]:
@@ -65,11 +60,9 @@ def _value(tokens: list[str], name: Callable[[str], float | None], above: int = 
     return value
 
 
-def _bracket(tokens: list[str], name: Callable[[str], float | None]) -> list[float]:
+def _bracket(tokens: list[str], name: Names) -> list[float]:
     """The values up to a closing bracket, which is taken too."""
     values = [_value(tokens, name)]
     while (token := tokens.pop()) == ",":
         values.append(_value(tokens, name))
-    if token != ")":
-        raise ValueError(token)
-    return values
+    return values if token == ")" else []
