@@ -46,6 +46,15 @@ def test_the_mesh_leaves_the_space_between_the_walls_clear(name: str) -> None:
     assert mesh.vertices[rim][:, :, 2].min() == pytest.approx(0.06)  # closed at the bottom
 
 
+@pytest.mark.parametrize("profile", [[[0, 0], [0.024, 0.008], [0.032, 0.05]], None])
+def test_lines_of_a_bowl_have_a_length(profile: list[list[float]] | None) -> None:
+    """Also of a floor that rises from a point on the axis."""
+    shape = SMALL_BOWLS["revolved"]["bowl"] | ({"profile_m": profile} if profile else {})
+    data = {**plain_study({}), "bowl": {"material": "steel"} | shape}
+    lines = list(Study.model_validate(data).bowl.container.lines(0.04))
+    assert len(lines) > 6 and min(np.ptp(line, axis=0).max() for line in lines) > 1e-3
+
+
 @pytest.mark.parametrize("name", SMALL_BOWLS)
 def test_particles_start_within_the_walls(name: str, made: Made) -> None:
     study = made(SMALL_BOWLS[name]).study

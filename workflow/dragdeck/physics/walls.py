@@ -265,7 +265,7 @@ class Container(Part):
                 for r, z, end_r, end_z in ends
                 if min(z, end_z) <= height_m < max(z, end_z)
             ]
-        return [radius * circle for radius in sorted(radii, reverse=True)]
+        return [radius * circle for radius in sorted(radii, reverse=True) if radius > 0]
 
     def lines(self, height_m: float) -> Iterator[Floats]:
         """Its edges up to a height, and lines up its walls, (N, 3), m; of facets, sections."""
