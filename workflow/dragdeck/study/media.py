@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from dragdeck.parts import omitted
 from dragdeck.physics.walls import Container
 from dragdeck.study.base import MaterialName, Model, Name, NonNegative, Number, Positive, Whole
 from dragdeck.study.shapes import FEWEST_SPHERES, AnyShape, solid_fraction
@@ -49,10 +50,6 @@ INSTEAD_OF: Mapping[str, Sequence[str]] = {
 """Fields that others of a study that is extended give way to."""
 
 
-def _none(value: object) -> bool:
-    return value is None
-
-
 class Sieve(NamedTuple):
     """A row of a sieve analysis: diameter, m, and the fraction of the mass that is finer."""
 
@@ -63,31 +60,21 @@ class Sieve(NamedTuple):
 class Grains(Model):
     """Particles of one material and one distribution of sizes."""
 
-    material: MaterialName | None = Field(
-        default=None, description="material of the particles: a name under `materials`"
+    material: MaterialName | None = None
+    """material of the particles: a name under `materials`"""
+    radius_mean_m: Positive | None = None
+    """mean particle radius, m"""
+    radius_std_m: NonNegative = 0.0
+    """standard deviation of the particle radii, m"""
+    distribution: Literal["normal", "log_normal", "uniform"] = omitted("normal")
+    """distribution of the radii"""
+    sieve: Annotated[list[Sieve], Field(min_length=2, max_length=MOST_SIEVES)] | None = omitted(
+        None
     )
-    radius_mean_m: Positive | None = Field(default=None, description="mean particle radius, m")
-    radius_std_m: NonNegative = Field(
-        default=0.0, description="standard deviation of the particle radii, m"
-    )
-    distribution: Literal["normal", "log_normal", "uniform"] = Field(
-        default="normal",
-        description="distribution of the radii",
-        exclude_if=lambda value: value == "normal",
-    )
-    sieve: Annotated[list[Sieve], Field(min_length=2, max_length=MOST_SIEVES)] | None = Field(
-        default=None,
-        description="sieve analysis instead of radius_mean_m: rows [diameter in m, finer fraction "
-        "of the mass], linear in between; or a CSV file with the columns diameter_m and "
-        "mass_passing",
-        exclude_if=_none,
-    )
-    shape: AnyShape | None = Field(
-        default=None,
-        description="shape of the particles, none: spheres; radii are those of spheres of equal "
-        "volume",
-        exclude_if=_none,
-    )
+    """sieve analysis instead of radius_mean_m: rows [diameter in m, finer fraction of the mass],
+    linear in between; or a CSV file with the columns diameter_m and mass_passing"""
+    shape: AnyShape | None = omitted(None)
+    """shape of the particles, none: spheres; radii are those of spheres of equal volume"""
 
     @model_validator(mode="after")
     def _sizes(self) -> Self:
@@ -222,38 +209,24 @@ def _sieved(rows: Sequence[Sieve], count: int) -> Array:
 class MediaClass(Grains):
     """One of several classes of particles."""
 
-    fraction: Annotated[Number, Field(gt=0, le=1)] = Field(
-        description="fraction of the class; all fractions sum to 1"
-    )
+    fraction: Annotated[Number, Field(gt=0, le=1)]
+    """fraction of the class; all fractions sum to 1"""
 
 
 class Media(Grains):
     """The media: spherical particles of one class, or of several."""
 
-    count: Annotated[Whole, Field(ge=1)] | None = Field(
-        default=None, description="number of particles"
-    )
-    mass_kg: Positive | None = Field(
-        default=None, description="total mass, kg, instead of count", exclude_if=_none
-    )
-    fill_height_m: Positive | None = Field(
-        default=None,
-        description="expected height of the bed, m, instead of count; the report states the height "
-        "obtained",
-        exclude_if=_none,
-    )
-    classes: dict[Name, MediaClass] = Field(
-        default_factory=dict,
-        max_length=MOST_CLASSES,
-        description="several classes by name, each with material, sizes and fraction, instead of "
-        "material and sizes here",
-        exclude_if=lambda value: not value,
-    )
-    fractions_of: Literal["number", "mass", "volume"] = Field(
-        default="mass",
-        description="quantity to which the fractions of the classes refer",
-        exclude_if=lambda value: value == "mass",
-    )
+    count: Annotated[Whole, Field(ge=1)] | None = None
+    """number of particles"""
+    mass_kg: Positive | None = omitted(None)
+    """total mass, kg, instead of count"""
+    fill_height_m: Positive | None = omitted(None)
+    """expected height of the bed, m, instead of count; the report states the height obtained"""
+    classes: Annotated[dict[Name, MediaClass], Field(max_length=MOST_CLASSES)] = omitted({})
+    """several classes by name, each with material, sizes and fraction, instead of material and
+    sizes here"""
+    fractions_of: Literal["number", "mass", "volume"] = omitted("mass")
+    """quantity to which the fractions of the classes refer"""
 
     @model_validator(mode="after")
     def _whole(self) -> Self:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import Discriminator, Field, Tag, model_validator
 
+from dragdeck.parts import omitted
 from dragdeck.study.base import (
     Json,
     Line,
@@ -82,11 +83,10 @@ class Compound(Model):
     Nothing else of it is modelled. `pairs` has the coefficients of wet contacts.
     """
 
-    density_kg_m3: Positive = Field(description="density of the liquid, kg/m3")
-    level_m: Positive | None = Field(
-        default=None,
-        description="height of the liquid above the floor, m; none: up to the rim of the bowl",
-    )
+    density_kg_m3: Positive
+    """density of the liquid, kg/m3"""
+    level_m: Positive | None = None
+    """height of the liquid above the floor, m; none: up to the rim of the bowl"""
 
 
 class Superposed(Model):
@@ -128,56 +128,35 @@ class Motion(Superposed):
     """Immersion and path of the workpiece."""
 
     path: Annotated[AnyPath, Field(discriminator="kind")]
-    speed_m_s: Positive | None = Field(
-        default=None,
-        description="speed of the workpiece's axis along the path, m/s; required except for `rest` "
-        "and `waypoints`",
-    )
-    ramp_s: NonNegative = Field(
-        default=0.0,
-        exclude_if=lambda value: value == 0,
-        description="duration of the start from rest along the path, s, with `speed_factor` 1; "
-        "excluded from all statistics; not for `rest` and `waypoints`",
-    )
-    immersion_depth_m: Positive = Field(description="depth of the tip below the settled surface, m")
-    orientation: Literal["follow_path", "fixed"] = Field(
-        default="follow_path",
-        description="follow_path: the workpiece turns with its path; fixed: it does not turn",
-    )
-    tilt_deg: Annotated[Number, Field(ge=-45, le=45)] | None = Field(
-        default=None,
-        description="inclination of the workpiece, degrees; positive: its upper end leans in the "
-        "direction of motion, with orientation fixed in the first one; `spin` is then about the "
-        "inclined axis",
-    )
-    bowl: AnyBowlMotion | None = Field(
-        default=None, description="motion of the bowl during the whole process; none: it rests"
-    )
-    bed_friction_deg: Annotated[Number, Field(ge=0, lt=90)] = Field(
-        default=BED_FRICTION_DEG,
-        exclude_if=lambda value: value == BED_FRICTION_DEG,
-        description="angle of friction of the bed, degrees, by which its surface in a rotating "
-        "bowl is less inclined than that of a liquid",
-    )
-    plunge_at_m: tuple[Number, Number] | None = Field(
-        default=None,
-        description="x and y of the immersion, m; none: the bowl's axis for a circle, otherwise "
-        "the start of the path",
-    )
-    plunge_speed_m_s: Positive = Field(
-        default=0.05, description="vertical speed during the plunge, m/s"
-    )
-    approach_speed_m_s: Positive = Field(
-        default=0.02, description="speed from the place of immersion to the start of the path, m/s"
-    )
-    transient_m: NonNegative = Field(
-        description="initial path length excluded from all statistics, m"
-    )
-    counted_from_revolution: Annotated[Whole, Field(ge=1)] | None = Field(
-        default=None,
-        description="first revolution of a circle that the statistics include; none: all after "
-        "`transient_m`",
-    )
+    speed_m_s: Positive | None = None
+    """speed of the workpiece's axis along the path, m/s; required except for `rest` and
+    `waypoints`"""
+    ramp_s: NonNegative = omitted(0.0)
+    """duration of the start from rest along the path, s, with `speed_factor` 1; excluded from all
+    statistics; not for `rest` and `waypoints`"""
+    immersion_depth_m: Positive
+    """depth of the tip below the settled surface, m"""
+    orientation: Literal["follow_path", "fixed"] = "follow_path"
+    """follow_path: the workpiece turns with its path; fixed: it does not turn"""
+    tilt_deg: Annotated[Number, Field(ge=-45, le=45)] | None = None
+    """inclination of the workpiece, degrees; positive: its upper end leans in the direction of
+    motion, with orientation fixed in the first one; `spin` is then about the inclined axis"""
+    bowl: AnyBowlMotion | None = None
+    """motion of the bowl during the whole process; none: it rests"""
+    bed_friction_deg: Annotated[Number, Field(ge=0, lt=90)] = omitted(BED_FRICTION_DEG)
+    """angle of friction of the bed, degrees, by which its surface in a rotating bowl is less
+    inclined than that of a liquid"""
+    plunge_at_m: tuple[Number, Number] | None = None
+    """x and y of the immersion, m; none: the bowl's axis for a circle, otherwise the start of the
+    path"""
+    plunge_speed_m_s: Positive = 0.05
+    """vertical speed during the plunge, m/s"""
+    approach_speed_m_s: Positive = 0.02
+    """speed from the place of immersion to the start of the path, m/s"""
+    transient_m: NonNegative
+    """initial path length excluded from all statistics, m"""
+    counted_from_revolution: Annotated[Whole, Field(ge=1)] | None = None
+    """first revolution of a circle that the statistics include; none: all after `transient_m`"""
 
     @model_validator(mode="after")
     def _path(self) -> "Motion":
@@ -311,50 +290,37 @@ class Motion(Superposed):
 class DropTest(Model):
     """The drop test: one mean particle on a plate of the workpiece's material."""
 
-    height_m: Positive = Field(
-        default=0.010, description="gap between particle and plate at the start, m"
-    )
-    impacts: Annotated[Whole, Field(ge=1, le=20)] = Field(
-        default=3, description="number of impacts"
-    )
-    timestep_fraction: Annotated[Number, Field(gt=0, le=1)] = Field(
-        default=0.02, description="time step as a fraction of the Rayleigh time"
-    )
+    height_m: Positive = 0.010
+    """gap between particle and plate at the start, m"""
+    impacts: Annotated[Whole, Field(ge=1, le=20)] = 3
+    """number of impacts"""
+    timestep_fraction: Annotated[Number, Field(gt=0, le=1)] = 0.02
+    """time step as a fraction of the Rayleigh time"""
 
 
 class Filling(Model):
     """When a packing counts as settled."""
 
-    energy_ratio: Annotated[Number, Field(gt=0, le=1e-3)] = Field(
-        default=1e-5,
-        description="settling criterion: largest mean kinetic energy per particle / (m g d)",
-    )
-    max_time_s: Positive = Field(
-        default=10.0, description="simulated time after which an unsettled packing is rejected, s"
-    )
+    energy_ratio: Annotated[Number, Field(gt=0, le=1e-3)] = 1e-5
+    """settling criterion: largest mean kinetic energy per particle / (m g d)"""
+    max_time_s: Positive = 10.0
+    """simulated time after which an unsettled packing is rejected, s"""
 
 
 class Outputs(Model):
     """Sampling rates of a process run; each is a lower bound, in process time."""
 
-    workpiece_force_hz: Positive = Field(
-        default=1000.0, description="minimum sampling rate of force and torque on the workpiece, Hz"
-    )
-    workpiece_contacts_hz: Positive = Field(
-        default=200.0, description="minimum sampling rate of the contacts on the workpiece, Hz"
-    )
-    network_hz: Positive = Field(
-        default=20.0, description="minimum sampling rate of all contacts and particles, Hz"
-    )
-    n_checkpoints: Annotated[Whole, Field(ge=0, le=1000)] = Field(
-        default=50, description="number of checkpoints of a run, from which it can be resumed"
-    )
-    first_touch_fraction: Annotated[Number, Field(ge=0, le=1)] = Field(
-        default=0,
-        description="fraction of the drag, at its end, in which contacts on the workpiece are "
-        "written at every step, for the velocity at first touch",
-        exclude_if=lambda value: value == 0,
-    )
+    workpiece_force_hz: Positive = 1000.0
+    """minimum sampling rate of force and torque on the workpiece, Hz"""
+    workpiece_contacts_hz: Positive = 200.0
+    """minimum sampling rate of the contacts on the workpiece, Hz"""
+    network_hz: Positive = 20.0
+    """minimum sampling rate of all contacts and particles, Hz"""
+    n_checkpoints: Annotated[Whole, Field(ge=0, le=1000)] = 50
+    """number of checkpoints of a run, from which it can be resumed"""
+    first_touch_fraction: Annotated[Number, Field(ge=0, le=1)] = omitted(0)
+    """fraction of the drag, at its end, in which contacts on the workpiece are written at every
+    step, for the velocity at first touch"""
 
     @model_validator(mode="after")
     def _order(self) -> "Outputs":
@@ -383,19 +349,14 @@ LARGEST_TIMESTEP_FRACTION = 2.0
 class Windows(Model):
     """Short runs at physical stiffness along the path, until quantities are known well enough."""
 
-    tolerance: Annotated[Number, Field(ge=1e-4, lt=1)] = Field(
-        description="relative half-width of the 95 % confidence interval at which no further "
-        "window is run"
-    )
-    quantities: Annotated[list[Quantity], Field(min_length=1)] = Field(
-        default=["drag_mean"], description="quantities to which the tolerance applies"
-    )
-    most: Annotated[Whole, Field(ge=2, le=64)] = Field(
-        default=16, description="largest number of windows"
-    )
-    timestep_fraction: Annotated[Number, Field(gt=0, le=LARGEST_TIMESTEP_FRACTION)] = Field(
-        default=0.64, description="time step of the windows as a fraction of the Rayleigh time"
-    )
+    tolerance: Annotated[Number, Field(ge=1e-4, lt=1)]
+    """relative half-width of the 95 % confidence interval at which no further window is run"""
+    quantities: Annotated[list[Quantity], Field(min_length=1)] = Field(default=["drag_mean"])
+    """quantities to which the tolerance applies"""
+    most: Annotated[Whole, Field(ge=2, le=64)] = 16
+    """largest number of windows"""
+    timestep_fraction: Annotated[Number, Field(gt=0, le=LARGEST_TIMESTEP_FRACTION)] = 0.64
+    """time step of the windows as a fraction of the Rayleigh time"""
 
 
 class SoftStart(Model):
@@ -405,57 +366,35 @@ class SoftStart(Model):
     the run: the bed's surface, from which depth is measured, depends on them.
     """
 
-    youngs_modulus_scale: Annotated[Number, Field(gt=0, lt=1)] = Field(
-        description="multiplier of every Young's modulus"
-    )
-    timestep_fraction: Annotated[Number, Field(gt=0, le=LARGEST_TIMESTEP_FRACTION)] = Field(
-        default=0.3, description="time step as a fraction of the Rayleigh time"
-    )
+    youngs_modulus_scale: Annotated[Number, Field(gt=0, lt=1)]
+    """multiplier of every Young's modulus"""
+    timestep_fraction: Annotated[Number, Field(gt=0, le=LARGEST_TIMESTEP_FRACTION)] = 0.3
+    """time step as a fraction of the Rayleigh time"""
 
 
 class Fidelity(Model):
     """Settings for speed and accuracy."""
 
-    youngs_modulus_scale: Annotated[Number, Field(gt=0, le=1)] = Field(
-        default=1.0, description="multiplier of every Young's modulus; 1: physical stiffness"
-    )
-    soft_start: SoftStart | None = Field(
-        default=None,
-        description="settings of plunge, approach and the start of the drag; none: those of the "
-        "rest",
-        exclude_if=lambda value: value is None,
-    )
-    timestep_fraction: Annotated[Number, Field(gt=0, le=LARGEST_TIMESTEP_FRACTION)] = Field(
-        default=0.2, description="time step of the process as a fraction of the Rayleigh time"
-    )
-    filling_timestep_fraction: Annotated[Number, Field(gt=0, le=1)] = Field(
-        default=0.25, description="time step of the filling as a fraction of the Rayleigh time"
-    )
-    filling_youngs_modulus_scale: Annotated[Number, Field(gt=0, le=1)] | None = Field(
-        default=None,
-        description="multiplier of every Young's modulus in the filling; none: that of the "
-        "results, which is 1 with windows",
-        exclude_if=lambda value: value is None,
-    )
-    speed_factor: Annotated[Number, Field(ge=1, le=100)] = Field(
-        default=1.0, description="multiplier of the speed of the workpiece"
-    )
-    skin_m: Positive | None = Field(
-        default=None,
-        description="neighbour skin, m; none: 10 % of the mean particle radius, in a fast process "
-        "up to 30 %",
-    )
-    ranks: Ranks = Field(
-        default=2,
-        description="number of MPI ranks; auto: from particles, cases and cores "
-        "(docs/howto/running.md)",
-    )
+    youngs_modulus_scale: Annotated[Number, Field(gt=0, le=1)] = 1.0
+    """multiplier of every Young's modulus; 1: physical stiffness"""
+    soft_start: SoftStart | None = omitted(None)
+    """settings of plunge, approach and the start of the drag; none: those of the rest"""
+    timestep_fraction: Annotated[Number, Field(gt=0, le=LARGEST_TIMESTEP_FRACTION)] = 0.2
+    """time step of the process as a fraction of the Rayleigh time"""
+    filling_timestep_fraction: Annotated[Number, Field(gt=0, le=1)] = 0.25
+    """time step of the filling as a fraction of the Rayleigh time"""
+    filling_youngs_modulus_scale: Annotated[Number, Field(gt=0, le=1)] | None = omitted(None)
+    """multiplier of every Young's modulus in the filling; none: that of the results, which is 1
+    with windows"""
+    speed_factor: Annotated[Number, Field(ge=1, le=100)] = 1.0
+    """multiplier of the speed of the workpiece"""
+    skin_m: Positive | None = None
+    """neighbour skin, m; none: 10 % of the mean particle radius, in a fast process up to 30 %"""
+    ranks: Ranks = 2
+    """number of MPI ranks; auto: from particles, cases and cores (docs/howto/running.md)"""
 
-    windows: Windows | None = Field(
-        default=None,
-        description="windows of a run with reduced moduli; none: none are run",
-        exclude_if=lambda value: value is None,
-    )
+    windows: Windows | None = omitted(None)
+    """windows of a run with reduced moduli; none: none are run"""
 
     @model_validator(mode="after")
     def _parts_fit(self) -> Self:
@@ -506,18 +445,14 @@ class Fidelity(Model):
 class Tolerance(Model):
     """A tolerance instead of settings: runs go on until the results are inside it."""
 
-    tolerance: Annotated[Number, Field(ge=1e-4, lt=1)] = Field(
-        description="relative half-width of the 95 % confidence interval at the physical Young's "
-        "modulus"
-    )
+    tolerance: Annotated[Number, Field(ge=1e-4, lt=1)]
+    """relative half-width of the 95 % confidence interval at the physical Young's modulus"""
     quantity: Annotated[
         Annotated[Quantity, Tag("a-name")]
         | Annotated[list[Quantity], Field(min_length=1, max_length=8), Tag("a-list")],
         Discriminator(lambda value: "a-list" if isinstance(value, list) else "a-name"),
-    ] = Field(
-        default="drag_mean",
-        description="quantity, or list of up to eight, to which the tolerance applies",
-    )
+    ] = "drag_mean"
+    """quantity, or list of up to eight, to which the tolerance applies"""
 
     @property
     def quantities(self) -> Sequence[Quantity]:
@@ -543,12 +478,14 @@ AnyFidelity = Annotated[
 class Scaling(Model):
     """A power law of the mean drag as a function of one sweep field."""
 
-    field: str = Field(description="dotted name of the `sweep` field; its values must be above 0")
-    expected_exponent: Number | None = Field(default=None, description="expected exponent")
-    source: str | None = Field(default=None, description="source of the expected exponent")
-    fit_range: tuple[Positive, Positive] | None = Field(
-        default=None, description="lowest and highest value of the fit; none: all"
-    )
+    field: str
+    """dotted name of the `sweep` field; its values must be above 0"""
+    expected_exponent: Number | None = None
+    """expected exponent"""
+    source: str | None = None
+    """source of the expected exponent"""
+    fit_range: tuple[Positive, Positive] | None = None
+    """lowest and highest value of the fit; none: all"""
 
     @model_validator(mode="after")
     def _order(self) -> "Scaling":
@@ -565,21 +502,20 @@ class Scaling(Model):
 class Assumption(Model):
     """A value that the source of the study does not give."""
 
-    field: str = Field(description="dotted name of the field whose value is assumed")
-    why: str = Field(description="what the source reports, and the reason for the value")
+    field: str
+    """dotted name of the field whose value is assumed"""
+    why: str
+    """what the source reports, and the reason for the value"""
 
 
 class Accepted(Model):
     """Limits that a study goes beyond on purpose."""
 
-    unsafe_timestep: Line | None = Field(
-        default=None,
-        description="reason for a time step that is forecast to be unstable, and for accepting its "
-        "run; shown in the report",
-    )
-    cases: Annotated[Whole, Field(ge=1)] = Field(
-        default=200, description="largest number of cases of `sweep`"
-    )
+    unsafe_timestep: Line | None = None
+    """reason for a time step that is forecast to be unstable, and for accepting its run; shown in
+    the report"""
+    cases: Annotated[Whole, Field(ge=1)] = 200
+    """largest number of cases of `sweep`"""
 
 
 BUILT_IN_FIDELITIES: Mapping[str, Fidelity] = {
@@ -601,50 +537,41 @@ OF_NO_RUN = (
 class Study(Model):
     """A whole study file."""
 
-    title: Line = Field(description="title of the study in one line, used in headings")
-    licence: Line | None = Field(
-        default=None,
-        description="licence of the results, as an SPDX name or an address; the RO-Crate states it",
-    )
-    gravity_m_s2: Positive = Field(
-        default=9.81, description="gravitational acceleration along -z, m/s2"
-    )
+    title: Line
+    """title of the study in one line, used in headings"""
+    licence: Line | None = None
+    """licence of the results, as an SPDX name or an address; the RO-Crate states it"""
+    gravity_m_s2: Positive = 9.81
+    """gravitational acceleration along -z, m/s2"""
     materials: dict[MaterialName, Material] = Field(max_length=MOST_CLASSES)
-    pairs: dict[str, Pair] = Field(
-        description="'a-b': contact coefficients of the materials a and b"
-    )
+    pairs: dict[str, Pair]
+    """'a-b': contact coefficients of the materials a and b"""
     media: Media
     bowl: Annotated[AnyBowl, Discriminator(_kind_of_bowl)]
-    compound: Compound | None = Field(default=None, exclude_if=lambda value: value is None)
+    compound: Compound | None = omitted(None)
     workpiece: Workpiece
     workpieces: Carousel | None = None
     motion: Motion
-    reduction: Reduction | None = Field(default=None, exclude_if=lambda value: value is None)
+    reduction: Reduction | None = omitted(None)
     contact: Contact = Contact()
     drop_test: DropTest = DropTest()
     calibration: Calibration | None = None
     filling: Filling = Filling()
     outputs: Outputs = Outputs()
-    fidelity: AnyFidelity = Field(
-        default="standard",
-        description="settings for speed and accuracy: a name, a block, or a tolerance",
-    )
+    fidelity: AnyFidelity = "standard"
+    """settings for speed and accuracy: a name, a block, or a tolerance"""
     fidelities: dict[Name, Fidelity] = Field(default_factory=dict)
-    seed: Annotated[Whole, Field(ge=0, lt=2**32)] = Field(
-        default=1,
-        description="random seed of the initial positions and velocities; one seed is one packing",
-    )
-    sweep: dict[str, list[Any]] = Field(
-        default_factory=dict,
-        description="dotted field name: list of values; every combination is a case",
-    )
+    seed: Annotated[Whole, Field(ge=0, lt=2**32)] = 1
+    """random seed of the initial positions and velocities; one seed is one packing"""
+    sweep: dict[str, list[Any]] = Field(default_factory=dict)
+    """dotted field name: list of values; every combination is a case"""
     scaling: Scaling | None = None
     accepted: Accepted = Accepted()
     assumptions: list[Assumption] = Field(default_factory=list)
     reference: Reference | None = None
-    removal: Removal | None = Field(default=None, exclude_if=lambda value: value is None)
-    roughness: Roughness | None = Field(default=None, exclude_if=lambda value: value is None)
-    search: Search | None = Field(default=None, exclude_if=lambda value: value is None)
+    removal: Removal | None = omitted(None)
+    roughness: Roughness | None = omitted(None)
+    search: Search | None = omitted(None)
 
     def of_each_workpiece(self) -> Sequence["Study"]:
         """The study of each workpiece alone, its path and its place of immersion turned.

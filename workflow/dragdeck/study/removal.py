@@ -25,36 +25,31 @@ _TELLS = 0.5
 class WeighedTrial(Model):
     """A trial after which the workpiece was weighed."""
 
-    mass_loss_kg: Positive = Field(description="mass that one workpiece lost in the trial, kg")
-    time_s: Positive = Field(description="duration of the trial, s")
-    sd_kg: Positive = Field(description="standard uncertainty of `mass_loss_kg`, kg")
+    mass_loss_kg: Positive
+    """mass that one workpiece lost in the trial, kg"""
+    time_s: Positive
+    """duration of the trial, s"""
+    sd_kg: Positive
+    """standard uncertainty of `mass_loss_kg`, kg"""
 
 
 class Removal(Model):
     """How load becomes removal, for the report; no run depends on it."""
 
-    law: str = Field(
-        default="archard",
-        description="law of removal: `archard`, `finnie`, `oka`, or a sum such as `archard+oka`",
-    )
-    coefficient_m2_n: Positive | None = Field(
-        default=None, description="removed volume per action, m2/N; none: from `calibrate`"
-    )
-    sd_m2_n: Positive | None = Field(
-        default=None, description="standard uncertainty of `coefficient_m2_n`, m2/N"
-    )
-    calibrate: Annotated[list[WeighedTrial], Field(min_length=1, max_length=100)] | None = Field(
-        default=None, description="weighed trial of this process, or a list of those"
-    )
-    impact_ratio: Positive | None = Field(
-        default=None, description="of a sum: coefficient of the impact law / that of sliding"
-    )
-    hardness_pa: Positive | None = Field(
-        default=None, description="Vickers hardness of the workpiece, Pa; for `oka` only"
-    )
-    target_depth_m: Positive | None = Field(
-        default=None, description="removal depth for which the time is reported, m"
-    )
+    law: str = "archard"
+    """law of removal: `archard`, `finnie`, `oka`, or a sum such as `archard+oka`"""
+    coefficient_m2_n: Positive | None = None
+    """removed volume per action, m2/N; none: from `calibrate`"""
+    sd_m2_n: Positive | None = None
+    """standard uncertainty of `coefficient_m2_n`, m2/N"""
+    calibrate: Annotated[list[WeighedTrial], Field(min_length=1, max_length=100)] | None = None
+    """weighed trial of this process, or a list of those"""
+    impact_ratio: Positive | None = None
+    """of a sum: coefficient of the impact law / that of sliding"""
+    hardness_pa: Positive | None = None
+    """Vickers hardness of the workpiece, Pa; for `oka` only"""
+    target_depth_m: Positive | None = None
+    """removal depth for which the time is reported, m"""
 
     @field_validator("calibrate", mode="before")
     @classmethod

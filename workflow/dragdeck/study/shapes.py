@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from dragdeck.parts import omitted
 from dragdeck.physics.estimates import SOLID_FRACTION_ESTIMATE
 from dragdeck.study.base import Model, Number, Positive, Whole
 
@@ -72,9 +73,8 @@ class ParticleShape(Model):
 
     denser: ClassVar[float] = 1.04
 
-    spheres: Annotated[Whole, Field(ge=FEWEST_SPHERES, le=MOST_SPHERES)] = Field(
-        description="number of spheres; `./run dragdeck shapes` lists the errors"
-    )
+    spheres: Annotated[Whole, Field(ge=FEWEST_SPHERES, le=MOST_SPHERES)]
+    """number of spheres; `./run dragdeck shapes` lists the errors"""
 
     def corners(self) -> Corners:
         """Points whose convex hull is the body, (N, 3); their scale is of no importance."""
@@ -93,14 +93,12 @@ class CylinderParticle(ParticleShape):
 
     denser: ClassVar[float] = 1.06
 
-    kind: Literal["cylinder"] = Field(description="cylinder with straight ends, or cut at an angle")
-    aspect: _Aspect = Field(description="length / diameter")
-    cut_deg: Annotated[Number, Field(ge=0, le=60)] = Field(
-        default=0.0,
-        description="angle of the two parallel end faces from those of a straight cylinder, "
-        "degrees",
-        exclude_if=lambda value: not value,
-    )
+    kind: Literal["cylinder"]
+    """cylinder with straight ends, or cut at an angle"""
+    aspect: _Aspect
+    """length / diameter"""
+    cut_deg: Annotated[Number, Field(ge=0, le=60)] = omitted(0.0)
+    """angle of the two parallel end faces from those of a straight cylinder, degrees"""
 
     def corners(self) -> Corners:
         """The rims of both ends."""
@@ -113,8 +111,10 @@ class ConeParticle(ParticleShape):
 
     denser: ClassVar[float] = 1.07
 
-    kind: Literal["cone"] = Field(description="circular cone")
-    aspect: _Aspect = Field(description="height / diameter of the base")
+    kind: Literal["cone"]
+    """circular cone"""
+    aspect: _Aspect
+    """height / diameter of the base"""
 
     def corners(self) -> Corners:
         """The rim of the base and the tip."""
@@ -126,7 +126,8 @@ class TetrahedronParticle(ParticleShape):
 
     denser: ClassVar[float] = 1.01
 
-    kind: Literal["tetrahedron"] = Field(description="regular tetrahedron")
+    kind: Literal["tetrahedron"]
+    """regular tetrahedron"""
 
     def corners(self) -> Corners:
         """Four corners of a cube."""
@@ -138,10 +139,10 @@ class PrismParticle(ParticleShape):
 
     denser: ClassVar[float] = 1.01
 
-    kind: Literal["triangular_prism"] = Field(
-        description="straight prism on an equilateral triangle"
-    )
-    aspect: _Aspect = Field(description="length / side of the triangle")
+    kind: Literal["triangular_prism"]
+    """straight prism on an equilateral triangle"""
+    aspect: _Aspect
+    """length / side of the triangle"""
 
     def corners(self) -> Corners:
         """Three corners of each end."""
@@ -155,10 +156,10 @@ class EllipsoidParticle(ParticleShape):
 
     denser: ClassVar[float] = 1.06
 
-    kind: Literal["ellipsoid"] = Field(description="ellipsoid")
-    axes: tuple[Positive, Positive, Positive] = Field(
-        description="proportions of the half-axes, such as [2, 1, 1]; ratio at most 5"
-    )
+    kind: Literal["ellipsoid"]
+    """ellipsoid"""
+    axes: tuple[Positive, Positive, Positive]
+    """proportions of the half-axes, such as [2, 1, 1]; ratio at most 5"""
 
     @model_validator(mode="after")
     def _proportion(self) -> Self:
@@ -181,13 +182,12 @@ class EllipsoidParticle(ParticleShape):
 class MeshParticle(ParticleShape):
     """A body of the user's; its size in the file is of no importance."""
 
-    kind: Literal["mesh"] = Field(description="convex body from a mesh file")
+    kind: Literal["mesh"]
+    """convex body from a mesh file"""
     points: Annotated[
         tuple[tuple[Number, Number, Number], ...], Field(min_length=4, max_length=MOST_CORNERS)
-    ] = Field(
-        description="file beside the study with a closed, convex surface, for example STL; or a "
-        "list of corners"
-    )
+    ]
+    """file beside the study with a closed, convex surface, for example STL; or a list of corners"""
 
     def corners(self) -> Corners:
         """As given."""

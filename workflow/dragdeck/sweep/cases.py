@@ -67,20 +67,13 @@ class DesignPoint(NamedTuple):
 class Variation(Model):
     """Points that belong together: every combination of the values that vary."""
 
-    vary: dict[str, list[Any]] = Field(
-        default_factory=dict,
-        description="dotted field name: list of values; every combination is a design point",
-    )
-    one_by_one: dict[str, list[Any]] = Field(
-        default_factory=dict,
-        description="dotted field name: list of values that are varied one at a time, at every "
-        "combination of `vary`",
-    )
-    others: dict[str, Any] = Field(
-        default_factory=dict,
-        alias="with",
-        description="dotted field name: value at all these points",
-    )
+    vary: dict[str, list[Any]] = Field(default_factory=dict)
+    """dotted field name: list of values; every combination is a design point"""
+    one_by_one: dict[str, list[Any]] = Field(default_factory=dict)
+    """dotted field name: list of values that are varied one at a time, at every combination of
+    `vary`"""
+    others: dict[str, Any] = Field(default_factory=dict, alias="with")
+    """dotted field name: value at all these points"""
 
     @property
     def count(self) -> int:
@@ -104,12 +97,10 @@ Block = TypeVar("Block", bound=Variation)
 class Design(Model, Generic[Block]):
     """Points with what all of them share and what they are compared with."""
 
-    base: dict[str, Any] = Field(
-        description="dotted field name: value at all points that do not set it"
-    )
-    reference: Block = Field(
-        description="reference settings, to which errors are relative; a single point"
-    )
+    base: dict[str, Any]
+    """dotted field name: value at all points that do not set it"""
+    reference: Block
+    """reference settings, to which errors are relative; a single point"""
     points: list[Block] = Field(default_factory=list)
 
     @classmethod

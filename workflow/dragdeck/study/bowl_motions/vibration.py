@@ -20,20 +20,17 @@ class Vibration(BowlMotion):
     middle place.
     """
 
-    kind: Literal["vibration"] = Field(description="vibration without turning")
-    amplitude_m: tuple[NonNegative, NonNegative, NonNegative] = Field(
-        description="amplitudes along x, y and z, m"
-    )
-    phase_deg: tuple[Number, Number, Number] = Field(
-        default=(0.0, 0.0, 0.0),
-        description="phases along x, y and z, degrees; 0 and 90 along two axes: an ellipse",
-    )
-    frequency_hz: Positive = Field(description="frequency, Hz")
-    ramp_s: Annotated[Number, Field(gt=0)] = Field(
-        default=0.1,
-        description="time in which the amplitudes rise from zero, s, with `speed_factor` 1; it "
-        "begins before the plunge",
-    )
+    kind: Literal["vibration"]
+    """vibration without turning"""
+    amplitude_m: tuple[NonNegative, NonNegative, NonNegative]
+    """amplitudes along x, y and z, m"""
+    phase_deg: tuple[Number, Number, Number] = (0.0, 0.0, 0.0)
+    """phases along x, y and z, degrees; 0 and 90 along two axes: an ellipse"""
+    frequency_hz: Positive
+    """frequency, Hz"""
+    ramp_s: Annotated[Number, Field(gt=0)] = 0.1
+    """time in which the amplitudes rise from zero, s, with `speed_factor` 1; it begins before the
+    plunge"""
 
     @model_validator(mode="after")
     def _vibrates(self) -> Self:

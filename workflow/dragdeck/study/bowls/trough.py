@@ -3,8 +3,6 @@
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Literal
 
-from pydantic import Field
-
 from dragdeck.mesh import shapes
 from dragdeck.physics.walls import Container, Wall
 from dragdeck.study.base import Positive
@@ -17,9 +15,12 @@ if TYPE_CHECKING:
 class TroughBowl(Bowl):
     """A rectangular trough with its sides along x and y."""
 
-    kind: Literal["trough"] = Field(description="rectangular trough, the z axis in its middle")
-    length_m: Positive = Field(description="inner length of the trough along x, m")
-    width_m: Positive = Field(description="inner width of the trough along y, m")
+    kind: Literal["trough"]
+    """rectangular trough, the z axis in its middle"""
+    length_m: Positive
+    """inner length of the trough along x, m"""
+    width_m: Positive
+    """inner width of the trough along y, m"""
 
     @property
     def container(self) -> Container:

@@ -7,12 +7,11 @@ says better.
 import math
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
-from pydantic import Field
 
-from dragdeck.study.base import Json, Model, Number
+from dragdeck.study.base import Json, Model
 from dragdeck.study.drive import (
     Drive,
     EngineMotion,
@@ -26,13 +25,6 @@ from dragdeck.study.drive import (
     wrap_angle,
 )
 
-StartAngle = Annotated[
-    Number,
-    Field(
-        description="polar angle of the start of the path about the bowl's axis, from +x, degrees",
-        exclude_if=lambda value: value == 0,
-    ),
-]
 Point = tuple[float, float]
 Vector = tuple[float, float, float]
 

@@ -71,23 +71,18 @@ class WaypointsPath(WorkpiecePath):
 
     length_field: ClassVar[str] = "fraction"
 
-    kind: Literal["waypoints"] = Field(
-        description="recorded path with its own speed and rotation; lengths along it refer to its "
-        "mean speed; `orientation` has no effect"
-    )
-    file: Line | None = Field(
-        default=None,
-        description="CSV file with the columns time_s, x_m, y_m and optionally z_m, turn_deg, "
-        "pitch_deg and roll_deg; relative to the study; either this or `points`",
-    )
+    kind: Literal["waypoints"]
+    """recorded path with its own speed and rotation; lengths along it refer to its mean speed;
+    `orientation` has no effect"""
+    file: Line | None = None
+    """CSV file with the columns time_s, x_m, y_m and optionally z_m, turn_deg, pitch_deg and
+    roll_deg; relative to the study; either this or `points`"""
     points: Annotated[list[Waypoint], Field(min_length=2, max_length=MOST_POINTS)] = Field(
-        default_factory=list,
-        description="rows of the same columns, in s, m and degrees; the last four may be left out "
-        "(0)",
+        default_factory=list
     )
-    fraction: Annotated[Number, Field(gt=0, le=1)] = Field(
-        default=1.0, description="fraction of the recorded time that is simulated, from its start"
-    )
+    """rows of the same columns, in s, m and degrees; the last four may be left out (0)"""
+    fraction: Annotated[Number, Field(gt=0, le=1)] = 1.0
+    """fraction of the recorded time that is simulated, from its start"""
 
     @field_validator("points")
     @classmethod

@@ -30,11 +30,11 @@ from dragdeck.study.superposed.motion import SuperposedMotion
 class SpinStage(Model):
     """A stretch of constant spin."""
 
-    until_s: Positive = Field(
-        description="end of the stage, s from the start of the drag, with `speed_factor` 1; the "
-        "last stage lasts to the end of the drag"
-    )
-    rpm: Number = Field(description="rotational speed, 1/min; positive: counter-clockwise")
+    until_s: Positive
+    """end of the stage, s from the start of the drag, with `speed_factor` 1; the last stage lasts
+    to the end of the drag"""
+    rpm: Number
+    """rotational speed, 1/min; positive: counter-clockwise"""
 
 
 class Spin(SuperposedMotion):
@@ -43,11 +43,9 @@ class Spin(SuperposedMotion):
     kind: ClassVar[str] = "spin"
     turns: ClassVar[bool] = True
 
-    rpm: Number | None = Field(
-        default=None,
-        description="rotational speed during the drag, relative to `orientation`, 1/min; positive: "
-        "counter-clockwise seen from above; either this or `schedule`",
-    )
+    rpm: Number | None = None
+    """rotational speed during the drag, relative to `orientation`, 1/min; positive:
+    counter-clockwise seen from above; either this or `schedule`"""
     schedule: list[SpinStage] | None = Field(default=None, min_length=1, max_length=100)
 
     @model_validator(mode="after")
