@@ -33,7 +33,7 @@ from dragdeck.physics.rounding import rounded
 from dragdeck.physics.run_limits import ENGINE_SOFTEST_PA
 from dragdeck.physics.walls import round_container
 from dragdeck.records.case import CaseOfRun
-from dragdeck.scenes.scene import case_of_study, material_table
+from dragdeck.scenes.scene import case_of_study, deck_of_study
 from dragdeck.study.calibration import Drum, Repose, Rig
 from dragdeck.study.media import Array
 from dragdeck.study.model import Fidelity, Study
@@ -142,18 +142,17 @@ def angle_scene(case: Case, run: AngleRun, stiffness: float = STIFFNESS) -> Scen
     dt, rayleigh = bed_timestep(study, "timestep_fraction"), bed_rayleigh_time(study)
     start, stop, end = (round(time / dt) for time in placed.times_s)
     period, glued, of = -(-end // _FRAMES), len(placed.glued), Case(case.file, {}, study)
-    steps, fidelity = _FRAMES * period, study.chosen_fidelity()
+    steps = _FRAMES * period
     read_with = {"glued": glued, "drum_radius_m": drum.radius_m if drum else 0.0}
     names = [study.media.main_material, study.bowl.material]
-    deck = AngleDeck(
+    deck = deck_of_study(
+        AngleDeck,
+        of,
+        names,
         title=f"{run.rig}: {study.title}",
-        study=case.study_name,
         scene="angles",
         run=run.rig,
         source="particles.data",
-        materials=material_table(study, names, fidelity.youngs_modulus_scale, of),
-        limit_force=study.contact.limit_force,
-        gravity_m_s2=study.gravity_m_s2,
         gravity_direction=(0, -1, 0) if drum else (0, 0, -1),
         skin_m=widest_skin(study),
         timestep_s=dt,
@@ -174,7 +173,7 @@ def angle_scene(case: Case, run: AngleRun, stiffness: float = STIFFNESS) -> Scen
     side = -placed.edge_m - size, placed.edge_m + size
     box = side, side, (placed.bottom_m - size, placed.top_m + size)
     angle = run.model_copy(update={**read_with, "counted_from": stop})
-    content = case_of_study(AngleCase, of, run.rig, dt, rayleigh, angle=angle)
+    content = case_of_study(AngleCase, of, deck, angle=angle)
     media = content.media.model_copy(update={"count": len(bodies)})
     files = {
         "particles.data": lambda: data_file(deck.title, len(names), box, bodies),

@@ -59,10 +59,10 @@ from dragdeck.scenes.scene import (
     acting_gravity,
     case_of_study,
     check_submerged,
+    deck_of_study,
     liquid,
     liquid_leaves_out,
     liquid_models,
-    material_table,
     media_of_run,
 )
 from dragdeck.study.base import Json, without_fields
@@ -114,26 +114,24 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
     _check_capacity(case)
     _check_cells(case)
     check_submerged(case, expected_bed(study))
-    fidelity = study.chosen_fidelity()
-    rayleigh = bed_rayleigh_time(study)
     dt = bed_timestep(study, "filling_timestep_fraction")
     check_steps = max(1, math.ceil(_CHECK_INTERVAL_S / dt))
     top, start = box_top(study), _start(study)
     longest = study.filling.max_time_s
     types, meshed = _filling_types(study), bool(study.bowl.container.rim)
-    deck = FillingDeck(
+    deck = deck_of_study(
+        FillingDeck,
+        case,
+        types,
         title=f"Filling: {study.title}",
-        study=case.study_name,
         scene="filling",
         run=FILLING.run_id(case),
         source="particles.data",
-        materials=material_table(study, types, fidelity.youngs_modulus_scale, case),
-        limit_force=study.contact.limit_force,
         gravity_m_s2=acting_gravity(study),
         liquid=liquid(study),
         skin_m=skin(study),
         timestep_s=dt,
-        rayleigh_time_s=rayleigh,
+        rayleigh_time_s=bed_rayleigh_time(study),
         outputs=(outputs.thermo(check_steps, None), outputs.settled_particles(study.media.clumped)),
         thermo_steps=check_steps,
         checkpoint_steps=5 * check_steps,
@@ -156,9 +154,7 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
         case=case_of_study(
             FillingCase,
             case,
-            FILLING.run_id(case),
-            dt,
-            rayleigh,
+            deck,
             inputs=_content(case),
             media=media_of_run(study, buoyancy_density(study)),
             settled=SettlingCriterion(

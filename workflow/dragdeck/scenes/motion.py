@@ -359,7 +359,7 @@ class ProcessDeck(Deck):
     bowl_motion: EngineMotion
     workpiece_type: int
     workpieces: Sequence[MovedWorkpiece]
-    stops: Sequence[Stop]
+    stops: Sequence[Stop] = ()
     entry_step: int = 0
 
     @property

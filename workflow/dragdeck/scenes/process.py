@@ -52,10 +52,10 @@ from dragdeck.scenes.scene import (
     assumed,
     case_of_study,
     check_submerged,
+    deck_of_study,
     liquid,
     liquid_leaves_out,
     liquid_models,
-    material_table,
     media_of_run,
     said_study,
 )
@@ -109,7 +109,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
     whole = with_lead(case.all_workpieces)
     each = of_each_workpiece(whole)
     study, counts = whole.study, [workpiece_facets(workpiece) for workpiece in each]
-    fidelity, facets = study.chosen_fidelity(), study.bowl_facet_size_m is not None
+    facets = study.bowl_facet_size_m is not None
     settled = bed or expected_bed(study)
     dt, top = bed_timestep(study, "timestep_fraction"), box_top(study)
     check_bowl_motion(whole, settled, top)
@@ -134,19 +134,17 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
     skin = max(map(process_skin, each))
     gravity, down = driven_gravity(study, acting_gravity(study))
     types, parts = study.type_names(), rank_split(whole, skin)
-    materials = material_table(study, types, fidelity.youngs_modulus_scale, whole)
     bowl = study.bowl.closed
     primitive = tuple(wall for wall in bowl.walls if not facets or wall.name == LID)
     touches = study.outputs.first_touch_fraction if steps.end == drag.end else 0.0
-    deck = ProcessDeck(
-        title=study.title,
-        study=whole.study_name,
+    deck = deck_of_study(
+        ProcessDeck,
+        whole,
+        types,
         case=whole.name,
         scene="process",
         run=PROCESS.run_id(whole),
         source=_source(whole),
-        materials=materials,
-        limit_force=study.contact.limit_force,
         gravity_m_s2=gravity,
         gravity_direction=down,
         liquid=liquid(study),
@@ -175,9 +173,9 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         clumped=study.media.clumped,
         workpiece_type=types.index(study.workpiece.material) + 1,
         workpieces=moved,
-        stops=list(stops(whole, drag, steps, materials)),
         entry_step=steps.entry,
     )
+    deck = replace(deck, stops=list(stops(whole, drag, steps, deck.materials)))
     number = max(case.number, 1) - 1
     files = {WORKPIECE_MESH: partial(_stl, each[number])}
     fastest = max(map(_fastest, each, courses))
@@ -193,9 +191,9 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
             number,
             bed.surface_m,
             courses[number],
+            deck,
             limits,
             steps,
-            skin,
             None if jam else thrown_speed(study.gravity_m_s2, top, fastest),
         ),
         steps=steps.end - steps.entry,
@@ -280,9 +278,9 @@ def _process_case(
     number: int,
     surface_m: float,
     way: Course,
+    deck: ProcessDeck,
     limits: RunLimits,
     steps: Covered,
-    skin_m: float,
     thrown_m_s: float | None,
 ) -> ProcessCase:
     case, drag = each[number], way.drag
@@ -293,13 +291,9 @@ def _process_case(
     return case_of_study(
         ProcessCase,
         case,
-        PROCESS.run_id(case),
-        drag.timestep_s,
-        bed_rayleigh_time(study),
-        settings={
-            **study.chosen_fidelity().model_dump(include={"timestep_fraction", "speed_factor"}),
-            "skin_m": skin_m,
-        },
+        deck,
+        settings=study.chosen_fidelity().model_dump(include={"timestep_fraction", "speed_factor"}),
+        run=PROCESS.run_id(case),
         media=media_of_run(study, buoyancy_density(study)),
         bowl=BowlOfRun(
             **dict(study.bowl.closed),

@@ -10,9 +10,9 @@ import numpy as np
 from pydantic import ValidationError
 
 from dragdeck import __version__
-from dragdeck.cases.bed import bed_classes, bed_density, body_sizes, particle_material, skin
+from dragdeck.cases.bed import bed_classes, bed_density, body_sizes, particle_material
 from dragdeck.cases.case import Case, digest, slug
-from dragdeck.decks.deck import NOT_OF_LIQUID, LeftOut, Liquid, Materials, Scene, contact_law
+from dragdeck.decks.deck import NOT_OF_LIQUID, Deck, LeftOut, Liquid, Materials, Scene, contact_law
 from dragdeck.errors import InputError
 from dragdeck.physics.contact_mechanics import ContactConstants, effective_modulus, effective_shear
 from dragdeck.physics.packing import Bed
@@ -25,7 +25,7 @@ from dragdeck.study.base import Json, flat, without_fields
 from dragdeck.study.contact_law import Pair
 from dragdeck.study.model import LARGEST_TIMESTEP_FRACTION, Study
 
-C = TypeVar("C", bound=CaseOfRun)
+C, D = TypeVar("C", bound=CaseOfRun), TypeVar("D", bound=Deck)
 
 StudyScene = Scene[CaseOfRun]
 """A run of a study's case."""
@@ -151,13 +151,36 @@ class SceneType:
         return digest(said)
 
 
+def deck_of_study(kind: type[D], of: Case, types: Sequence[str], **parts: Any) -> D:
+    """The content of an input script of a run of a study's case.
+
+    Parameters
+    ----------
+    kind : type
+        Of the scene's decks.
+    of : Case
+    types : sequence of str
+        The material of each type of LIGGGHTS, the particles first.
+    **parts
+        What this scene's deck has beyond the others', or has otherwise.
+    """
+    study = of.study
+    entries = {
+        "title": study.title,
+        "study": of.study_name,
+        "materials": material_table(study, types, study.chosen_fidelity().youngs_modulus_scale, of),
+        "limit_force": study.contact.limit_force,
+        "gravity_m_s2": study.gravity_m_s2,
+    }
+    return kind(**{**entries, **parts})
+
+
 def case_of_study(
     kind: type[C],
     of: Case,
-    run: str,
-    timestep_s: float,
-    rayleigh_time_s: float,
+    deck: Deck,
     *,
+    rayleigh_time_s: float | None = None,
     settings: Json | None = None,
     **parts: Any,
 ) -> C:
@@ -168,21 +191,23 @@ def case_of_study(
     kind : type
         The model of the scene's case file.
     of : Case
-    run : str
-        The run id.
-    timestep_s, rayleigh_time_s : float
+    deck : Deck
+        Of the run.
+    rayleigh_time_s : float, optional
+        If not that of the deck.
     settings : mapping, optional
-        What is not the case's modulus, skin and ranks, the given step, and no faster workpiece.
-    **own
+        What is not the deck's, the case's number of ranks, and no faster workpiece.
+    **parts
         What this scene's case file has beyond the others', or has otherwise.
     """
     study = of.study
+    rayleigh_time_s = rayleigh_time_s or deck.rayleigh_time_s
     usual = {
         "name": of.fidelity_name,
-        "youngs_modulus_scale": study.chosen_fidelity().youngs_modulus_scale,
-        "timestep_fraction": round_to(timestep_s / rayleigh_time_s, 3),
+        "youngs_modulus_scale": deck.materials.youngs_modulus_scale,
+        "timestep_fraction": round_to(deck.timestep_s / rayleigh_time_s, 3),
         "speed_factor": 1.0,
-        "skin_m": skin(study),
+        "skin_m": deck.skin_m,
         "ranks": of.ranks,
     }
     fidelity = FidelityOfRun(**{**usual, **(settings or {})})
@@ -190,8 +215,8 @@ def case_of_study(
     entries = {
         "study_name": of.study_name,
         "title": study.title,
-        "run": run,
-        "timestep_s": timestep_s,
+        "run": deck.run,
+        "timestep_s": deck.timestep_s,
         "rayleigh_time_s": rayleigh_time_s,
         "gravity_m_s2": study.gravity_m_s2,
         "fidelity": fidelity,
