@@ -56,7 +56,7 @@ def section(page: str, start: str, end: str) -> str:
 
 
 def test_every_target_is_on_the_page_and_in_the_usage() -> None:
-    usage = "".join((ROOT / name).read_text() for name in ("run", "workflow/run.sh"))
+    usage = "".join(file.read_text() for file in (ROOT / "workflow").glob("[ur]*.*"))
     rules = "".join(file.read_text() for file in SNAKEFILES)
     targets = set(re.findall(r"^rule (\w+):", rules, re.M))
     assert first_cells(section("docs/reference/snakemake.md", "## Targets", "\n## ")) == targets

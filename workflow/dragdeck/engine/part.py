@@ -23,7 +23,7 @@ from dragdeck.engine.space import SPARE_BYTES, check_space, free_bytes, space_le
 from dragdeck.engine.watch import EngineEnded, LimitMet, Watcher, cut_screen
 from dragdeck.errors import EngineError, RejectedRunError
 from dragdeck.records.run import (
-    REMEDIES,
+    CHECKS,
     AcceptanceCheck,
     CaseFile,
     CheckCode,
@@ -228,7 +228,7 @@ class PartOfRun:
         """Note the checks, and that the run is complete or failed."""
         passed, told = all(check.passed for check in checks), causes(checks)
         checks = [
-            check.model_copy(update={"remedy": REMEDIES.get(check.code)})
+            check.model_copy(update={"remedy": CHECKS[check.code]["remedy"] or None})
             if check in told
             else check
             for check in checks

@@ -14,6 +14,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from dragdeck.errors import Caution, InputError, RecordError, choices, near, together
+from dragdeck.files import table_rows
 from dragdeck.study.base import Json, Model, flat
 from dragdeck.study.driven import directions
 from dragdeck.study.model import (
@@ -468,35 +469,7 @@ def warnings(study: Study) -> list[Caution]:
 _FORMS = ("a-name", "a-list", "a-number", "a-word", "settings", "a-tolerance", "[key]")
 """Names of alternatives, which are no part of a field's dotted name; nor are kinds."""
 
-_OUT_OF_RANGE = "the value is out of range"
-_ENTRIES = "the list has {actual_length} entries"
-_BLOCK, _LIST = "a block of fields is required", "a list is required"
-_WHOLE, _SWITCH = "a whole number is required", "true or false is required"
-_WORDS = {
-    "string_type": ("text is required", None),
-    "bool_type": (_SWITCH, None),
-    "bool_parsing": (_SWITCH, None),
-    "float_type": ("a number is required", None),
-    "int_type": (_WHOLE, None),
-    "int_from_float": (_WHOLE, None),
-    "dict_type": (_BLOCK, None),
-    "model_type": (_BLOCK, None),
-    "model_attributes_type": (_BLOCK, None),
-    "list_type": (_LIST, None),
-    "tuple_type": (_LIST, None),
-    "named_tuple_type": (_LIST, None),
-    "too_long": (_ENTRIES, "at most {max_length}"),
-    "too_short": (_ENTRIES, "at least {min_length}"),
-    "union_tag_not_found": ("the block does not state its kind", None),
-    "union_tag_invalid": ("unknown kind", "one of {expected_tags}"),
-    "literal_error": ("the value is unknown", "{expected}"),
-    "string_pattern_mismatch": ("a character is not accepted", "none of {{ and }}"),
-    "greater_than": (_OUT_OF_RANGE, "greater than {gt}"),
-    "greater_than_equal": (_OUT_OF_RANGE, "at least {ge}"),
-    "less_than": (_OUT_OF_RANGE, "less than {lt}"),
-    "less_than_equal": (_OUT_OF_RANGE, "at most {le}"),
-    "finite_number": (_OUT_OF_RANGE, "a finite number"),
-}
+_WORDS = {row.pop("type"): row for row in table_rows(Path(__file__).with_name("refusals.csv"))}
 """Problem and limit by the type of an error of pydantic, whose own words are about Python."""
 
 
@@ -522,13 +495,12 @@ def _problem(issue: ErrorDetails) -> InputError:
     places = pairwise(("", *issue["loc"]))
     named = (part for above, part in places if above not in ("path", "shape", "bowl"))
     field = ".".join(str(part) for part in named if part not in _FORMS)
-    words = _WORDS.get(kind, (issue["msg"].removeprefix("Value error, "), None))
-    problem, limit, remedy = *words, None
+    problem, limit, remedy = issue["msg"].removeprefix("Value error, "), None, None
     if kind in _WORDS:
         context = issue.get("ctx", {})
         if "actual_length" in context:  # pydantic does not count the entries of a mapping
             context = {**context, "actual_length": len(issue["input"])}
-        problem, limit = problem.format(**context), limit and limit.format(**context)
+        problem, limit = (text.format(**context) for text in _WORDS[kind].values())
     value: object = issue["input"]
     if kind == "union_tag_invalid" and isinstance(value, Mapping):
         field, value = f"{field}.kind", value.get("kind")
@@ -545,7 +517,9 @@ def _problem(issue: ErrorDetails) -> InputError:
         problem, remedy, value = f"a required {what} is missing", "add it", None
     if isinstance(value, Mapping | BaseModel):
         value = None
-    return InputError(problem, field=field or None, value=shown(value), limit=limit, remedy=remedy)
+    return InputError(
+        problem, field=field or None, value=shown(value), limit=limit or None, remedy=remedy
+    )
 
 
 def _hint(word: str, known: set[str]) -> str:

@@ -41,6 +41,9 @@ from dragdeck.sweep.own_part import study_of_part
 Settings = Mapping[str, Any]
 """Dotted name of a field to its value."""
 
+_NEW_STUDY = Path(__file__).with_name("new_study.yaml")
+"""Text of a study that extends another."""
+
 _MIDDLE = 0.382
 """A part of a range at which a field of whole numbers, or a switch, is no fraction by chance."""
 
@@ -339,18 +342,6 @@ def study_file(studies: Path, name: str) -> Path:
     return files[0]
 
 
-_NEW_STUDY = """\
-# Only the fields that differ from {base}; docs/reference/study.md lists all fields.
-title: {name}
-extends: {base}
-reference: null  # measured or published values to compare with, if any
-
-# fidelity: {{tolerance: 0.1}}
-# motion: {{speed_m_s: 0.02}}
-# sweep: {{motion.speed_m_s: [0.01, 0.02]}}
-"""
-
-
 def new_study(studies: Path, name: str, base: str) -> Path:
     """Write the file of a study that extends another or is of a part, and return it.
 
@@ -377,7 +368,7 @@ def new_study(studies: Path, name: str, base: str) -> Path:
             limit=f"a name has {NAME_LIMIT}",
             remedy="choose another",
         )
-    text = study_of_part(part) if of_part else _NEW_STUDY.format(name=name, base=base)
+    text = study_of_part(part) if of_part else _NEW_STUDY.read_text().format(name=name, base=base)
     folder.mkdir()
     if of_part:
         shutil.copy(part, folder / part.name)
