@@ -18,7 +18,7 @@ from dragdeck.scenes.motion import surface_speed
 from dragdeck.scenes.process import PROCESS, process_scene
 from dragdeck.scenes.workpiece import clearances, describe, fastest_motion, workpiece_length
 from dragdeck.study.check import warnings
-from dragdeck.study.drive import in_steps
+from dragdeck.study.stages import in_steps
 from dragdeck.sweep.cases import load_cases
 
 POINTS = [[2, -0.01, 0], [2.2, -0.006, 0], [2.3, -0.006, 0, 0.001], [2.5, -0.006, 0, 0.001],

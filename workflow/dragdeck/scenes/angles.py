@@ -10,6 +10,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from dragdeck.arrays import Floats
 from dragdeck.cases.bed import (
     bed_radii,
     bed_rayleigh_time,
@@ -35,7 +36,6 @@ from dragdeck.physics.walls import round_container
 from dragdeck.records.case import CaseOfRun
 from dragdeck.scenes.scene import case_of_study, deck_of_study
 from dragdeck.study.calibration import Drum, Repose, Rig
-from dragdeck.study.media import Array
 from dragdeck.study.model import Fidelity, Study
 
 STIFFNESS = 1e4
@@ -116,8 +116,8 @@ class AngleDeck(Deck):
 class _Placed(NamedTuple):
     """Glued and free particles as centres and radii, (N, 4); a mesh; the box; times, s."""
 
-    glued: Array
-    media: Array
+    glued: Floats
+    media: Floats
     mesh: str
     edge_m: float
     bottom_m: float

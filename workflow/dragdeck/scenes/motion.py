@@ -13,16 +13,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from dragdeck.arrays import Floats
 from dragdeck.cases.bed import bed_timestep
 from dragdeck.cases.case import Case
 from dragdeck.decks.deck import Deck, Properties
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import round_to
 from dragdeck.physics.walls import Container
-from dragdeck.study.drive import Drive, EngineMotion, Floats, Orientations, rotation_vector
+from dragdeck.study.drive import Drive, EngineMotion
 from dragdeck.study.driven import DrivenMotion
 from dragdeck.study.model import Motion, Study
 from dragdeck.study.paths.path import Point, Vector
+from dragdeck.study.rotations import Orientations, rotation_vector
 from dragdeck.study.workpiece import MeshShape
 
 # --- legs, and the places that a motion reaches --------------------------------------------------

@@ -62,9 +62,9 @@ from dragdeck.scenes.motion import (
 )
 from dragdeck.scenes.moving_bowl import path_tilt_deg
 from dragdeck.study.contact_law import compared_numbers
-from dragdeck.study.drive import by_vector
 from dragdeck.study.driven import DrivenMotion
 from dragdeck.study.paths.path import as_rows
+from dragdeck.study.rotations import by_vector
 from dragdeck.study.workpiece import CylinderShape, MeshShape
 
 if TYPE_CHECKING:

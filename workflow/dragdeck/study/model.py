@@ -33,7 +33,6 @@ from dragdeck.study.bowls.revolved import RevolvedBowl
 from dragdeck.study.bowls.trough import TroughBowl
 from dragdeck.study.calibration import Calibration
 from dragdeck.study.contact_law import Contact, Pair
-from dragdeck.study.drive import about_vertical
 from dragdeck.study.media import MOST_CLASSES, Media, class_counts
 from dragdeck.study.paths.circle import CirclePath
 from dragdeck.study.paths.figure_eight import FigureEightPath
@@ -45,6 +44,7 @@ from dragdeck.study.quantities import QUANTITIES
 from dragdeck.study.reduction import Reduction
 from dragdeck.study.reference import Reference
 from dragdeck.study.removal import Removal
+from dragdeck.study.rotations import about_vertical
 from dragdeck.study.roughness import Roughness
 from dragdeck.study.search import Search
 from dragdeck.study.superposed.motion import SuperposedMotion

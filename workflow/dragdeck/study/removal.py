@@ -10,13 +10,11 @@ from dataclasses import dataclass
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
+from dragdeck.arrays import Floats
 from dragdeck.errors import choices
 from dragdeck.study.base import Model, Positive
-
-_Floats = NDArray[np.float64]
 
 _TELLS = 0.5
 """With a larger relative uncertainty, the interval of a coefficient reaches zero."""
@@ -185,25 +183,25 @@ class Wearing:
         Relative velocity at the contact point at first touch, positive when closing; m/s.
     """
 
-    force_slide_n_m: _Floats
-    mass_kg: _Floats
-    radius_m: _Floats
-    normal_m_s: _Floats
-    tangential_m_s: _Floats
+    force_slide_n_m: Floats
+    mass_kg: Floats
+    radius_m: Floats
+    normal_m_s: Floats
+    tangential_m_s: Floats
 
     @property
-    def double_energy_j(self) -> _Floats:
+    def double_energy_j(self) -> Floats:
         """Mass times the square of the speed, (N,), zero where the surfaces do not close."""
         square = self.normal_m_s**2 + self.tangential_m_s**2
         return np.where(self.normal_m_s > 0.0, self.mass_kg * square, 0.0)
 
     @property
-    def angle_rad(self) -> _Floats:
+    def angle_rad(self) -> Floats:
         """Angle of impact, (N,)."""
         return impact_angle(self.normal_m_s, self.tangential_m_s)
 
 
-def impact_angle(normal_m_s: _Floats, tangential_m_s: _Floats) -> _Floats:
+def impact_angle(normal_m_s: Floats, tangential_m_s: Floats) -> Floats:
     """Angle from the surface at which N surfaces close at these velocities, (N,), 0 to pi/2."""
     return np.arctan2(np.maximum(normal_m_s, 0.0), tangential_m_s)
 
@@ -226,11 +224,11 @@ class Law:
 
     title: str
     impact: bool
-    action: Callable[[Wearing, Removal], _Floats]
+    action: Callable[[Wearing, Removal], Floats]
     parameters: tuple[str, ...] = ()
 
 
-def _finnie(wearing: Wearing, _: Removal) -> _Floats:
+def _finnie(wearing: Wearing, _: Removal) -> Floats:
     """Finnie (1960), with a ratio of normal to tangential force of 2."""
     angle = wearing.angle_rad
     flat = np.sin(2 * angle) - 3 * np.sin(angle) ** 2
@@ -240,7 +238,7 @@ def _finnie(wearing: Wearing, _: Removal) -> _Floats:
 _OKA_SPEED_M_S, _OKA_DIAMETER_M = 104.0, 326e-6
 
 
-def _oka(wearing: Wearing, of: Removal) -> _Floats:
+def _oka(wearing: Wearing, of: Removal) -> Floats:
     """Oka et al. (2005), with their constants for sand; hardness in GPa.
 
     ``m v^2 (v/v')^(k2 - 2) (D/D')^k3 sin(a)^n1 (1 + Hv (1 - sin(a)))^n2``.
@@ -254,7 +252,7 @@ def _oka(wearing: Wearing, of: Removal) -> _Floats:
     )
 
 
-def _archard(wearing: Wearing, _: Removal) -> _Floats:
+def _archard(wearing: Wearing, _: Removal) -> Floats:
     """Archard (1953), and Preston (1927) for polishing."""
     return wearing.force_slide_n_m
 

@@ -6,9 +6,11 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from dragdeck.arrays import Floats
 from dragdeck.study.base import NonNegative, Number, Positive
 from dragdeck.study.bowl_motions.bowl_motion import BowlMotion
-from dragdeck.study.drive import EngineMotion, Floats, SmoothStart, StepCounts
+from dragdeck.study.drive import EngineMotion, SmoothStart
+from dragdeck.study.stages import StepCounts
 
 _AXES = "xyz"
 

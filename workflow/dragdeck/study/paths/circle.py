@@ -6,19 +6,13 @@ from typing import Any, Literal
 
 import numpy as np
 
+from dragdeck.arrays import Floats
 from dragdeck.parts import omitted
 from dragdeck.study.base import Json, Number, Positive
-from dragdeck.study.drive import (
-    Drive,
-    EngineMotion,
-    Floats,
-    Orientation,
-    StepCounts,
-    about_vertical,
-    rotated,
-    wrap_angle,
-)
+from dragdeck.study.drive import Drive, EngineMotion, Orientation
 from dragdeck.study.paths.path import AroundBowl, Point
+from dragdeck.study.rotations import about_vertical, rotated, wrap_angle
+from dragdeck.study.stages import StepCounts
 
 
 class CirclePath(AroundBowl):

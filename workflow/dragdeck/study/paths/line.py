@@ -6,9 +6,12 @@ from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 
+from dragdeck.arrays import Floats
 from dragdeck.study.base import Json, Number, Positive
-from dragdeck.study.drive import Drive, EngineMotion, Floats, StepCounts, wrap_angle
+from dragdeck.study.drive import Drive, EngineMotion
 from dragdeck.study.paths.path import FromPlace, Point, as_rows
+from dragdeck.study.rotations import wrap_angle
+from dragdeck.study.stages import StepCounts
 
 
 class LinePath(FromPlace):

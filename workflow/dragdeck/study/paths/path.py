@@ -11,19 +11,11 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
+from dragdeck.arrays import Floats
 from dragdeck.study.base import Json, Model
-from dragdeck.study.drive import (
-    Drive,
-    EngineMotion,
-    Floats,
-    Formula,
-    Orientation,
-    StepCounts,
-    about_vertical,
-    formula,
-    rotating,
-    wrap_angle,
-)
+from dragdeck.study.drive import Drive, EngineMotion, Formula, Orientation, formula, rotating
+from dragdeck.study.rotations import about_vertical, wrap_angle
+from dragdeck.study.stages import StepCounts
 
 Point = tuple[float, float]
 Vector = tuple[float, float, float]

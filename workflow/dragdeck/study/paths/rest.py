@@ -7,10 +7,12 @@ from typing import Any, ClassVar, Literal, Self
 import numpy as np
 from pydantic import field_validator
 
+from dragdeck.arrays import Floats
 from dragdeck.parts import omitted
 from dragdeck.study.base import Json, Number, Positive
-from dragdeck.study.drive import Drive, EngineMotion, Floats, Orientation, StepCounts
+from dragdeck.study.drive import Drive, EngineMotion, Orientation
 from dragdeck.study.paths.path import AroundBowl
+from dragdeck.study.stages import StepCounts
 
 
 class RestPath(AroundBowl):

@@ -11,25 +11,12 @@ from numpy.typing import NDArray
 from pydantic import Field, JsonValue, ValidationError, field_validator, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
+from dragdeck.arrays import Floats
 from dragdeck.study.base import Json, Line, Number
-from dragdeck.study.drive import (
-    Drive,
-    EngineMotion,
-    Floats,
-    Orientation,
-    StepCounts,
-    by_vector,
-    chain,
-    in_steps,
-    integral,
-    rates_about_axes,
-    rotated,
-    rotating_by,
-    rotation_vector,
-    stage_at,
-    wrap_angle,
-)
+from dragdeck.study.drive import Drive, EngineMotion, Orientation, rates_about_axes, rotating_by
 from dragdeck.study.paths.path import Vector, WorkpiecePath, as_rows, turned
+from dragdeck.study.rotations import by_vector, rotated, rotation_vector, wrap_angle
+from dragdeck.study.stages import StepCounts, chain, in_steps, integral, stage_at
 
 MOST_POINTS = 100
 

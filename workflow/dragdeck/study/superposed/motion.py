@@ -6,8 +6,11 @@ from typing import ClassVar, Self
 import numpy as np
 from pydantic import JsonValue
 
+from dragdeck.arrays import Floats
 from dragdeck.study.base import Model, NonNegative
-from dragdeck.study.drive import Drive, EngineMotion, Floats, Orientations, SmoothStart, StepCounts
+from dragdeck.study.drive import Drive, EngineMotion, SmoothStart
+from dragdeck.study.rotations import Orientations
+from dragdeck.study.stages import StepCounts
 
 
 class SuperposedMotion(Model):

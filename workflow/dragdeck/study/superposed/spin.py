@@ -8,22 +8,11 @@ from typing import ClassVar, Self
 import numpy as np
 from pydantic import Field, JsonValue, model_validator
 
+from dragdeck.arrays import Floats
 from dragdeck.study.base import Model, Number, Positive
-from dragdeck.study.drive import (
-    Drive,
-    EngineMotion,
-    Floats,
-    Orientations,
-    StepCounts,
-    about_vertical,
-    by_vector,
-    chain,
-    in_steps,
-    integral,
-    rotating,
-    rotating_by,
-    stage_at,
-)
+from dragdeck.study.drive import Drive, EngineMotion, rotating, rotating_by
+from dragdeck.study.rotations import Orientations, about_vertical, by_vector
+from dragdeck.study.stages import StepCounts, chain, in_steps, integral, stage_at
 from dragdeck.study.superposed.motion import SuperposedMotion
 
 
