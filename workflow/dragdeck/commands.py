@@ -11,30 +11,20 @@ import jinja2
 from pydantic import ValidationError
 from rich.table import Table
 
+from dragdeck import project as projects
+from dragdeck.advice import forecast as forecasts
 from dragdeck.advice.advise import advised_settings
-from dragdeck.advice.forecast import (
-    advice_file,
-    advice_tables,
-    advised_case,
-    question,
-    ways_in_words,
-)
 from dragdeck.cases.bed import clump_of
 from dragdeck.cases.case import Case
 from dragdeck.cases.ranks import check_ranks, cores_here
-from dragdeck.decks.render import (
-    changed_scripts,
-    deck_text,
-    of_its_templates,
-    write_run,
-    write_workpiece,
-)
+from dragdeck.decks import render as rendering
 from dragdeck.decks.templates import environment
 from dragdeck.engine.process import LAUNCHER_VARIABLE, find_engine
 from dragdeck.engine.reports import say
 from dragdeck.engine.space import check_amount
 from dragdeck.errors import DragdeckError, InputError, choices, together
 from dragdeck.files import write_bytes
+from dragdeck.outlook import timestep as timesteps
 from dragdeck.outlook.explain import explanation, show
 from dragdeck.outlook.explain import scene_lines as page_of_scene
 from dragdeck.outlook.process import (
@@ -45,23 +35,9 @@ from dragdeck.outlook.process import (
     workpiece_notes,
 )
 from dragdeck.outlook.runs import expected_runs, plan_in_words, written
-from dragdeck.outlook.timestep import (
-    settling_cautions,
-    stable_step_cautions,
-    stable_step_note,
-    timestep_notes,
-)
 from dragdeck.physics.packing import Bed
 from dragdeck.preview.layout import layout
 from dragdeck.preview.picture import picture, small_picture
-from dragdeck.project import (
-    by_folder,
-    by_run,
-    check_buildable,
-    check_search,
-    find_project,
-    study_templates,
-)
 from dragdeck.records.advice import AdviceFile
 from dragdeck.records.run import changed_in_words
 from dragdeck.records.tradeoff import TradeoffRecord, measured_tradeoff
@@ -102,9 +78,9 @@ def check(study: str, fidelity: str | None, verbose: bool) -> None:
 
 
 def _check(study: str, fidelity: str | None, verbose: bool) -> None:
-    project = find_project(Path.cwd())
+    project = projects.find_project(Path.cwd())
     every = project.cases(study, fidelity)
-    findings = _Findings(environment(project.templates, study_templates(every[0])))
+    findings = _Findings(environment(project.templates, projects.study_templates(every[0])))
     runs = [
         run
         for kind in SCENES.values()
@@ -112,7 +88,7 @@ def _check(study: str, fidelity: str | None, verbose: bool) -> None:
             kind, project.run_folders(every, kind), partial(findings.look, kind)
         )
     ]
-    for varied, cases in check_search(every[0].file).items():
+    for varied, cases in projects.check_search(every[0].file).items():
         findings.look_at_bounds(f"search.vary.{varied}", cases)
     findings.show(verbose)
     if findings.errors:
@@ -157,8 +133,8 @@ class _Findings:
         case = next(iter(runs.values()))
         try:
             scene = _built(kind, case, None)
-            used_templates = of_its_templates(
-                deck_text(scene, self.templates), scene, self.templates
+            used_templates = rendering.of_its_templates(
+                rendering.deck_text(scene, self.templates), scene, self.templates
             )
             _check_tolerance(case, used_templates["changed_law"])
         except InputError as error:
@@ -169,7 +145,7 @@ class _Findings:
             self.warnings.setdefault(text, {})[case.name] = None
         notes = [reduced(case), not_corrected(case)] if kind.needs_bed else []
         notes.append(changed_in_words(used_templates["changed_scripts"]))
-        notes.append(ways_in_words(case, measured_tradeoff()) if kind.needs_bed else "")
+        notes.append(forecasts.ways_in_words(case, measured_tradeoff()) if kind.needs_bed else "")
         for text in filter(None, notes):
             self.reduced.setdefault(text, {})[case.name] = None
         lines = [f"time step: {scene.deck.timestep_s:.3g} s, about {scene.steps:,} steps"]
@@ -183,7 +159,7 @@ class _Findings:
         refused = []
         for case in cases:
             try:
-                check_buildable(case)
+                projects.check_buildable(case)
             except InputError as error:
                 refused.append(replace(error, field=f"{name}: {case.name}: {error.field}"))
         if len(refused) == len(cases):
@@ -257,18 +233,18 @@ def _built(kind: SceneType, case: Case, bed: Bed | None) -> StudyScene:
     except InputError as error:
         error.file = error.file or case.file
         raise located(error) from None
-    step = stable_step_cautions if kind.needs_bed else settling_cautions
+    step = timesteps.stable_step_cautions if kind.needs_bed else timesteps.settling_cautions
     more = () if kind.single_particle else step(case)
     return replace(scene, warnings=[*warnings(case.study), *scene.warnings, *more])
 
 
 def explain(study: str, fidelity: str | None, scene: str | None, verbose: bool) -> None:
     """Show what the input scripts of a study model and leave out, and what that would cost."""
-    project = find_project(Path.cwd())
+    project = projects.find_project(Path.cwd())
     every = project.cases(study, fidelity)
-    templates = environment(project.templates, study_templates(every[0]))
+    templates = environment(project.templates, projects.study_templates(every[0]))
     for kind in [_scene_type(scene)] if scene else SCENES.values():
-        cases = list(by_run(every, kind).values())
+        cases = list(projects.by_run(every, kind).values())
         for case in cases if verbose else cases[:1]:
             scripted = _as_scripted(_built(kind, case, None), templates)
             if verbose:
@@ -282,8 +258,8 @@ def explain(study: str, fidelity: str | None, scene: str | None, verbose: bool) 
 
 def _as_scripted(scene: StudyScene, templates: jinja2.Environment) -> StudyScene:
     """A scene with what its input script models, whatever the study says."""
-    text = deck_text(scene, templates)
-    changed = changed_scripts(text, scene, templates)
+    text = rendering.deck_text(scene, templates)
+    changed = rendering.changed_scripts(text, scene, templates)
     if not changed:
         return scene
     there = set().union(*map(modelled, contact_laws(text)))
@@ -294,15 +270,15 @@ def _as_scripted(scene: StudyScene, templates: jinja2.Environment) -> StudyScene
 
 def _expectations(case: Case, kind: SceneType, scene: StudyScene) -> list[tuple[str, str]]:
     """What is known of a scene's time step and bed before it is run."""
-    notes = timestep_notes(case, kind, scene)
+    notes = timesteps.timestep_notes(case, kind, scene)
     if kind.needs_bed:
-        notes += [stable_step_note(case), *workpiece_notes(case), *dimensionless(case)]
+        notes += [timesteps.stable_step_note(case), *workpiece_notes(case), *dimensionless(case)]
     return [*notes, *([] if kind.single_particle else bed_notes(case))]
 
 
 def preview(study: str, fidelity: str | None, case: str | None) -> None:
     """Draw one case of a study, also one that `check` refuses."""
-    project = find_project(Path.cwd())
+    project = projects.find_project(Path.cwd())
     every = project.cases(study, fidelity)
     chosen = _case_named(every, case)
     try:
@@ -318,7 +294,7 @@ def preview(study: str, fidelity: str | None, case: str | None) -> None:
 
 def draw_set_up(study: str, fidelity: str | None) -> None:
     """Draw the first case of a study for its report."""
-    project = find_project(Path.cwd())
+    project = projects.find_project(Path.cwd())
     scene = layout(project.cases(study, fidelity)[0])
     write_bytes(project.results(study) / "set_up.png", small_picture(scene))
 
@@ -341,13 +317,13 @@ def _case_named(cases: list[Case], name: str | None) -> Case:
 
 def new(study: str, base: str) -> None:
     """Make the folder of a study that extends another."""
-    file = new_study(find_project(Path.cwd()).studies, study, base)
+    file = new_study(projects.find_project(Path.cwd()).studies, study, base)
     say(f"{file}: edit it, then run: ./run dragdeck check {study}")
 
 
 def cases(study: str, fidelity: str | None, plan: str | None) -> None:
     """List the cases of a study, or the points of a plan, with their runs."""
-    project = find_project(Path.cwd())
+    project = projects.find_project(Path.cwd())
     every = project.points(study, plan).processes if plan else project.cases(study, fidelity)
     table = Table("case", *SCENES)
     for case in every:
@@ -361,7 +337,7 @@ _NUMBERS_OF_SPHERES = (2, 3, 4, 6, 8, 12, 16)
 
 def shapes(study: str, fidelity: str | None) -> None:
     """Show how far clumps of more and fewer spheres are from the bodies of a study's media."""
-    project = find_project(Path.cwd())
+    project = projects.find_project(Path.cwd())
     media, tables = project.cases(study, fidelity)[0].study.media, []
     heads = ("spheres", "volume", "inertia", "surface, rms", "left out", "stands out")
     for name, part in media.parts.items():
@@ -401,19 +377,21 @@ def advise(
     tradeoff: TradeoffRecord | None = None,
 ) -> None:
     """Show the settings for a tolerance, with their cost, and keep them."""
-    project = find_project(Path.cwd())
+    project = projects.find_project(Path.cwd())
     tradeoff = tradeoff or measured_tradeoff()
-    every = list(by_run(project.cases(study, fidelity, tradeoff), SCENES["process"]).values())
+    every = list(
+        projects.by_run(project.cases(study, fidelity, tradeoff), SCENES["process"]).values()
+    )
     results, tables = project.results(study), []
     try:
-        asked = [question(case, tolerance, quantity) for case in every]
+        asked = [forecasts.question(case, tolerance, quantity) for case in every]
     except ValidationError as error:
         raise explained(error, "command line") from None
     for case, wanted in zip(every, asked, strict=True):
         advice = advised_settings(case, wanted, tradeoff)
-        tables.append(advised_case(case, advice, results, tradeoff))
-        show(advice_tables(case, advice, tables[-1]))
-    _keep(results / "advice.json", advice_file(every[0], tables))
+        tables.append(forecasts.advised_case(case, advice, results))
+        show(forecasts.advice_tables(case, advice, tables[-1]))
+    _keep(results / "advice.json", forecasts.advice_file(every[0], tables))
 
 
 def _keep(file: Path, content: AdviceFile) -> None:
@@ -428,11 +406,11 @@ def render(
     study: str, fidelity: str | None, plan: str | None, scene: str, run: str, packing: Path | None
 ) -> None:
     """Write the input files of one run, or the folder of a further workpiece of a run."""
-    project = find_project(Path.cwd())
+    project = projects.find_project(Path.cwd())
     kind = _scene_type(scene)
     points = project.points(study, plan) if plan else None
     every = points.of(kind) if points else project.cases(study, fidelity)
-    runs = by_folder(with_leads(every) if kind.needs_bed else every, kind)
+    runs = projects.by_folder(with_leads(every) if kind.needs_bed else every, kind)
     if run not in runs:
         raise InputError(
             f"no {scene} run of this name",
@@ -444,18 +422,18 @@ def render(
     case = runs[run]
     if not kind.needs_bed:
         _check_processes(case for case in every if kind.run_id(case) == run)
-    templates = environment(project.templates, study_templates(case))
+    templates = environment(project.templates, projects.study_templates(case))
     built = _built(kind, case, _bed(kind, packing))
-    changes = of_its_templates(deck_text(built, templates), built, templates)
+    changes = rendering.of_its_templates(rendering.deck_text(built, templates), built, templates)
     _check_tolerance(case, changes["changed_law"])
     for warning in (*built.warnings, *_friction_unknown(changes)):
         say(f"warning: {warning}")
     folder = project.run_folder(case, kind, of_plan=plan is not None)
     if case.number > 1:
         whole = project.run_folder(case.all_workpieces, kind, of_plan=plan is not None)
-        write_workpiece(built, folder, case.number, whole, templates)
+        rendering.write_workpiece(built, folder, case.number, whole, templates)
         return
-    write_run(built, folder, templates)
+    rendering.write_run(built, folder, templates)
 
 
 def _check_processes(cases: Iterable[Case]) -> None:

@@ -24,9 +24,9 @@ from dragdeck.errors import InputError
 from dragdeck.preview.layout import layout
 from dragdeck.records.case import CaseOfRun as ReadCase
 from dragdeck.records.case import load_case
+from dragdeck.scenes.fit import clearances
 from dragdeck.scenes.motion import course, farthest_reach, path_heights
 from dragdeck.scenes.process import process_scene
-from dragdeck.scenes.workpiece import clearances
 from dragdeck.study.check import warnings
 
 CIRCLE = {"kind": "circle", "radius_m": 0.010, "revolutions": 0.1}

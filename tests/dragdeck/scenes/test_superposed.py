@@ -13,9 +13,11 @@ from pydantic import ValidationError
 from dragdeck.cases.bed import bed_timestep, widest_skin
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
+from dragdeck.scenes.fit import fastest_motion
 from dragdeck.scenes.motion import surface_speed
+from dragdeck.scenes.numbers import describe
 from dragdeck.scenes.process import PROCESS, process_scene
-from dragdeck.scenes.workpiece import describe, fastest_motion, workpiece_length
+from dragdeck.scenes.workpiece import workpiece_length
 from dragdeck.study.drive import Drive
 from dragdeck.study.model import Motion
 from dragdeck.study.superposed.oscillation import Oscillation

@@ -14,9 +14,11 @@ from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
 from dragdeck.preview.layout import layout
 from dragdeck.project import Project
+from dragdeck.scenes.fit import clearances, fastest_motion
 from dragdeck.scenes.motion import surface_speed
+from dragdeck.scenes.numbers import describe
 from dragdeck.scenes.process import PROCESS, process_scene
-from dragdeck.scenes.workpiece import clearances, describe, fastest_motion, workpiece_length
+from dragdeck.scenes.workpiece import workpiece_length
 from dragdeck.study.check import warnings
 from dragdeck.study.stages import in_steps
 from dragdeck.sweep.cases import load_cases

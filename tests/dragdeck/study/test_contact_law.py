@@ -27,7 +27,8 @@ from dragdeck.engine.run_folder import run
 from dragdeck.errors import InputError
 from dragdeck.physics.contact_mechanics import effective_modulus, pull_off_force
 from dragdeck.project import Project
-from dragdeck.scenes.filling import bond_numbers, filling_scene
+from dragdeck.scenes.filling import filling_scene
+from dragdeck.scenes.filling_cautions import bond_numbers
 from dragdeck.scenes.process import SCENES, process_scene
 from dragdeck.scenes.scene import material_table
 from dragdeck.study import contact_law

@@ -14,30 +14,18 @@ from dragdeck.advice.ways import Way, Ways, Work
 from dragdeck.cases.bed import expected_surface, full_stiffness_number, softest_scale, widest_skin
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
-from dragdeck.outlook.timestep import (
-    largest_fraction,
-    settling_cautions,
-    stable_fraction,
-    stable_step_cautions,
-)
+from dragdeck.outlook import timestep as timesteps
 from dragdeck.physics.contact_mechanics import FAST
 from dragdeck.physics.rounding import rounded
 from dragdeck.records.advised import AdvisedSettings
 from dragdeck.records.tradeoff import DropEntry, TradeoffRecord, measured_tradeoff
 from dragdeck.records.windows import WindowsRecord, front_of
-from dragdeck.scenes.filling import filling_cautions
+from dragdeck.scenes.filling_cautions import filling_cautions
+from dragdeck.scenes.fit import JAMMING_GAP, may_jam
 from dragdeck.scenes.lead import FIRST_WINDOWS
-from dragdeck.scenes.workpiece import JAMMING_GAP, describe, may_jam, process_cautions
-from dragdeck.study.model import (
-    BUILT_IN_FIDELITIES,
-    LARGEST_TIMESTEP_FRACTION,
-    RESTITUTION,
-    Fidelity,
-    SoftStart,
-    Study,
-    Tolerance,
-    Windows,
-)
+from dragdeck.scenes.numbers import describe
+from dragdeck.scenes.process_cautions import process_cautions
+from dragdeck.study import model as models
 
 _PROCESS_OF_DROP = "standard"
 """Fidelity of the process in a study whose tolerance is about the drop test."""
@@ -78,7 +66,7 @@ class Option:
         Step of the drop test over the Rayleigh time, if the option is about it.
     """
 
-    fidelity: Fidelity
+    fidelity: models.Fidelity
     relative_cost: float
     largest_cost: float
     error: float | None = None
@@ -100,7 +88,7 @@ class Option:
         return text
 
 
-def with_option(study: Study, option: Option) -> Study:
+def with_option(study: models.Study, option: Option) -> models.Study:
     """A study with the settings of an option."""
     update: dict[str, object] = {"fidelity": option.fidelity}
     if (fraction := option.drop_timestep_fraction) is not None:
@@ -108,14 +96,14 @@ def with_option(study: Study, option: Option) -> Study:
     return study.model_copy(update=update)
 
 
-def consistent(case: Case) -> Fidelity:
+def consistent(case: Case) -> models.Fidelity:
     """Settings that pass every check of a case: its own, or the nearest to them.
 
     Modulus and time step change only to the accurate side; skin, filling step and ranks do not
     change the process. Warnings that remain are about the scene itself.
     """
     fidelity, lowest = case.study.chosen_fidelity(), describe(case)["lowest_restitution"]
-    filling = min(fidelity.filling_timestep_fraction, largest_fraction("settle", lowest))
+    filling = min(fidelity.filling_timestep_fraction, timesteps.largest_fraction("settle", lowest))
     remedy: Mapping[str, float] = {
         "youngs_modulus_scale": max(fidelity.youngs_modulus_scale, softest_scale(case.study)),
         "filling_timestep_fraction": filling,
@@ -129,13 +117,13 @@ def consistent(case: Case) -> Fidelity:
 
 def _remedies(case: Case) -> Iterator[Mapping[str, float]]:
     """What checks that a case's settings do not pass take; the next one may need less after it."""
-    stable = stable_step_cautions(case, surely=True)
-    settling = settling_cautions(case)
+    stable = timesteps.stable_step_cautions(case, surely=True)
+    settling = timesteps.settling_cautions(case)
     cautions = chain(filling_cautions(case), settling, process_cautions(case), stable)
     yield from (caution.settings for caution in cautions if caution.settings)
 
 
-def _with(case: Case, **settings: float | str | SoftStart) -> Case:
+def _with(case: Case, **settings: float | str | models.SoftStart) -> Case:
     """The case with these settings of a process."""
     chosen = {
         "skin_m": widest_skin(case.study),
@@ -143,28 +131,28 @@ def _with(case: Case, **settings: float | str | SoftStart) -> Case:
         "filling_timestep_fraction": _FILLING_FRACTION,
         **settings,
     }
-    fidelity = Fidelity.model_validate(chosen)
+    fidelity = models.Fidelity.model_validate(chosen)
     return replace(case, study=case.study.model_copy(update={"fidelity": fidelity}))
 
 
-def soft_settings(case: Case) -> Fidelity:
+def soft_settings(case: Case) -> models.Fidelity:
     """Those of the soft run from which others go on, with its largest stable step."""
     scale = min((_SOFT_STIFFNESS / full_stiffness_number(case.study)) ** 1.5, 1.0)
     scale = max(rounded(scale, up=True), softest_scale(case.study))
-    stable = stable_fraction(_with(case, youngs_modulus_scale=scale))
+    stable = timesteps.stable_fraction(_with(case, youngs_modulus_scale=scale))
     return consistent(_with(case, youngs_modulus_scale=scale, timestep_fraction=_step(stable)))
 
 
-def stiff_settings(case: Case) -> Fidelity:
+def stiff_settings(case: Case) -> models.Fidelity:
     """Those of a run at the physical modulus, begun softer if that saves anything."""
-    stable = _step(stable_fraction(_with(case), math.log(_STABILITY_NUMBER)))
+    stable = _step(timesteps.stable_fraction(_with(case), math.log(_STABILITY_NUMBER)))
     if describe(case)["inertial_number"] > FAST:
         stable = min(stable, _PLAIN_FRACTION)
     chosen = consistent(_with(case, timestep_fraction=stable))
     soft = soft_settings(case)
     if soft.youngs_modulus_scale > _SOFTEST_START:
         return chosen
-    start = SoftStart(
+    start = models.SoftStart(
         youngs_modulus_scale=soft.youngs_modulus_scale, timestep_fraction=soft.timestep_fraction
     )
     return chosen.model_copy(update={"soft_start": start})
@@ -172,15 +160,15 @@ def stiff_settings(case: Case) -> Fidelity:
 
 def _step(stable: float) -> float:
     """A time step over the Rayleigh time that is stable and may be set."""
-    return min(rounded(stable, up=False), LARGEST_TIMESTEP_FRACTION)
+    return min(rounded(stable, up=False), models.LARGEST_TIMESTEP_FRACTION)
 
 
-def ways_of(case: Case, requested: Tolerance, tradeoff: TradeoffRecord) -> Ways | None:
+def ways_of(case: Case, requested: models.Tolerance, tradeoff: TradeoffRecord) -> Ways | None:
     """The ways to a tolerance; None where a softer run saves nothing, or no windows fit."""
     stiff = stiff_settings(case)
     if stiff.soft_start is None:
         return None
-    windows = Windows(
+    windows = models.Windows(
         tolerance=requested.tolerance,
         quantities=list(requested.quantities),
         timestep_fraction=stiff.timestep_fraction,
@@ -213,15 +201,15 @@ def finest_drop(case: Case, tradeoff: TradeoffRecord) -> Option:
     return _drop_option(process, finest, min(finest.timestep_fraction, limit))
 
 
-def _beside_drop(case: Case) -> tuple[Fidelity, float]:
+def _beside_drop(case: Case) -> tuple[models.Fidelity, float]:
     """If the drop test is asked about: settings of the process, and largest step of the drop."""
-    named = {**BUILT_IN_FIDELITIES, **case.study.fidelities}[_PROCESS_OF_DROP]
-    limit = largest_fraction("impact", describe(case)["lowest_restitution"])
+    named = {**models.BUILT_IN_FIDELITIES, **case.study.fidelities}[_PROCESS_OF_DROP]
+    limit = timesteps.largest_fraction("impact", describe(case)["lowest_restitution"])
     study = case.study.model_copy(update={"fidelity": named})
     return consistent(replace(case, study=study)), limit
 
 
-def _drop_option(process: Fidelity, drop: DropEntry, fraction: float) -> Option:
+def _drop_option(process: models.Fidelity, drop: DropEntry, fraction: float) -> Option:
     """A step of the drop test, whose error has no scatter."""
     cost = drop.relative_cost
     return Option(process, cost, cost, abs(drop.restitution_error), fraction)
@@ -243,7 +231,7 @@ class Advice:
         What could be done instead; none for a drop test, or where a softer run saves nothing.
     """
 
-    requested: Tolerance
+    requested: models.Tolerance
     chosen: Option
     reference: Option
     fallback: str | None = None
@@ -262,7 +250,9 @@ class Advice:
         )
 
 
-def resolve(case: Case, requested: Tolerance, tradeoff: TradeoffRecord | None = None) -> Case:
+def resolve(
+    case: Case, requested: models.Tolerance, tradeoff: TradeoffRecord | None = None
+) -> Case:
     """The case with the settings that a tolerance asks for; it remembers the question.
 
     Parameters
@@ -282,7 +272,7 @@ def resolve(case: Case, requested: Tolerance, tradeoff: TradeoffRecord | None = 
     return replace(case, study=study, requested=requested, advised=advice.for_case)
 
 
-def advised_settings(case: Case, requested: Tolerance, tradeoff: TradeoffRecord) -> Advice:
+def advised_settings(case: Case, requested: models.Tolerance, tradeoff: TradeoffRecord) -> Advice:
     """The settings for a tolerance.
 
     Parameters
@@ -298,7 +288,7 @@ def advised_settings(case: Case, requested: Tolerance, tradeoff: TradeoffRecord)
     InputError
         The quantities do not go together.
     """
-    if RESTITUTION not in requested.quantities:
+    if models.RESTITUTION not in requested.quantities:
         return _process_advice(case, requested, tradeoff)
     if len(requested.quantities) > 1:
         raise InputError(
@@ -306,7 +296,7 @@ def advised_settings(case: Case, requested: Tolerance, tradeoff: TradeoffRecord)
             file=case.file,
             field="fidelity.quantity",
             value=", ".join(requested.quantities),
-            limit=f"{RESTITUTION} alone, or quantities of the process",
+            limit=f"{models.RESTITUTION} alone, or quantities of the process",
             remedy="remove one of them",
         )
     finest = finest_drop(case, tradeoff)
@@ -325,7 +315,7 @@ def advised_settings(case: Case, requested: Tolerance, tradeoff: TradeoffRecord)
     return Advice(requested, finest, finest, why)
 
 
-def _process_advice(case: Case, requested: Tolerance, tradeoff: TradeoffRecord) -> Advice:
+def _process_advice(case: Case, requested: models.Tolerance, tradeoff: TradeoffRecord) -> Advice:
     """The settings with which a tolerance is met in a case's own scene.
 
     A soft run over the whole path, and windows at the physical modulus until the tolerance is met;

@@ -11,14 +11,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from dragdeck.arrays import Floats
-from dragdeck.cases.bed import (
-    bed_radii,
-    bed_rayleigh_time,
-    bed_timestep,
-    bed_volume,
-    particle_material,
-    widest_skin,
-)
+from dragdeck.cases import bed as beds
 from dragdeck.cases.case import Case
 from dragdeck.decks import outputs
 from dragdeck.decks.deck import Body, Deck, Scene, data_file
@@ -139,7 +132,7 @@ def angle_scene(case: Case, run: AngleRun, stiffness: float = STIFFNESS) -> Scen
     drum, size = (rig if isinstance(rig, Drum) else None), study.media.typical_radius_m
     speed = 0.0 if drum else _LIFT * math.sqrt(2 * study.gravity_m_s2 * size)
     placed = _drum(study, rig) if isinstance(rig, Drum) else _heap(study, rig, speed)
-    dt, rayleigh = bed_timestep(study, "timestep_fraction"), bed_rayleigh_time(study)
+    dt, rayleigh = beds.bed_timestep(study, "timestep_fraction"), beds.bed_rayleigh_time(study)
     start, stop, end = (round(time / dt) for time in placed.times_s)
     period, glued, of = -(-end // _FRAMES), len(placed.glued), Case(case.file, {}, study)
     steps = _FRAMES * period
@@ -154,7 +147,7 @@ def angle_scene(case: Case, run: AngleRun, stiffness: float = STIFFNESS) -> Scen
         run=run.rig,
         source="particles.data",
         gravity_direction=(0, -1, 0) if drum else (0, 0, -1),
-        skin_m=widest_skin(study),
+        skin_m=beds.widest_skin(study),
         timestep_s=dt,
         rayleigh_time_s=rayleigh,
         outputs=(outputs.thermo(period, steps), outputs.particles(period, 0, steps, ())),
@@ -167,7 +160,7 @@ def angle_scene(case: Case, run: AngleRun, stiffness: float = STIFFNESS) -> Scen
         lift_steps=(start, stop),
         steps=steps,
     )
-    density = particle_material(study).density_kg_m3
+    density = beds.particle_material(study).density_kg_m3
     rows = np.concatenate([placed.glued, placed.media]).tolist()
     bodies = [Body(1, radius, density, (x, y, z)) for x, y, z, radius in rows]
     side = -placed.edge_m - size, placed.edge_m + size
@@ -184,7 +177,7 @@ def angle_scene(case: Case, run: AngleRun, stiffness: float = STIFFNESS) -> Scen
 
 def _study(study: Study, rig: Repose | Drum, run: AngleRun, stiffness: float) -> Study:
     """The study with the media of a heap or drum, softened, and with its coefficients."""
-    main, particle = study.media.main_material, particle_material(study)
+    main, particle = study.media.main_material, beds.particle_material(study)
     count, length = _total(study, rig)
     modulus = stiffness * particle.density_kg_m3 * study.gravity_m_s2 * length
     least = min(study.materials[name].youngs_modulus_pa for name in (main, study.bowl.material))
@@ -209,9 +202,9 @@ def _total(study: Study, rig: Repose | Drum) -> tuple[int, float]:
 
 def _heap(study: Study, rig: Repose, speed_m_s: float) -> _Placed:
     """The cylinder on its glued layer, whose tops are at z = 0."""
-    size, inner, radii = study.media.typical_radius_m, rig.cylinder_radius_m, bed_radii(study)
+    size, inner, radii = study.media.typical_radius_m, rig.cylinder_radius_m, beds.bed_radii(study)
     poured = pour([radii], round_container(inner), study.seed)
-    volume = bed_volume(study) / SOLID_FRACTION_ESTIMATE
+    volume = beds.bed_volume(study) / SOLID_FRACTION_ESTIMATE
     edge = max((3 * volume / math.pi / _FLATTEST) ** (1 / 3), inner) + 4 * size
     line = np.arange(-edge + size, edge - size, 2 * size)
     flat = np.stack(np.meshgrid(line, line)).reshape(2, -1)
@@ -232,7 +225,7 @@ def _drum(study: Study, rig: Drum) -> _Placed:
     rows = np.linspace(size - half, half - size, math.floor(half / size))
     angle, z = np.stack(np.meshgrid(math.tau * around / len(around), rows)).reshape(2, -1)
     ring = (radius - size) * np.stack([np.cos(angle), np.sin(angle)])
-    radii = np.random.default_rng(study.seed).permutation(bed_radii(study))
+    radii = np.random.default_rng(study.seed).permutation(beds.bed_radii(study))
     step = 2.01 * float(radii.max())
     x, z_free = (np.arange(step / 2 - length, length - step / 2, step) for length in (radius, half))
     sites = np.stack(np.meshgrid(x, x, z_free)).reshape(3, -1).T

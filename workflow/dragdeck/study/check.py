@@ -15,18 +15,9 @@ from pydantic_core import ErrorDetails
 
 from dragdeck.errors import Caution, InputError, RecordError, choices, near, together
 from dragdeck.files import table_rows
+from dragdeck.study import model as models
 from dragdeck.study.base import Json, Model, flat
 from dragdeck.study.driven import directions
-from dragdeck.study.model import (
-    BUILT_IN_FIDELITIES,
-    OF_NO_RUN,
-    AnyBowl,
-    AnyPath,
-    Fidelity,
-    Scaling,
-    Study,
-    Tolerance,
-)
 from dragdeck.study.plausible import implausible, plausible_range
 from dragdeck.study.recorded import Places, mesh_errors, recorded_file, with_recording
 from dragdeck.study.reduction import RADIAL
@@ -45,7 +36,7 @@ _Found = Iterator[tuple[str, str, str]]
 # --- values against each other -------------------------------------------------------------------
 
 
-def contradictions(study: Study, whole: bool) -> Iterator[InputError]:
+def contradictions(study: models.Study, whole: bool) -> Iterator[InputError]:
     """Every contradiction within a whole study, or one of its cases; the errors name no file."""
     values = flat(study.plain())
     for check in (
@@ -64,14 +55,14 @@ def contradictions(study: Study, whole: bool) -> Iterator[InputError]:
             yield InputError(problem, field=field, value=values.get(field), limit=limit)
 
 
-def _names(study: Study) -> _Found:
+def _names(study: models.Study) -> _Found:
     owners = {"bowl": study.bowl.material, "workpiece": study.workpiece.material}
     for name, part in study.media.parts.items():
         owners[f"media.classes.{name}" if name else "media"] = str(part.material)
     for owner, material in owners.items():
         yield from _known(f"{owner}.material", material, study.materials, "no such material")
     if isinstance(study.fidelity, str):
-        known = {**BUILT_IN_FIDELITIES, **study.fidelities}
+        known = {**models.BUILT_IN_FIDELITIES, **study.fidelities}
         yield from _known("fidelity", study.fidelity, known, "unknown fidelity")
 
 
@@ -80,7 +71,7 @@ def _known(field: str, name: str, known: Iterable[str], problem: str) -> _Found:
         yield field, f"{problem} {name!r}", choices(name, known)
 
 
-def _pairs(study: Study) -> _Found:
+def _pairs(study: models.Study) -> _Found:
     every = ["-".join(both) for both in product(study.materials, repeat=2)]
     for key, pair in study.pairs.items():
         back = "-".join(key.split("-")[::-1])
@@ -107,7 +98,7 @@ def _pairs(study: Study) -> _Found:
             )
 
 
-def _media(study: Study) -> _Found:
+def _media(study: models.Study) -> _Found:
     media = study.media
     for name in {"particle", "bowl", "workpiece"} & set(media.classes):
         yield "media.classes", f"a class must not be called {name}", "another name"
@@ -124,7 +115,7 @@ def _media(study: Study) -> _Found:
         yield "media.fill_height_m", problem, f"at most {study.bowl.height_m:g} m"
 
 
-def _crowd(study: Study) -> _Found:
+def _crowd(study: models.Study) -> _Found:
     """More spheres than a run can have, and the class and sieves that make most of them."""
     media, known = study.media, plausible_range("media.count")
     assert known is not None
@@ -147,7 +138,7 @@ def _crowd(study: Study) -> _Found:
     )
 
 
-def _compound(study: Study) -> _Found:
+def _compound(study: models.Study) -> _Found:
     compound, rim = study.compound, study.bowl.height_m
     if compound is None:
         return
@@ -166,7 +157,7 @@ def _compound(study: Study) -> _Found:
             yield "compound.density_kg_m3", problem, f"below {lightest:g} kg/m3"
 
 
-def _angles(study: Study) -> _Found:
+def _angles(study: models.Study) -> _Found:
     angles, media = study.calibration and study.calibration.angles, study.media
     if angles and media.classes:
         yield "calibration.angles", "the media have several classes", "media of one class"
@@ -175,7 +166,7 @@ def _angles(study: Study) -> _Found:
         yield from ((f"calibration.angles.{field}", what, limit) for field, what, limit in problems)
 
 
-def _shape(study: Study) -> _Found:
+def _shape(study: models.Study) -> _Found:
     shape, field = study.workpiece.shape, "workpiece.shape"
     if isinstance(shape, CylinderShape):
         return
@@ -195,7 +186,7 @@ def _shape(study: Study) -> _Found:
         yield f"{field}.edge_facet_size_m", problem, "a STEP file (.step, .stp); or no such field"
 
 
-def _motion(study: Study) -> _Found:
+def _motion(study: models.Study) -> _Found:
     """Statistics need a frame of the contact network after all that they leave out."""
     motion, problem = study.motion, "no path is left for the statistics"
     if motion.bowl_rad_s and not study.bowl.container.round:
@@ -233,9 +224,9 @@ def _motion(study: Study) -> _Found:
 _OF_OTHER_KINDS = [
     f"{block}.{name}"
     for block, kinds in {
-        "motion.path": get_args(AnyPath),
+        "motion.path": get_args(models.AnyPath),
         "workpiece.shape": get_args(get_args(Shape)[0]),
-        "bowl": [get_args(kind)[0] for kind in get_args(AnyBowl)],
+        "bowl": [get_args(kind)[0] for kind in get_args(models.AnyBowl)],
     }.items()
     for kind in kinds
     for name in kind.model_fields
@@ -243,7 +234,7 @@ _OF_OTHER_KINDS = [
 """Fields of all kinds of path, shape and bowl: a study may extend or sweep to another kind."""
 
 
-def _assumptions(study: Study) -> _Found:
+def _assumptions(study: models.Study) -> _Found:
     values = [*flat(study.model_dump(mode="json")), *_OF_OTHER_KINDS]
     parts = (name.split(".") for name in values)
     known = {".".join(words[:count]) for words in parts for count in range(1, len(words) + 1)}
@@ -253,7 +244,7 @@ def _assumptions(study: Study) -> _Found:
             yield f"assumptions.{number}.field", f"no such field {entry.field!r}", limit
 
 
-def _removal(study: Study) -> _Found:
+def _removal(study: models.Study) -> _Found:
     removal = study.removal
     if removal is None:
         if study.roughness:
@@ -262,7 +253,7 @@ def _removal(study: Study) -> _Found:
     if any(law.impact for law in removal.laws) and not study.outputs.first_touch_fraction:
         problem = f"the law {removal.law} reads impacts, but no run writes them"
         yield "removal.law", problem, "outputs.first_touch_fraction: 0.05, or the law archard"
-    asked = study.fidelity.quantities if isinstance(study.fidelity, Tolerance) else ()
+    asked = study.fidelity.quantities if isinstance(study.fidelity, models.Tolerance) else ()
     if "force_slide" in asked and removal.laws[-1].impact:
         problem = f"windows do not see the impacts that the law {removal.law} reads"
         yield "fidelity.quantity", problem, "the law archard, or without force_slide"
@@ -272,13 +263,13 @@ def _removal(study: Study) -> _Found:
         yield "removal.calibrate", problem, "one workpiece, and a sweep over seed at most"
 
 
-def _sweep(study: Study) -> _Found:
+def _sweep(study: models.Study) -> _Found:
     for field, values in study.sweep.items():
         if not all(field.split(".")):
             yield "sweep", f"{field!r} is not a field", "a dotted name, such as motion.speed_m_s"
         if not values:
             yield f"sweep.{field}", "no values", "one value or more"
-        if field.split(".")[0] in OF_NO_RUN:
+        if field.split(".")[0] in models.OF_NO_RUN:
             yield f"sweep.{field}", "no run depends on it", "a field that the runs depend on"
     count, most = math.prod(map(len, study.sweep.values())), study.accepted.cases
     if count > most:
@@ -290,7 +281,7 @@ def _sweep(study: Study) -> _Found:
         yield from _search(study.search, study)
 
 
-def _search(search: Search, study: Study) -> _Found:
+def _search(search: Search, study: models.Study) -> _Found:
     """Why no run of the study could answer the search."""
     if {*study.sweep} != {"seed"} or len(study.sweep["seed"]) < 2:
         problem = "a search knows the scatter of its runs from several packings at each setting"
@@ -311,7 +302,7 @@ def _search(search: Search, study: Study) -> _Found:
             limit = "another quantity, or the machine without reduction.cut_out"
             yield f"search.{name}.quantity", "a straight cut-out does not give it", limit
     for field in search.vary:
-        if field.split(".")[0] in (*OF_NO_RUN, "fidelity", "fidelities", "seed", "outputs"):
+        if field.split(".")[0] in (*models.OF_NO_RUN, "fidelity", "fidelities", "seed", "outputs"):
             yield f"search.vary.{field}", "it is no setting of the machine", "another field"
     for name, problem in search.excluded():
         yield f"search.{name}", problem, "limits that one setting can meet together"
@@ -319,9 +310,9 @@ def _search(search: Search, study: Study) -> _Found:
     if count > most:
         limit = f"{most}; if this is intended, set accepted.cases: {count}"
         yield "search.runs", f"makes {count} cases, more than are accepted", limit
-    known = {**BUILT_IN_FIDELITIES, **study.fidelities}
+    known = {**models.BUILT_IN_FIDELITIES, **study.fidelities}
     yield from _known("search.confirm", search.confirm, known, "unknown fidelity")
-    if search.confirm in known and not isinstance(study.fidelity, Tolerance):
+    if search.confirm in known and not isinstance(study.fidelity, models.Tolerance):
         fidelity, confirm = study.chosen_fidelity(), known[search.confirm]
         scale, speed = confirm.youngs_modulus_scale, confirm.speed_factor
         softer = scale < 1 and scale <= fidelity.youngs_modulus_scale
@@ -331,7 +322,7 @@ def _search(search: Search, study: Study) -> _Found:
             yield "search.confirm", problem, limit
 
 
-def _scaling(scaling: Scaling, study: Study) -> _Found:
+def _scaling(scaling: models.Scaling, study: models.Study) -> _Found:
     """Why the sweep cannot tell the power law."""
     field, others = scaling.field, [name for name in study.sweep if name != "seed"]
     if field not in others:
@@ -349,7 +340,7 @@ def _scaling(scaling: Scaling, study: Study) -> _Found:
         yield f"sweep.{field}", problem, f"{_LEAST_LEVELS} levels or more"
 
 
-def _signal(study: Study, file: Path) -> Iterator[InputError]:
+def _signal(study: models.Study, file: Path) -> Iterator[InputError]:
     """What keeps the measured force signal from being compared with that of a run."""
     signal = study.reference.signal if study.reference else None
     if signal is None:
@@ -377,7 +368,7 @@ def _signal(study: Study, file: Path) -> Iterator[InputError]:
         yield error
 
 
-def _decimal_commas(study: Study, file: Path) -> Iterator[InputError]:
+def _decimal_commas(study: models.Study, file: Path) -> Iterator[InputError]:
     """Lists of a sweep that may be one number, ``[1,5]``; whole numbers have no fraction."""
     values, written = flat(study.plain()), comma_lists(file) if study.sweep else {}
     for name in study.sweep:
@@ -400,7 +391,7 @@ def _level(value: object) -> float:
 # --- the whole file ------------------------------------------------------------------------------
 
 
-def validate(data: Json, file: Path | str, *, whole: bool = False) -> Study:
+def validate(data: Json, file: Path | str, *, whole: bool = False) -> models.Study:
     """Check plain data against the study model, and its values against each other.
 
     Parameters
@@ -419,7 +410,7 @@ def validate(data: Json, file: Path | str, *, whole: bool = False) -> Study:
     data, places, unread = with_recording(data, Path(file))
     problems, study = list(unread.values()), None
     try:
-        study = Study.model_validate(data)
+        study = models.Study.model_validate(data)
     except ValidationError as error:
         problems += [problem for problem in _problems(error) if problem.field not in _named(unread)]
     wrong = {error.field for error in problems}
@@ -441,7 +432,7 @@ def _named(unread: Iterable[str]) -> set[str]:
     return {name for field in unread for name in (field, f"{field}.points")}
 
 
-def warnings(study: Study) -> list[Caution]:
+def warnings(study: models.Study) -> list[Caution]:
     """What a valid study hardly means, one line each."""
     cautions = [
         Caution(
@@ -452,8 +443,8 @@ def warnings(study: Study) -> list[Caution]:
         for caution, _ in implausible({**study.plain(), **study.motion.path.implied})
     ]
     chosen = {"youngs_modulus_scale", "timestep_fraction", "soft_start"}
-    fidelity, draft = study.fidelity, BUILT_IN_FIDELITIES["draft"]
-    if isinstance(fidelity, Fidelity) and not fidelity.model_fields_set & chosen:
+    fidelity, draft = study.fidelity, models.BUILT_IN_FIDELITIES["draft"]
+    if isinstance(fidelity, models.Fidelity) and not fidelity.model_fields_set & chosen:
         text = (
             "fidelity is a block without youngs_modulus_scale and timestep_fraction: it replaces "
             "any named fidelity, and means the stiffness and time step of reference; to keep those "
@@ -524,7 +515,7 @@ def _problem(issue: ErrorDetails) -> InputError:
 
 def _hint(word: str, known: set[str]) -> str:
     """A question about the blocks that have a key, or about the key that it resembles."""
-    elsewhere = sorted({word} & set(Study.model_fields))
+    elsewhere = sorted({word} & set(models.Study.model_fields))
     elsewhere += sorted(name for name in known if name.endswith(f".{word}"))[:3]
     return f"did you mean {' or '.join(map(repr, elsewhere))}? " if elsewhere else near(word, known)
 

@@ -7,8 +7,8 @@ from dragdeck.cases.bed import typical_reach
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
 from dragdeck.scenes.filling import expected_bed
+from dragdeck.scenes.fit import clearances
 from dragdeck.scenes.moving_bowl import bed_in_motion
-from dragdeck.scenes.workpiece import clearances
 from dragdeck.study.media import Grains, Media, Sieve
 from dragdeck.study.model import Assumption, Study
 
