@@ -24,7 +24,8 @@ from worked_examples import EXAMPLES, study_text
 from dragchain.cli import PROGRAM as DRAGCHAIN
 from dragdeck.cli import PROGRAM as DRAGDECK
 from dragdeck.script.findings import rules
-from dragdeck.study.model import BUILT_IN_FIDELITIES, Fidelity, Study
+from dragdeck.study.fidelity import BUILT_IN_FIDELITIES, Fidelity
+from dragdeck.study.model import Study
 from dragdeck.study.plausible import plausible_range
 
 NUMBERS = re.compile(r"[-+\u00d7 ]*\d[\d., %]*(e[-+]\d+)?( \(.*\))?|")

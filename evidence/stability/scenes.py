@@ -21,7 +21,7 @@ from dragdeck.physics.walls import Container, round_container
 from dragdeck.records.bed import BowlOfRun, MediaOfRun
 from dragdeck.records.case import CaseOfRun
 from dragdeck.records.run import Phase
-from dragdeck.scenes.filling import box_top
+from dragdeck.scenes.bed_space import box_top
 from dragdeck.scenes.scene import case_of_study, deck_of_study
 
 # --- single impacts, many at once: particles on a plate, or small particles on large ones ------

@@ -23,7 +23,7 @@ from dragdeck.project import (
     run_path,
     scaling_of,
 )
-from dragdeck.records.run import figures_of
+from dragdeck.records.figures import figures_of
 from dragdeck.rules import (
     ENGINE_RUN,
     FURTHER_WORKPIECE,

@@ -22,7 +22,7 @@ from dragdeck.scenes.lead import with_leads
 from dragdeck.scenes.process import PROCESS, SCENES
 from dragdeck.scenes.process_cautions import process_cautions
 from dragdeck.scenes.scene import SceneType
-from dragdeck.study.model import Fidelity
+from dragdeck.study.fidelity import Fidelity
 from dragdeck.sweep.cases import settle_case
 
 FILE = Path("studies/random/study.yaml")

@@ -27,7 +27,7 @@ from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.numbers import describe
 from dragdeck.scenes.process import PROCESS
 from dragdeck.scenes.workpiece import workpiece_radius
-from dragdeck.study.model import Fidelity
+from dragdeck.study.fidelity import Fidelity
 from dragdeck.sweep.cases import load_cases
 
 TABLE = RestitutionErrors(

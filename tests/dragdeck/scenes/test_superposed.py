@@ -19,7 +19,7 @@ from dragdeck.scenes.numbers import describe
 from dragdeck.scenes.process import PROCESS, process_scene
 from dragdeck.scenes.workpiece import workpiece_length
 from dragdeck.study.drive import Drive
-from dragdeck.study.model import Motion
+from dragdeck.study.motion import Motion
 from dragdeck.study.superposed.oscillation import Oscillation
 from dragdeck.study.superposed.spin import Spin
 

@@ -29,7 +29,8 @@ from dragdeck.physics.contact_mechanics import rayleigh_time
 from dragdeck.physics.packing import Bed
 from dragdeck.project import Project
 from dragdeck.records.packing import Packing
-from dragdeck.scenes.filling import expected_bed, filling_scene, first_particles
+from dragdeck.scenes.bed_space import expected_bed, first_particles
+from dragdeck.scenes.filling import filling_scene
 from dragdeck.scenes.filling_cautions import filling_cautions
 from dragdeck.scenes.process import process_scene
 from dragdeck.study.media import Grains

@@ -11,7 +11,7 @@ from made_scenes import script
 
 from dragdeck.project import Project
 from dragdeck.study.driven import DrivenMotion
-from dragdeck.study.model import AnyPath, Motion
+from dragdeck.study.motion import AnyPath, Motion
 from dragdeck.study.paths.figure_eight import FigureEightPath
 from dragdeck.study.rotations import rotated
 from dragdeck.sweep.cases import load_cases

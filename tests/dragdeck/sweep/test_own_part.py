@@ -13,7 +13,7 @@ from dragdeck.errors import InputError
 from dragdeck.mesh import checks
 from dragdeck.mesh.checks import MeshDefect
 from dragdeck.project import Project
-from dragdeck.scenes.filling import expected_bed
+from dragdeck.scenes.bed_space import expected_bed
 from dragdeck.scenes.fit import clearances, in_diameters
 from dragdeck.scenes.process import PROCESS
 from dragdeck.study.workpiece import MeshShape

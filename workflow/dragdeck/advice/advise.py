@@ -26,6 +26,15 @@ from dragdeck.scenes.lead import FIRST_WINDOWS
 from dragdeck.scenes.numbers import describe
 from dragdeck.scenes.process_cautions import process_cautions
 from dragdeck.study import model as models
+from dragdeck.study.fidelity import (
+    BUILT_IN_FIDELITIES,
+    LARGEST_TIMESTEP_FRACTION,
+    RESTITUTION,
+    Fidelity,
+    SoftStart,
+    Tolerance,
+    Windows,
+)
 
 _PROCESS_OF_DROP = "standard"
 """Fidelity of the process in a study whose tolerance is about the drop test."""
@@ -66,7 +75,7 @@ class Option:
         Step of the drop test over the Rayleigh time, if the option is about it.
     """
 
-    fidelity: models.Fidelity
+    fidelity: Fidelity
     relative_cost: float
     largest_cost: float
     error: float | None = None
@@ -96,7 +105,7 @@ def with_option(study: models.Study, option: Option) -> models.Study:
     return study.model_copy(update=update)
 
 
-def consistent(case: Case) -> models.Fidelity:
+def consistent(case: Case) -> Fidelity:
     """Settings that pass every check of a case: its own, or the nearest to them.
 
     Modulus and time step change only to the accurate side; skin, filling step and ranks do not
@@ -123,7 +132,7 @@ def _remedies(case: Case) -> Iterator[Mapping[str, float]]:
     yield from (caution.settings for caution in cautions if caution.settings)
 
 
-def _with(case: Case, **settings: float | str | models.SoftStart) -> Case:
+def _with(case: Case, **settings: float | str | SoftStart) -> Case:
     """The case with these settings of a process."""
     chosen = {
         "skin_m": widest_skin(case.study),
@@ -131,11 +140,11 @@ def _with(case: Case, **settings: float | str | models.SoftStart) -> Case:
         "filling_timestep_fraction": _FILLING_FRACTION,
         **settings,
     }
-    fidelity = models.Fidelity.model_validate(chosen)
+    fidelity = Fidelity.model_validate(chosen)
     return replace(case, study=case.study.model_copy(update={"fidelity": fidelity}))
 
 
-def soft_settings(case: Case) -> models.Fidelity:
+def soft_settings(case: Case) -> Fidelity:
     """Those of the soft run from which others go on, with its largest stable step."""
     scale = min((_SOFT_STIFFNESS / full_stiffness_number(case.study)) ** 1.5, 1.0)
     scale = max(rounded(scale, up=True), softest_scale(case.study))
@@ -143,7 +152,7 @@ def soft_settings(case: Case) -> models.Fidelity:
     return consistent(_with(case, youngs_modulus_scale=scale, timestep_fraction=_step(stable)))
 
 
-def stiff_settings(case: Case) -> models.Fidelity:
+def stiff_settings(case: Case) -> Fidelity:
     """Those of a run at the physical modulus, begun softer if that saves anything."""
     stable = _step(timesteps.stable_fraction(_with(case), math.log(_STABILITY_NUMBER)))
     if describe(case)["inertial_number"] > FAST:
@@ -152,7 +161,7 @@ def stiff_settings(case: Case) -> models.Fidelity:
     soft = soft_settings(case)
     if soft.youngs_modulus_scale > _SOFTEST_START:
         return chosen
-    start = models.SoftStart(
+    start = SoftStart(
         youngs_modulus_scale=soft.youngs_modulus_scale, timestep_fraction=soft.timestep_fraction
     )
     return chosen.model_copy(update={"soft_start": start})
@@ -160,15 +169,15 @@ def stiff_settings(case: Case) -> models.Fidelity:
 
 def _step(stable: float) -> float:
     """A time step over the Rayleigh time that is stable and may be set."""
-    return min(rounded(stable, up=False), models.LARGEST_TIMESTEP_FRACTION)
+    return min(rounded(stable, up=False), LARGEST_TIMESTEP_FRACTION)
 
 
-def ways_of(case: Case, requested: models.Tolerance, tradeoff: TradeoffRecord) -> Ways | None:
+def ways_of(case: Case, requested: Tolerance, tradeoff: TradeoffRecord) -> Ways | None:
     """The ways to a tolerance; None where a softer run saves nothing, or no windows fit."""
     stiff = stiff_settings(case)
     if stiff.soft_start is None:
         return None
-    windows = models.Windows(
+    windows = Windows(
         tolerance=requested.tolerance,
         quantities=list(requested.quantities),
         timestep_fraction=stiff.timestep_fraction,
@@ -201,15 +210,15 @@ def finest_drop(case: Case, tradeoff: TradeoffRecord) -> Option:
     return _drop_option(process, finest, min(finest.timestep_fraction, limit))
 
 
-def _beside_drop(case: Case) -> tuple[models.Fidelity, float]:
+def _beside_drop(case: Case) -> tuple[Fidelity, float]:
     """If the drop test is asked about: settings of the process, and largest step of the drop."""
-    named = {**models.BUILT_IN_FIDELITIES, **case.study.fidelities}[_PROCESS_OF_DROP]
+    named = {**BUILT_IN_FIDELITIES, **case.study.fidelities}[_PROCESS_OF_DROP]
     limit = timesteps.largest_fraction("impact", describe(case)["lowest_restitution"])
     study = case.study.model_copy(update={"fidelity": named})
     return consistent(replace(case, study=study)), limit
 
 
-def _drop_option(process: models.Fidelity, drop: DropEntry, fraction: float) -> Option:
+def _drop_option(process: Fidelity, drop: DropEntry, fraction: float) -> Option:
     """A step of the drop test, whose error has no scatter."""
     cost = drop.relative_cost
     return Option(process, cost, cost, abs(drop.restitution_error), fraction)
@@ -231,7 +240,7 @@ class Advice:
         What could be done instead; none for a drop test, or where a softer run saves nothing.
     """
 
-    requested: models.Tolerance
+    requested: Tolerance
     chosen: Option
     reference: Option
     fallback: str | None = None
@@ -250,9 +259,7 @@ class Advice:
         )
 
 
-def resolve(
-    case: Case, requested: models.Tolerance, tradeoff: TradeoffRecord | None = None
-) -> Case:
+def resolve(case: Case, requested: Tolerance, tradeoff: TradeoffRecord | None = None) -> Case:
     """The case with the settings that a tolerance asks for; it remembers the question.
 
     Parameters
@@ -272,7 +279,7 @@ def resolve(
     return replace(case, study=study, requested=requested, advised=advice.for_case)
 
 
-def advised_settings(case: Case, requested: models.Tolerance, tradeoff: TradeoffRecord) -> Advice:
+def advised_settings(case: Case, requested: Tolerance, tradeoff: TradeoffRecord) -> Advice:
     """The settings for a tolerance.
 
     Parameters
@@ -288,7 +295,7 @@ def advised_settings(case: Case, requested: models.Tolerance, tradeoff: Tradeoff
     InputError
         The quantities do not go together.
     """
-    if models.RESTITUTION not in requested.quantities:
+    if RESTITUTION not in requested.quantities:
         return _process_advice(case, requested, tradeoff)
     if len(requested.quantities) > 1:
         raise InputError(
@@ -296,7 +303,7 @@ def advised_settings(case: Case, requested: models.Tolerance, tradeoff: Tradeoff
             file=case.file,
             field="fidelity.quantity",
             value=", ".join(requested.quantities),
-            limit=f"{models.RESTITUTION} alone, or quantities of the process",
+            limit=f"{RESTITUTION} alone, or quantities of the process",
             remedy="remove one of them",
         )
     finest = finest_drop(case, tradeoff)
@@ -315,7 +322,7 @@ def advised_settings(case: Case, requested: models.Tolerance, tradeoff: Tradeoff
     return Advice(requested, finest, finest, why)
 
 
-def _process_advice(case: Case, requested: models.Tolerance, tradeoff: TradeoffRecord) -> Advice:
+def _process_advice(case: Case, requested: Tolerance, tradeoff: TradeoffRecord) -> Advice:
     """The settings with which a tolerance is met in a case's own scene.
 
     A soft run over the whole path, and windows at the physical modulus until the tolerance is met;

@@ -16,7 +16,8 @@ from dragdeck.scenes.filling import FILLING, expected_time
 from dragdeck.scenes.motion import plunge_point
 from dragdeck.scenes.scene import particles_step_s
 from dragdeck.scenes.workpiece import FACET_STEP_S, PARTICLE_STEPS_PER_S, workpiece_facets
-from dragdeck.study.model import Fidelity, Study, Tolerance
+from dragdeck.study.fidelity import Fidelity, Tolerance
+from dragdeck.study.model import Study
 
 
 @dataclass(frozen=True)

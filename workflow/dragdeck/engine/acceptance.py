@@ -12,7 +12,7 @@ from dragdeck.decks.outputs import WORKPIECE_FORCE, OutputOfRun
 from dragdeck.engine import log
 from dragdeck.engine.checkpoints import is_whole
 from dragdeck.engine.completeness import coverage, part_files, some_frames
-from dragdeck.physics.contact_mechanics import stability_number
+from dragdeck.physics.contact_network import stability_number
 from dragdeck.physics.rigid import RigidBodies, pose
 from dragdeck.physics.run_limits import SPEED_FACTOR
 from dragdeck.records.bed import CaseOfBed

@@ -6,7 +6,7 @@ from dragdeck.cases.bed import particle_material, skin
 from dragdeck.cases.case import Case, of_each_workpiece
 from dragdeck.cases.ranks import cores_here
 from dragdeck.physics.contact_mechanics import FAST, effective_modulus, impact_overlap
-from dragdeck.scenes.filling import expected_bed, rank_split
+from dragdeck.scenes.bed_space import expected_bed, rank_split
 from dragdeck.scenes.filling_cautions import MOST_OVERLAP, floor_overlap
 from dragdeck.scenes.fit import clearances, closest, in_diameters
 from dragdeck.scenes.moving_bowl import bed_in_motion

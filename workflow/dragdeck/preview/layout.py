@@ -16,7 +16,7 @@ from dragdeck.arrays import Floats
 from dragdeck.cases.case import Case, of_each_workpiece
 from dragdeck.mesh.surface import surface
 from dragdeck.physics.packing import Bed
-from dragdeck.scenes.filling import expected_bed
+from dragdeck.scenes.bed_space import expected_bed
 from dragdeck.scenes.motion import Course, course
 from dragdeck.scenes.moving_bowl import bed_in_motion
 from dragdeck.scenes.workpiece import reference_height, workpiece_mesh, workpiece_radius

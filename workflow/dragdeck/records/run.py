@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, NamedTuple, Self
+from typing import TYPE_CHECKING, Literal, Self
 
 from pydantic import Field, PositiveFloat, model_validator
 
@@ -153,14 +153,19 @@ def changed_in_words(scripts: Sequence[str]) -> str:
 
 
 State = Literal["running", "stopped", "failed", "complete"]
+
+
 CHECKS = {row["code"]: row for row in table_rows(Path(__file__).with_name("checks.csv"))}
 """The registry of acceptance checks by code: the name of each, and what to do where it did not
 pass; of some, its words or the screen output say it."""
+
 
 if TYPE_CHECKING:
     CheckCode = str
 else:
     CheckCode = Literal[tuple(CHECKS)]
+
+
 CheckReason = Literal["lost_particles", "other", "particles", "finite_numbers", "energy", "speed"]
 
 
@@ -391,35 +396,3 @@ def read_accepted(run_dir: Path) -> RunRecord:
     if (reason := refusal(record)) is not None:
         raise RejectedRunError(f"{run_dir} cannot be used: {reason}")
     return record
-
-
-# --- figures -------------------------------------------------------------------------------------
-
-
-class FigureOfRun(NamedTuple):
-    """A figure of a run, ``figures/<name>.png``.
-
-    Attributes
-    ----------
-    scene : str
-        Whose runs have it; that of the loading of the workpiece is drawn apart.
-    caption : str
-    seen : str
-        What is seen in it, for those who do not see it.
-    """
-
-    scene: str
-    caption: str
-    seen: str
-
-
-FIGURES: Mapping[str, FigureOfRun] = {
-    row.pop("name"): FigureOfRun(**row)
-    for row in table_rows(Path(__file__).with_name("figures.csv"))
-}
-"""The registry of figures by name, in the order of the report."""
-
-
-def figures_of(scene: str) -> Sequence[str]:
-    """Names of the figures of a scene's runs."""
-    return [name for name, figure in FIGURES.items() if figure.scene == scene]

@@ -29,7 +29,8 @@ from dragdeck.physics.walls import round_container
 from dragdeck.records.case import CaseOfRun
 from dragdeck.scenes.scene import case_of_study, deck_of_study
 from dragdeck.study.calibration import Drum, Repose, Rig
-from dragdeck.study.model import Fidelity, Study
+from dragdeck.study.fidelity import Fidelity
+from dragdeck.study.model import Study
 
 STIFFNESS = 1e4
 """Young's modulus over density, gravity, and radius of the cylinder or drum: soft, but the angles

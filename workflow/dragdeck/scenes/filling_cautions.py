@@ -19,7 +19,7 @@ from dragdeck.physics.contact_mechanics import (
 )
 from dragdeck.physics.domain_split import rank_warnings
 from dragdeck.physics.rounding import rounded
-from dragdeck.scenes.filling import rank_split
+from dragdeck.scenes.bed_space import rank_split
 from dragdeck.study.contact_law import FrictionLimit
 from dragdeck.study.model import Study
 

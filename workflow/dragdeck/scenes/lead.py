@@ -15,7 +15,8 @@ from dragdeck.decks.deck import Materials
 from dragdeck.errors import InputError
 from dragdeck.scenes.motion import Stop, driven, output_periods
 from dragdeck.study.drive import Drive
-from dragdeck.study.model import SoftStart, Study
+from dragdeck.study.fidelity import SoftStart
+from dragdeck.study.model import Study
 
 LEAD = "lead"
 """Part of a case that only leads to another one's process."""

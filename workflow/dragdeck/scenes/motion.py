@@ -22,7 +22,8 @@ from dragdeck.physics.rounding import round_to
 from dragdeck.physics.walls import Container
 from dragdeck.study.drive import Drive, EngineMotion
 from dragdeck.study.driven import DrivenMotion
-from dragdeck.study.model import Motion, Study
+from dragdeck.study.model import Study
+from dragdeck.study.motion import Motion
 from dragdeck.study.paths.path import Point, Vector
 from dragdeck.study.rotations import Orientations, rotation_vector
 from dragdeck.study.workpiece import MeshShape

@@ -26,15 +26,31 @@ from dragdeck.scenes import motion as motions
 from dragdeck.scenes import moving_bowl
 from dragdeck.scenes import scene as scenes
 from dragdeck.scenes import workpiece as workpieces
+from dragdeck.scenes.bed_space import (
+    bed_limits,
+    bowl_files,
+    bowl_neighbours,
+    box_top,
+    expected_bed,
+    rank_split,
+)
 from dragdeck.scenes.drop_test import DROP_TEST
 from dragdeck.scenes.lead import Covered, covered, mark_file, stops, with_lead
+from dragdeck.scenes.liquid import (
+    acting_gravity,
+    check_submerged,
+    liquid,
+    liquid_leaves_out,
+    liquid_models,
+)
 from dragdeck.scenes.numbers import describe, workpiece_buoyancy
 from dragdeck.scenes.process_cautions import process_cautions
 from dragdeck.study.base import Json, without_fields
 from dragdeck.study.bowls.bowl import LID
 from dragdeck.study.contact_law import coefficient_words
 from dragdeck.study.drive import Drive, EngineMotion
-from dragdeck.study.model import Motion, Study
+from dragdeck.study.model import Study
+from dragdeck.study.motion import Motion
 from dragdeck.study.workpiece import CylinderShape, MeshShape, Shape
 
 _ENERGY_DRIFT = 0.1
@@ -61,14 +77,14 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
     each = of_each_workpiece(whole)
     study, counts = whole.study, [workpieces.workpiece_facets(workpiece) for workpiece in each]
     facets = study.bowl_facet_size_m is not None
-    settled = bed or fillings.expected_bed(study)
-    dt, top = bed_timestep(study, "timestep_fraction"), fillings.box_top(study)
+    settled = bed or expected_bed(study)
+    dt, top = bed_timestep(study, "timestep_fraction"), box_top(study)
     moving_bowl.check_bowl_motion(whole, settled, top)
     bed = moving_bowl.bed_in_motion(study, settled)
     periods, meshes = motions.output_periods(study, dt), _mesh_files(each)
     fits.check_apart(each, bed)
     fits.check_lid(whole, bed)
-    scenes.check_submerged(whole, bed)
+    check_submerged(whole, bed)
     courses, moved = (
         [
             motions.course(workpiece.study, bed, workpieces.reference_height(workpiece))
@@ -89,8 +105,8 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
             workpiece, way.start_m[2] + bed.margin_m - workpieces.reference_height(workpiece), top
         )
     skin = max(map(fits.process_skin, each))
-    gravity, down = moving_bowl.driven_gravity(study, scenes.acting_gravity(study))
-    types, parts = study.type_names(), fillings.rank_split(whole, skin)
+    gravity, down = moving_bowl.driven_gravity(study, acting_gravity(study))
+    types, parts = study.type_names(), rank_split(whole, skin)
     bowl = study.bowl.closed
     primitive = tuple(wall for wall in bowl.walls if not facets or wall.name == LID)
     touches = study.outputs.first_touch_fraction if steps.end == drag.end else 0.0
@@ -104,11 +120,11 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         source=_source(whole),
         gravity_m_s2=gravity,
         gravity_direction=down,
-        liquid=scenes.liquid(study),
+        liquid=liquid(study),
         skin_m=skin,
         timestep_s=dt,
         rayleigh_time_s=bed_rayleigh_time(study),
-        neighbours=max(ENGINE_NEIGHBOURS, fillings.bowl_neighbours(study, skin), *counts),
+        neighbours=max(ENGINE_NEIGHBOURS, bowl_neighbours(study, skin), *counts),
         outputs=_outputs(
             periods,
             drag,
@@ -136,7 +152,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
     number = max(case.number, 1) - 1
     files = {WORKPIECE_MESH: partial(_stl, each[number])}
     fastest = max(map(_fastest, each, courses))
-    limits = fillings.bed_limits(study, top, fastest)
+    limits = bed_limits(study, top, fastest)
     jam = any(fits.may_jam(body, bed.surface_m) for body in each)
     models = {
         body.mesh: partial(_stl, body_case) for body_case, body in zip(each, moved, strict=True)
@@ -155,7 +171,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         ),
         steps=steps.end - steps.entry,
         facets=sum(counts),
-        files=files if number else {**models, **fillings.bowl_files(study, top)},
+        files=files if number else {**models, **bowl_files(study, top)},
         models=_models(study),
         leaves_out=_leaves_out(study),
         warnings=[*_cautions(each), *rank_warnings(parts)],
@@ -358,7 +374,7 @@ def _models(study: Study) -> dict[str, str]:
         "particle-particle, particle-workpiece, particle-bowl": "force chains run through all",
         f"bowl: {bowl}": "force chains end there; the force on each particle gives its contacts",
         **{words: "as given in the study" for words in optional},
-        **scenes.liquid_models(study),
+        **liquid_models(study),
         "workpiece as facets": "LIGGGHTS moves meshes only",
         **{f"{name} of the workpiece": "as given in the study" for name in superposed},
         f"total force, {study.outputs.workpiece_force_hz:g} Hz": "drag, its spread and its peaks",
@@ -372,7 +388,7 @@ def _leaves_out(study: Study) -> dict[str, LeftOut]:
     _, absent = coefficient_words(study.pairs.values())
     workpiece, network = study.outputs.workpiece_contacts_hz, study.outputs.network_hz
     reasons = {
-        **scenes.liquid_leaves_out(study),
+        **liquid_leaves_out(study),
         "positions, torques, areas of contacts": LeftOut(
             "the particles of the same step have the positions; no report uses the rest",
             "contact_columns",

@@ -9,7 +9,7 @@ import numpy as np
 from dragdeck.arrays import Floats
 from dragdeck.study.bowl_motions.bowl_motion import BowlMotion
 from dragdeck.study.drive import Drive, EngineMotion, PathEntry, SmoothStart, SuperposedEntry
-from dragdeck.study.model import Motion
+from dragdeck.study.motion import Motion
 from dragdeck.study.rotations import Orientations
 from dragdeck.study.stages import StepCounts
 from dragdeck.study.superposed.motion import SuperposedMotion

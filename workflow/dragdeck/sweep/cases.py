@@ -30,8 +30,9 @@ from dragdeck.cases.case import Case
 from dragdeck.errors import InputError, choices, together
 from dragdeck.mesh.files import FORMATS
 from dragdeck.study.base import NAME, NAME_LIMIT, STUDY_FILE, Json, Model
-from dragdeck.study.check import contradictions, explained, validate
-from dragdeck.study.model import Fidelity, Tolerance
+from dragdeck.study.check import explained, validate
+from dragdeck.study.contradictions import contradictions
+from dragdeck.study.fidelity import Fidelity, Tolerance
 from dragdeck.study.search import Search, SearchRecord
 from dragdeck.study.yaml import read_study, read_yaml, studies_called
 from dragdeck.sweep.coarse import with_larger_particles

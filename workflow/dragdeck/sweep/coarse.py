@@ -6,7 +6,7 @@ from typing import Any
 from dragdeck.cases.bed import typical_reach
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
-from dragdeck.scenes.filling import expected_bed
+from dragdeck.scenes.bed_space import expected_bed
 from dragdeck.scenes.fit import clearances
 from dragdeck.scenes.moving_bowl import bed_in_motion
 from dragdeck.study.media import Grains, Media, Sieve
