@@ -31,7 +31,8 @@ from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import PROCESS, process_scene
 from dragdeck.scenes.scene import read_bed
 from dragdeck.study.yaml import read_study
-from dragdeck.sweep.cases import Design, Variation, settle_case, study_file
+from dragdeck.sweep.cases import settle_case, study_file
+from dragdeck.sweep.design import Design, Variation
 from evidence.beds import dragged
 from evidence.second_engine.script import SCRIPT_FILE, script, write_particles
 

@@ -11,7 +11,6 @@ from dragdeck.errors import InputError, choices
 from dragdeck.outlook.timestep import check_timestep
 from dragdeck.records.tradeoff import TradeoffRecord
 from dragdeck.scenes.lead import FIRST_WINDOWS, LEAD, with_leads
-from dragdeck.scenes.motion import deepest
 from dragdeck.scenes.process import PROCESS, SCENES
 from dragdeck.scenes.scene import SceneType
 from dragdeck.scenes.workpiece import workpiece_length
@@ -175,7 +174,7 @@ def check_search(file: Path) -> Mapping[str, Sequence[Case]]:
             name = f"search.vary.{field}"
             raise InputError("no run depends on it", file=file, field=name, remedy="remove it")
     every = [case for cases in bounds.values() for case in cases]
-    depth = max(deepest(case.study.motion) for case in every)
+    depth = max(case.study.motion.deepest_m for case in every)
     for name, measure in search.measures.items():
         if measure.heights_m is None:
             continue

@@ -13,8 +13,6 @@ from dragdeck.records.tradeoff import TradeoffRecord
 from dragdeck.records.windows import Known, WindowsRecord, softening
 from dragdeck.scenes import lead as leads
 from dragdeck.scenes.filling import FILLING, expected_time
-from dragdeck.scenes.motion import plunge_point
-from dragdeck.scenes.scene import particles_step_s
 from dragdeck.scenes.workpiece import FACET_STEP_S, PARTICLE_STEPS_PER_S, workpiece_facets
 from dragdeck.study.fidelity import Fidelity, Tolerance
 from dragdeck.study.model import Study
@@ -46,7 +44,7 @@ class Work:
     def of(cls, case: Case, tradeoff: TradeoffRecord) -> "Work":
         """Of a case; its own fidelity does not matter."""
         study, motion = case.study, case.study.motion
-        way = math.dist(plunge_point(motion), motion.path.start_point)
+        way = math.dist(motion.plunge_point, motion.path.start_point)
         entry_s = (
             expected_surface(study) / motion.plunge_speed_m_s + way / motion.approach_speed_m_s
         )

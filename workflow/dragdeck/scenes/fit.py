@@ -23,7 +23,6 @@ from dragdeck.errors import InputError, together
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import round_to, rounded
 from dragdeck.scenes import motion as motions
-from dragdeck.scenes.motion import deepest
 from dragdeck.study.paths.path import as_rows
 from dragdeck.study.workpiece import MeshShape
 
@@ -78,7 +77,7 @@ def clearances(case: Case, surface_m: float) -> Clearances:
     across, along, up = motion.bowl.reach_m if motion.bowl else (0.0, 0.0, 0.0)
     tip = surface_m - motion.immersion_depth_m - up
     wall = wall_gap(case, surface_m) - math.hypot(across, along)
-    return Clearances(wall, tip, tip + motions.vertical_range(motion)[0] - workpieces.dip(case))
+    return Clearances(wall, tip, tip + motion.vertical_range_m[0] - workpieces.dip(case))
 
 
 def in_diameters(case: Case, gap_m: float) -> float:
@@ -96,7 +95,7 @@ def wall_gap(case: Case, surface_m: float | None = None) -> float:
     it starts, all others as the cylinder of `workpiece_reach`.
     """
     motion, bowl = case.study.motion, case.study.bowl.container
-    begin, plunge = motion.path.start_point, motions.plunge_point(motion)
+    begin, plunge = motion.path.start_point, motion.plunge_point
     one_side = motion.tilt_deg and motion.path.one_side_inwards(motion.orientation)
     if one_side and bowl.round and not bowl.rim:
         angle, outline = motion.path.direction_rad, workpieces.outline_in_bed(case).T
@@ -115,7 +114,7 @@ def wall_gap(case: Case, surface_m: float | None = None) -> float:
     points = (np.unique(places, axis=0)[:, None] + outline).reshape(-1, 2)
     return min(
         float(bowl.distance(np.insert(points, 2, height, axis=1)).min())
-        for height in np.linspace(surface - deepest(motion), surface, _HEIGHTS).tolist()
+        for height in np.linspace(surface - motion.deepest_m, surface, _HEIGHTS).tolist()
     )
 
 
@@ -210,7 +209,7 @@ def _beside(case: Case, gap: float) -> Iterator[InputError]:
             file=case.file,
             field="motion.path",
             value=f"{gap:.4g} m between workpiece and wall, at its axis "
-            f"{motions.farthest_reach(study.motion):.4g} m from that of the bowl or nearer",
+            f"{study.motion.farthest_m:.4g} m from that of the bowl or nearer",
             limit=f"at least {diameter:.4g} m, a particle diameter",
             remedy=remedy,
         )
@@ -250,10 +249,10 @@ def _largest_particle(case: Case) -> float:
 def _up_and_down(case: Case, tip_m: float) -> Iterator[InputError]:
     """Refuse a path or superposed motions that take a workpiece to the floor or out of the bed."""
     motion = case.study.motion
-    depth, (low, high) = motion.immersion_depth_m, motions.vertical_range(motion)
+    depth, (low, high) = motion.immersion_depth_m, motion.vertical_range_m
     low -= workpieces.dip(case)
     deepest = min(depth + tip_m - _largest_particle(case), workpieces.workpiece_length(case))
-    moving = ["path"] if any(motions.path_heights(motion)) or motion.path.inclined else []
+    moving = ["path"] if any(motion.path_heights_m) or motion.path.inclined else []
     moving += [
         name
         for name, superposed_motion in motion.superposed().items()

@@ -24,7 +24,7 @@ from dragdeck.study.drive import Drive, EngineMotion
 from dragdeck.study.driven import DrivenMotion
 from dragdeck.study.model import Study
 from dragdeck.study.motion import Motion
-from dragdeck.study.paths.path import Point, Vector
+from dragdeck.study.paths.path import Vector
 from dragdeck.study.rotations import Orientations, rotation_vector
 from dragdeck.study.workpiece import MeshShape
 
@@ -92,69 +92,6 @@ class Stop:
     first: bool = False
     writes: bool = False
     mark: str = ""
-
-
-def plunge_point(motion: Motion) -> Point:
-    """Where the workpiece goes in, m."""
-    return motion.path.plunge_point if motion.plunge_at_m is None else motion.plunge_at_m
-
-
-def farthest_reach(motion: Motion) -> float:
-    """Largest distance of the workpiece's axis from the bowl's, m."""
-    places = [plunge_point(motion), *motion.path.corners[:, :2].tolist()]
-    return max(math.hypot(x, y) for x, y in places)
-
-
-def surface_speed(motion: Motion, radius_m: float) -> float:
-    """Highest speed of the workpiece's surface in the drag, m/s: of its axis, and what is added.
-
-    The turn of a workpiece that follows a circle is not counted.
-
-    Parameters
-    ----------
-    motion : Motion
-    radius_m : float
-        Of the workpiece.
-    """
-    axis = motion.nominal_speed_m_s * motion.path.peak_speed_ratio
-    return max(axis, motion.speed_in_bowl_m_s) + added_speed(motion, radius_m, 1.0)
-
-
-def added_speed(motion: Motion, radius_m: float, factor: float) -> float:
-    """What turning and superposed motions add to the speed of the axis at most, m/s.
-
-    Parameters
-    ----------
-    motion : Motion
-    radius_m : float
-        Of the workpiece.
-    factor : float
-        On the study's own speeds.
-    """
-    turning = motion.path.turning_rad_s if motion.inclined else 0.0
-    arm = math.hypot(radius_m, deepest(motion))
-    moving = motion.superposed(factor).values()
-    return turning * factor * arm + sum(
-        superposed_motion.surface_speed_m_s(radius_m) for superposed_motion in moving
-    )
-
-
-def path_heights(motion: Motion) -> tuple[float, float]:
-    """Lowest and highest height of the path above the immersion depth, m; 0 is within."""
-    heights = [0.0, *motion.path.corners[:, 2].tolist()]
-    return min(heights), max(heights)
-
-
-def vertical_range(motion: Motion) -> tuple[float, float]:
-    """Lowest and highest height of the tip above the immersion depth, m; 0 is within."""
-    reach = sum(superposed.vertical_reach_m for superposed in motion.superposed().values())
-    low, high = path_heights(motion)
-    return low - reach, high + reach
-
-
-def deepest(motion: Motion) -> float:
-    """Largest depth of the tip below the surface in the drag, m."""
-    return motion.immersion_depth_m - vertical_range(motion)[0]
 
 
 # --- steps between frames of the outputs ---------------------------------------------------------
@@ -228,7 +165,7 @@ def driven(study: Study, start: int = 0) -> DrivenMotion:
 def driven_surface_speed(study: Study, radius_m: float) -> float:
     """The highest speed of the workpiece's surface as it is driven, m/s; see `surface_speed`."""
     way = driven(study)
-    return way.fastest_m_s + added_speed(study.motion, radius_m, way.factor)
+    return way.fastest_m_s + study.motion.added_speed_m_s(radius_m, way.factor)
 
 
 def course(
@@ -266,7 +203,7 @@ def course(
             motion=path.on_engine(drive),
         )
     )
-    start = (*plunge_point(motion), clear + reference_m)
+    start = (*motion.plunge_point, clear + reference_m)
     has_front = isinstance(study.workpiece.shape, MeshShape) or motion.inclined
     turn = path.direction_rad if has_front else 0.0  # a mesh looks along +x in its own file
     return Course(start_m=start, turn_rad=turn, legs=legs, driven=way)
@@ -278,7 +215,7 @@ def _entry(
     """Duration and velocity of plunge and approach; the tip goes down by `dive_m`."""
     speed = motion.plunge_speed_m_s * speed_factor
     yield "plunge", dive_m / speed, (0.0, 0.0, -speed)
-    begin, end = plunge_point(motion), motion.path.start_point
+    begin, end = motion.plunge_point, motion.path.start_point
     dx, dy = end[0] - begin[0], end[1] - begin[1]
     distance = math.hypot(dx, dy)
     if distance:

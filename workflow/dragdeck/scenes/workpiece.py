@@ -17,7 +17,6 @@ from dragdeck.mesh.checks import MeshDefect, Surroundings, check
 from dragdeck.mesh.files import read
 from dragdeck.mesh.shapes import cylinder, cylinder_facets, cylinder_radius
 from dragdeck.physics.rounding import round_to
-from dragdeck.scenes.motion import deepest, farthest_reach, surface_speed
 from dragdeck.study.driven import DrivenMotion
 from dragdeck.study.rotations import by_vector
 from dragdeck.study.workpiece import CylinderShape, MeshShape
@@ -110,7 +109,7 @@ def remeshing(case: Case) -> str | None:
 def mesh_of_case(case: Case, shape: MeshShape) -> "tuple[Trimesh, list[MeshDefect]]":
     """The mesh of a shape from a file, upright with its tip in the origin, and its defects."""
     study = case.study
-    sizes = study.bowl.container.clear_m, study.media.typical_radius_m, deepest(study.motion)
+    sizes = study.bowl.container.clear_m, study.media.typical_radius_m, study.motion.deepest_m
     surroundings = Surroundings(*sizes)
     return _from_file(mesh_file(case, shape), shape, surroundings)
 
@@ -130,8 +129,8 @@ def simulated_mesh(case: Case) -> "Trimesh":
     if motion.path.inclined or motion.turns_about_inclined_axis:
         return mesh
     box = case.study.bowl.container.reach_m + 2 * case.study.media.typical_radius_m
-    outside = np.hypot(*mesh.triangles_center[:, :2].T) + farthest_reach(motion) > box
-    if (outside & (mesh.triangles[:, :, 2].min(axis=1) < deepest(motion))).any():
+    outside = np.hypot(*mesh.triangles_center[:, :2].T) + motion.farthest_m > box
+    if (outside & (mesh.triangles[:, :, 2].min(axis=1) < motion.deepest_m)).any():
         raise InputError(
             "a facet of the workpiece reaches from the bed out of the simulation box",
             file=case.file,
@@ -155,7 +154,7 @@ def _generated_length(case: Case) -> float:
     """Length of a generated workpiece along its axis, m."""
     study = case.study
     freeboard = _FREEBOARD_DIAMETERS * 2 * study.media.typical_radius_m
-    depth = deepest(study.motion)
+    depth = study.motion.deepest_m
     return round_to((depth + freeboard) / math.cos(math.radians(study.motion.tilt_deg or 0)), 6)
 
 
@@ -168,7 +167,7 @@ def workpiece_radius(case: Case) -> float:
     if isinstance(shape, CylinderShape):
         return cylinder_radius(shape.radius_m, _generated_length(case), shape.facet_size_m)
     mesh, _ = mesh_of_case(case, shape)
-    below = surfaces.points_below(mesh, mesh.bounds[1, 2] if motion.inclined else deepest(motion))
+    below = surfaces.points_below(mesh, mesh.bounds[1, 2] if motion.inclined else motion.deepest_m)
     return float(np.hypot(*below[:, :2].T).max())
 
 
@@ -181,7 +180,7 @@ def workpiece_reach(case: Case) -> float:
 
 def outline_in_bed(case: Case) -> NDArray[np.float64]:
     """X and y, (2, N), of the corners of what is in the bed, its front along +x, m."""
-    mesh, height = workpiece_mesh(case), deepest(case.study.motion) - reference_height(case)
+    mesh, height = workpiece_mesh(case), case.study.motion.deepest_m - reference_height(case)
     outlines = [
         surfaces.points_below(surfaces.surface(points, mesh.faces), height)[:, :2]
         for points in _postures(case)
@@ -193,7 +192,7 @@ def fastest_surface(case: Case) -> float:
     """Highest speed of the workpiece's surface in the drag, at the study's own speed, m/s."""
     motion = case.study.motion
     turns = motion.superposed() or motion.path.inclined
-    return surface_speed(motion, workpiece_radius(case) if turns else 0.0)
+    return motion.surface_speed_m_s(workpiece_radius(case) if turns else 0.0)
 
 
 def workpiece_facets(case: Case) -> int:

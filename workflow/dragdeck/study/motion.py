@@ -9,11 +9,13 @@ from pydantic import Field, model_validator
 
 from dragdeck.parts import omitted
 from dragdeck.study.base import Model, NonNegative, Number, Positive, Whole
-from dragdeck.study.bowl_motions.registry import AnyBowlMotion
+from dragdeck.study.bowl_motions.acceleration import Acceleration
+from dragdeck.study.bowl_motions.rotation import Rotation
+from dragdeck.study.bowl_motions.vibration import Vibration
 from dragdeck.study.paths.circle import CirclePath
 from dragdeck.study.paths.figure_eight import FigureEightPath
 from dragdeck.study.paths.line import LinePath
-from dragdeck.study.paths.path import as_rows, turned
+from dragdeck.study.paths.path import Point, as_rows, turned
 from dragdeck.study.paths.rest import RestPath
 from dragdeck.study.paths.waypoints import WaypointsPath
 from dragdeck.study.rotations import about_vertical
@@ -43,6 +45,9 @@ class Superposed(Model):
 
 AnyPath = CirclePath | FigureEightPath | LinePath | RestPath | WaypointsPath
 """The registry of paths."""
+
+AnyBowlMotion = Annotated[Acceleration | Rotation | Vibration, Field(discriminator="kind")]
+"""The registry of motions of the bowl."""
 
 
 _PLACES = 1001
@@ -173,6 +178,58 @@ class Motion(Superposed):
     def path_length_m(self) -> float:
         """Length of the drag, m."""
         return self.path.path_length_m
+
+    @property
+    def plunge_point(self) -> Point:
+        """Where the workpiece goes in, m."""
+        return self.path.plunge_point if self.plunge_at_m is None else self.plunge_at_m
+
+    @property
+    def farthest_m(self) -> float:
+        """Largest distance of the workpiece's axis from the bowl's."""
+        places = [self.plunge_point, *self.path.corners[:, :2].tolist()]
+        return max(math.hypot(x, y) for x, y in places)
+
+    @property
+    def path_heights_m(self) -> tuple[float, float]:
+        """Lowest and highest height of the path above the immersion depth; 0 is within."""
+        heights = [0.0, *self.path.corners[:, 2].tolist()]
+        return min(heights), max(heights)
+
+    @property
+    def vertical_range_m(self) -> tuple[float, float]:
+        """Lowest and highest height of the tip above the immersion depth; 0 is within."""
+        reach = sum(superposed.vertical_reach_m for superposed in self.superposed().values())
+        low, high = self.path_heights_m
+        return low - reach, high + reach
+
+    @property
+    def deepest_m(self) -> float:
+        """Largest depth of the tip below the surface in the drag."""
+        return self.immersion_depth_m - self.vertical_range_m[0]
+
+    def surface_speed_m_s(self, radius_m: float) -> float:
+        """Highest speed of a workpiece's surface in the drag: of its axis, and what is added.
+
+        The turn of a workpiece that follows a circle is not counted.
+        """
+        axis = self.nominal_speed_m_s * self.path.peak_speed_ratio
+        return max(axis, self.speed_in_bowl_m_s) + self.added_speed_m_s(radius_m, 1.0)
+
+    def added_speed_m_s(self, radius_m: float, factor: float) -> float:
+        """What turning and superposed motions add to the speed of the axis at most.
+
+        Parameters
+        ----------
+        radius_m : float
+            Of the workpiece.
+        factor : float
+            On the study's own speeds.
+        """
+        turning = self.path.turning_rad_s if self.inclined else 0.0
+        moving = self.superposed(factor).values()
+        turned = turning * factor * math.hypot(radius_m, self.deepest_m)
+        return turned + sum(superposed.surface_speed_m_s(radius_m) for superposed in moving)
 
     @property
     def uncounted_m(self) -> float:

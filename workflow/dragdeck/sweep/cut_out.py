@@ -21,7 +21,6 @@ from dragdeck.physics.packing import Bed
 from dragdeck.physics.turning_bed import surface_tilt
 from dragdeck.physics.walls import Container
 from dragdeck.scenes.bed_space import expected_bed
-from dragdeck.scenes.motion import vertical_range
 from dragdeck.scenes.moving_bowl import bed_in_motion
 from dragdeck.scenes.workpiece import dip, workpiece_reach
 from dragdeck.study.bowl_motions.acceleration import Acceleration
@@ -100,17 +99,8 @@ def with_cut_out(case: Case) -> Case:
     problems = list(_refused(study))
     if problems:
         raise together(problems)
-    low = dip(case) - vertical_range(study.motion)[0]
-    cut = cut_out(study, workpiece_reach(case), low)
-    if cut.particle_count >= study.particle_count:
-        raise InputError(
-            "the cut-out is no smaller than the machine",
-            field="reduction.cut_out",
-            value=f"{cut.particle_count:,} particles",
-            limit=f"below {study.particle_count:,}, those of the machine",
-            remedy="simulate the machine: remove reduction; or use a shorter counted_m",
-        )
-    return replace(case, study=cut)
+    low = dip(case) - study.motion.vertical_range_m[0]
+    return replace(case, study=cut_out(study, workpiece_reach(case), low))
 
 
 def cut_out(study: Study, reach_m: float, low_m: float = 0.0) -> Study:

@@ -19,15 +19,8 @@ from dragdeck.errors import InputError
 from dragdeck.scenes.scene import SceneType
 from dragdeck.study.base import Positive, Whole
 from dragdeck.study.model import Study
-from dragdeck.sweep.cases import (
-    Design,
-    Resolve,
-    Settings,
-    Variation,
-    beside_each_other,
-    check_number,
-    settle_case,
-)
+from dragdeck.sweep.cases import Resolve, beside_each_other, settle_case
+from dragdeck.sweep.design import Design, Settings, Variation, check_number
 
 _LEAST_COUNTED = 0.5
 """Smallest fraction of a point's path that the statistics use."""
