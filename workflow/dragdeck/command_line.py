@@ -184,9 +184,12 @@ def _add(parsers: Any, commands: Sequence[Command]) -> None:
 
 def _of_argparse(options: Mapping[str, Any]) -> dict[str, Any]:
     """Options of an argument with a type for its name, and tuples, which YAML does not have."""
-    given = {key: tuple(value) if key == "metavar" and isinstance(value, list) else value
-             for key, value in options.items()}  # fmt: skip
-    return given | ({"type": _TYPES[given["type"]]} if "type" in given else {})
+    given = dict(options)
+    if "type" in given:
+        given["type"] = _TYPES[given["type"]]
+    if isinstance(given.get("metavar"), list):
+        given["metavar"] = tuple(given["metavar"])
+    return given
 
 
 def guarded(program: str, call: Callable[[], int | None]) -> int:

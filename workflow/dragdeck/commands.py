@@ -1,10 +1,8 @@
 """What the commands of ``dragdeck`` do, and some of its steps."""
 
-import os
 import shutil
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import partial
+from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 import jinja2
@@ -16,25 +14,15 @@ from dragdeck.advice import forecast as forecasts
 from dragdeck.advice.advise import advised_settings
 from dragdeck.cases.bed import clump_of
 from dragdeck.cases.case import Case
-from dragdeck.cases.ranks import check_ranks, cores_here
 from dragdeck.decks import render as rendering
 from dragdeck.decks.templates import environment
-from dragdeck.engine.process import LAUNCHER_VARIABLE, find_engine
 from dragdeck.engine.reports import say
-from dragdeck.engine.space import check_amount
 from dragdeck.errors import DragdeckError, InputError, choices, together
 from dragdeck.files import write_bytes
-from dragdeck.outlook import timestep as timesteps
+from dragdeck.outlook.built import built_scene, friction_unknown, refuse_tolerance
 from dragdeck.outlook.explain import explanation, show
 from dragdeck.outlook.explain import scene_lines as page_of_scene
-from dragdeck.outlook.process import (
-    bed_notes,
-    dimensionless,
-    not_corrected,
-    reduced,
-    workpiece_notes,
-)
-from dragdeck.outlook.runs import expected_runs, plan_in_words, written
+from dragdeck.outlook.process import reduced
 from dragdeck.physics.packing import Bed
 from dragdeck.preview.layout import layout
 from dragdeck.preview.picture import picture, small_picture
@@ -46,9 +34,8 @@ from dragdeck.scenes.process import SCENES
 from dragdeck.scenes.scene import SceneType, StudyScene, read_bed
 from dragdeck.scenes.workpiece import remeshing
 from dragdeck.script.commands import contact_laws
-from dragdeck.study.check import explained, warnings
+from dragdeck.study.check import explained
 from dragdeck.study.contact_law import coefficients, modelled
-from dragdeck.study.recorded import recorded_file
 from dragdeck.study.yaml import located
 from dragdeck.sweep.cases import new_study
 
@@ -66,178 +53,6 @@ def _scene_type(name: str) -> SceneType:
     return SCENES[name]
 
 
-def check(study: str, fidelity: str | None, verbose: bool) -> None:
-    """Build every input script of a study and look for LIGGGHTS; run nothing."""
-    try:
-        _check(study, fidelity, verbose)
-    except DragdeckError as wrong:
-        say(f"dragdeck: {wrong}")
-        count = 1 + len(wrong.more if isinstance(wrong, InputError) else ())
-        errors = f"{count} error{'s' if count > 1 else ''}"
-        raise DragdeckError(f"{study}: {errors}; it cannot be run") from None
-
-
-def _check(study: str, fidelity: str | None, verbose: bool) -> None:
-    project = projects.find_project(Path.cwd())
-    every = project.cases(study, fidelity)
-    findings = _Findings(environment(project.templates, projects.study_templates(every[0])))
-    runs = [
-        run
-        for kind in SCENES.values()
-        for run in expected_runs(
-            kind, project.run_folders(every, kind), partial(findings.look, kind)
-        )
-    ]
-    for varied, cases in projects.check_search(every[0].file).items():
-        findings.look_at_bounds(f"search.vary.{varied}", cases)
-    findings.show(verbose)
-    if findings.errors:
-        raise together(findings.errors)
-    for line in _records(every[0]):
-        print(f"  {line}")
-    engine = find_engine()
-    warned = f"{len(findings.warnings) or 'no'} warning{'' if len(findings.warnings) == 1 else 's'}"
-    cost, *scenes = plan_in_words(runs, cores_here())
-    print(*(f"  {line}" for line in scenes), sep="\n")
-    print(f"{study}: no errors, {warned}; {len(every)} case(s), {cost}; LIGGGHTS {engine.version}")
-
-
-def _records(case: Case) -> Iterator[str]:
-    """How the files that a study names are read: measured forces, and a surface meshed anew."""
-    from dragdeck.study.force_record import in_words
-
-    study, file = case.study, case.file
-    if deviation := remeshing(case):
-        yield f"workpiece.shape: {deviation}"
-    signal = study.reference.signal if study.reference else None
-    if signal:
-        record = recorded_file(signal.file, file, "reference.signal.file")
-        yield f"reference.signal: {in_words(record, signal)}"
-    if study.calibration and study.calibration.record:
-        record = recorded_file(study.calibration.record, file, "calibration.record")
-        yield f"calibration.record: {in_words(record)}"
-
-
-@dataclass
-class _Findings:
-    """What `check` finds, each thing once with the cases or runs that it is about."""
-
-    templates: jinja2.Environment
-    errors: list[InputError] = field(default_factory=list)
-    warnings: dict[str, dict[str, None]] = field(default_factory=dict)
-    reduced: dict[str, dict[str, None]] = field(default_factory=dict)
-    notes: dict[str, dict[str, None]] = field(default_factory=dict)
-
-    def look(self, kind: SceneType, runs: Mapping[Path, Case]) -> StudyScene:
-        """Build the scene of runs that differ in the seed alone."""
-        case = next(iter(runs.values()))
-        try:
-            scene = _built(kind, case, None)
-            used_templates = rendering.of_its_templates(
-                rendering.deck_text(scene, self.templates), scene, self.templates
-            )
-            _check_tolerance(case, used_templates["changed_law"])
-        except InputError as error:
-            self.errors.append(error)
-            raise
-        more = (*_friction_unknown(used_templates), *used_templates["script_findings"])
-        for text in (*map(str, scene.warnings), *more):
-            self.warnings.setdefault(text, {})[case.name] = None
-        notes = [reduced(case), not_corrected(case)] if kind.needs_bed else []
-        notes.append(changed_in_words(used_templates["changed_scripts"]))
-        notes.append(forecasts.ways_in_words(case, measured_tradeoff()) if kind.needs_bed else "")
-        for text in filter(None, notes):
-            self.reduced.setdefault(text, {})[case.name] = None
-        lines = [f"time step: {scene.deck.timestep_s:.3g} s, about {scene.steps:,} steps"]
-        lines += [f"{what}: {text}" for what, text in _expectations(case, kind, scene)]
-        names = dict.fromkeys(f"{kind.name} {folder.name}" for folder in runs)
-        self.notes.setdefault("\n  ".join(lines), {}).update(names)
-        return scene
-
-    def look_at_bounds(self, name: str, cases: Sequence[Case]) -> None:
-        """Refuse a field of a search that cannot be varied; warn where a part of it cannot be."""
-        refused = []
-        for case in cases:
-            try:
-                projects.check_buildable(case)
-            except InputError as error:
-                refused.append(replace(error, field=f"{name}: {case.name}: {error.field}"))
-        if len(refused) == len(cases):
-            self.errors += refused[:1]
-            return
-        for problem in refused:
-            text = f"{problem.field}: {problem.problem}; such a setting is not run, but infeasible"
-            self.warnings[text] = {"search": None}
-
-    def show(self, verbose: bool) -> None:
-        """Print the warnings; and what is expected of every run, if that is asked for."""
-        for text, names in self.warnings.items():
-            print(f"warning: {_first(names)}: {text}")
-        for text, names in self.reduced.items():
-            print(f"note: {_first(names)}: {text}")
-        for text, names in self.notes.items() if verbose else ():
-            print(f"{_first(names)}\n  {text}")
-
-
-def _check_tolerance(case: Case, changed_law: Sequence[str]) -> None:
-    """Refuse a tolerance with a contact law of which no error is known.
-
-    Raises
-    ------
-    InputError
-        A template changes the contact law of a case whose settings follow from a tolerance.
-    """
-    if case.requested and changed_law:
-        raise located(
-            InputError(
-                "the errors of settings are not known for the contact law of a template",
-                file=case.file,
-                field="fidelity.tolerance",
-                value="; ".join(changed_law),
-                limit="the contact law of the study: pairs and contact, without a template",
-                remedy="name a fidelity, such as full, instead of a tolerance",
-            )
-        )
-
-
-def _friction_unknown(changes: Mapping[str, Sequence[str]]) -> list[str]:
-    """A warning that contacts of a run cannot be analysed, if a template adds a force."""
-    added = changes["added_forces"]
-    if not added:
-        return []
-    return [
-        f"the contact law adds a force ({', '.join(added)}), so that the limit of friction does "
-        "not follow from the contact force; tables of contacts, chains, loading and the report "
-        "will be refused, force on the workpiece and raw output remain"
-    ]
-
-
-def _first(names: Iterable[str]) -> str:
-    first, *others = names
-    return first + (f" and {len(others)} more" if others else "")
-
-
-def _built(kind: SceneType, case: Case, bed: Bed | None) -> StudyScene:
-    """The scene of a case, with warnings about the study itself.
-
-    Raises
-    ------
-    InputError
-        It cannot be built, or has more ranks than there are cores; the error knows its line.
-    """
-    try:
-        if not kind.single_particle and LAUNCHER_VARIABLE not in os.environ:
-            check_ranks(case.ranks, case.file)
-        scene = kind.build(case, bed)
-        check_amount(*written(kind, scene))
-    except InputError as error:
-        error.file = error.file or case.file
-        raise located(error) from None
-    step = timesteps.stable_step_cautions if kind.needs_bed else timesteps.settling_cautions
-    more = () if kind.single_particle else step(case)
-    return replace(scene, warnings=[*warnings(case.study), *scene.warnings, *more])
-
-
 def explain(study: str, fidelity: str | None, scene: str | None, verbose: bool) -> None:
     """Show what the input scripts of a study model and leave out, and what that would cost."""
     project = projects.find_project(Path.cwd())
@@ -246,7 +61,7 @@ def explain(study: str, fidelity: str | None, scene: str | None, verbose: bool) 
     for kind in [_scene_type(scene)] if scene else SCENES.values():
         cases = list(projects.by_run(every, kind).values())
         for case in cases if verbose else cases[:1]:
-            scripted = _as_scripted(_built(kind, case, None), templates)
+            scripted = _as_scripted(built_scene(kind, case, None), templates)
             if verbose:
                 show([explanation(scripted, measured_tradeoff())])
             else:
@@ -266,14 +81,6 @@ def _as_scripted(scene: StudyScene, templates: jinja2.Environment) -> StudyScene
     modelling = scene.modelling(there, {row.words for row in coefficients().values() if row.model})
     told = {changed_in_words(changed): "docs/howto/input_scripts.md"}
     return replace(modelling, models={**told, **modelling.models})
-
-
-def _expectations(case: Case, kind: SceneType, scene: StudyScene) -> list[tuple[str, str]]:
-    """What is known of a scene's time step and bed before it is run."""
-    notes = timesteps.timestep_notes(case, kind, scene)
-    if kind.needs_bed:
-        notes += [timesteps.stable_step_note(case), *workpiece_notes(case), *dimensionless(case)]
-    return [*notes, *([] if kind.single_particle else bed_notes(case))]
 
 
 def preview(study: str, fidelity: str | None, case: str | None) -> None:
@@ -423,10 +230,10 @@ def render(
     if not kind.needs_bed:
         _check_processes(case for case in every if kind.run_id(case) == run)
     templates = environment(project.templates, projects.study_templates(case))
-    built = _built(kind, case, _bed(kind, packing))
+    built = built_scene(kind, case, _bed(kind, packing))
     changes = rendering.of_its_templates(rendering.deck_text(built, templates), built, templates)
-    _check_tolerance(case, changes["changed_law"])
-    for warning in (*built.warnings, *_friction_unknown(changes)):
+    refuse_tolerance(case, changes["changed_law"])
+    for warning in (*built.warnings, *friction_unknown(changes)):
         say(f"warning: {warning}")
     folder = project.run_folder(case, kind, of_plan=plan is not None)
     if case.number > 1:
@@ -441,7 +248,7 @@ def _check_processes(cases: Iterable[Case]) -> None:
     errors = []
     for case in cases:
         try:
-            _built(SCENES["process"], case, None)
+            built_scene(SCENES["process"], case, None)
         except InputError as error:
             errors.append(error)
         else:

@@ -45,6 +45,31 @@ def run_path(study: str, place: str, run: str) -> str:
     return f"results/{study}/{place}/{run}"
 
 
+RECORD = {place: "outcome.json" if place in OUTCOMES else "run.json" for place in PLACES}
+"""How a run in each folder of runs ended."""
+
+ENGINE_RUN = "[A-Za-z0-9._-]+-[0-9a-f]{8}"
+"""A run of LIGGGHTS, as a pattern."""
+
+FURTHER_WORKPIECE = f"{ENGINE_RUN}[.][0-9]+"
+"""A further workpiece of one: its number follows the run's name."""
+
+
+def of_run(place: str, file: str) -> str:
+    """Path of a file of a run, as a pattern."""
+    return f"{run_path('{study}', place, '{run}')}/{file}"
+
+
+def tables_of(place: str, names: Iterable[str]) -> list[str]:
+    """Paths of tables of a run, as patterns."""
+    return [of_run(place, f"tables/{name}") for name in names]
+
+
+def deck_files(place: str, inputs: Iterable[str]) -> list[str]:
+    """Paths of what is written of a run before it starts, as patterns."""
+    return [of_run(place, name) for name in ("in.liggghts", "case.json", "columns.json", *inputs)]
+
+
 @dataclass(frozen=True)
 class Project:
     """A folder with ``studies/``; results go beside them. What it lacks is that of dragdeck."""

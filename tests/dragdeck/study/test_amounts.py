@@ -15,7 +15,7 @@ import pytest
 import yaml
 from made_study import put
 
-from dragdeck.commands import check
+from dragdeck.checking import check
 from dragdeck.errors import DragdeckError, InputError
 from dragdeck.mesh.shapes import cylinder
 from dragdeck.project import Project

@@ -170,7 +170,7 @@ def _samples(folder: Path, output: OutputOfRun, parts: Sequence[RunPart]) -> lis
     """All whole rows of all parts."""
     texts = [_text(folder / output.pattern.format(part=part.part)) for part in parts]
     return [
-        sample for text in texts for sample in log.read_samples(text.splitlines(), output.columns)
+        sample for text in texts for sample in log.thermo_samples(text.splitlines(), output.columns)
     ]
 
 

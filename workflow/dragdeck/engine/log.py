@@ -100,7 +100,7 @@ class Sample:
         )
 
 
-def read_samples(rows: Sequence[str], columns: Sequence[str]) -> list[Sample]:
+def thermo_samples(rows: Sequence[str], columns: Sequence[str]) -> list[Sample]:
     """Rows of a ``thermo`` file; headers, and a row that was cut short, are left out."""
     samples = []
     for row in rows:

@@ -15,13 +15,7 @@ import numpy as np
 from dragdeck.cases import bed as beds
 from dragdeck.cases.case import Case
 from dragdeck.errors import Caution, InputError
-from dragdeck.physics.contact_mechanics import (
-    effective_modulus,
-    hertz_contact_time,
-    particle_mass,
-    rayleigh_time,
-    stiffness_number,
-)
+from dragdeck.physics import contact_mechanics as mechanics
 from dragdeck.physics.estimates import SOLID_FRACTION_ESTIMATE
 from dragdeck.physics.rounding import rounded
 from dragdeck.records.stability import RestitutionErrors, stability_map, stable_step_law
@@ -102,17 +96,19 @@ def outlook(case: Case, scene: SceneType, timestep_s: float) -> Iterator[PairOut
     study, particle = case.study, beds.particle_material(case.study)
     scale = 1.0 if scene.single_particle else study.chosen_fidelity().youngs_modulus_scale
     radius = study.media.typical_radius_m if scene.single_particle else beds.smallest_radius(study)
-    mass, speed = particle_mass(particle, radius), scene.impact_speed(case)
+    mass, speed = mechanics.particle_mass(particle, radius), scene.impact_speed(case)
     table = stability_map().restitution_error
     for name, other, others_radius in scene.partners(case):
         partner = study.materials[other]
-        times = {"particle": rayleigh_time(particle, radius, scale)}
-        times.setdefault(name, rayleigh_time(partner, others_radius, scale))
+        times = {"particle": mechanics.rayleigh_time(particle, radius, scale)}
+        times.setdefault(name, mechanics.rayleigh_time(partner, others_radius, scale))
         limiting = min(times, key=lambda body: times[body])
         # the engine meets walls and facets as planes: half of it all for two particles
         part = 0.5 if name == "particle" else 1.0
-        modulus = effective_modulus(particle, partner, scale)
-        steps = hertz_contact_time(part * mass, part * radius, modulus, speed) / timestep_s
+        modulus = mechanics.effective_modulus(particle, partner, scale)
+        steps = (
+            mechanics.hertz_contact_time(part * mass, part * radius, modulus, speed) / timestep_s
+        )
         restitution = study.pair(study.media.main_material, other).restitution
         yield PairOutlook(
             bodies=f"particle on {name}",
@@ -207,7 +203,7 @@ def stable_fraction(case: Case, margin: float = 0.0) -> float:
 def _stable_under(study: Study, pressure_pa: float, number: float) -> float:
     """The step over the Rayleigh time that has a stability number under a pressure."""
     softer = study.chosen_fidelity().youngs_modulus_scale ** (2 / 3)
-    kappa = softer * stiffness_number(beds.particle_material(study), pressure_pa)
+    kappa = softer * mechanics.stiffness_number(beds.particle_material(study), pressure_pa)
     restitution = study.pair(study.media.main_material, study.media.main_material).restitution
     spread = study.media.typical_std_m / study.media.typical_radius_m
     return stable_step_law().largest_fraction(kappa, restitution, spread, number)

@@ -14,25 +14,10 @@ from dragdeck.physics.packing import primes
 from dragdeck.physics.walls import Container
 from dragdeck.records.case import FillingCase
 from dragdeck.records.run import SettlingCriterion
+from dragdeck.scenes import bed_space
+from dragdeck.scenes import liquid as liquids
 from dragdeck.scenes import scene as scenes
-from dragdeck.scenes.bed_space import (
-    _start,
-    bed_limits,
-    bowl_files,
-    bowl_neighbours,
-    box_top,
-    expected_bed,
-    first_particles,
-    rank_split,
-)
 from dragdeck.scenes.filling_cautions import filling_cautions
-from dragdeck.scenes.liquid import (
-    acting_gravity,
-    check_submerged,
-    liquid,
-    liquid_leaves_out,
-    liquid_models,
-)
 from dragdeck.study.base import Json, without_fields
 from dragdeck.study.media import MOST_SIZES
 from dragdeck.study.model import Study
@@ -77,10 +62,10 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
     study = case.study
     _check_capacity(case)
     _check_cells(case)
-    check_submerged(case, expected_bed(study))
+    liquids.check_submerged(case, bed_space.expected_bed(study))
     dt = beds.bed_timestep(study, "filling_timestep_fraction")
     check_steps = max(1, math.ceil(_CHECK_INTERVAL_S / dt))
-    top, start = box_top(study), _start(study)
+    top, start = bed_space.box_top(study), bed_space._start(study)
     longest = study.filling.max_time_s
     types, meshed = _filling_types(study), bool(study.bowl.container.rim)
     deck = scenes.deck_of_study(
@@ -91,15 +76,15 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
         scene="filling",
         run=FILLING.run_id(case),
         source="particles.data",
-        gravity_m_s2=acting_gravity(study),
-        liquid=liquid(study),
+        gravity_m_s2=liquids.acting_gravity(study),
+        liquid=liquids.liquid(study),
         skin_m=beds.skin(study),
         timestep_s=dt,
         rayleigh_time_s=beds.bed_rayleigh_time(study),
         outputs=(outputs.thermo(check_steps, None), outputs.settled_particles(study.media.clumped)),
         thermo_steps=check_steps,
         checkpoint_steps=5 * check_steps,
-        processors=rank_split(case, beds.skin(study)).line,
+        processors=bed_space.rank_split(case, beds.skin(study)).line,
         bowl_type=types.index(study.bowl.material) + 1,
         bowl=study.bowl.container,
         energy_ratio=study.filling.energy_ratio,
@@ -108,7 +93,8 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
         most_checks=math.ceil(longest / (check_steps * dt)),
         max_time_s=longest,
         neighbours=max(
-            mechanics.ENGINE_NEIGHBOURS, bowl_neighbours(study, beds.skin(study)) if meshed else 0
+            mechanics.ENGINE_NEIGHBOURS,
+            bed_space.bowl_neighbours(study, beds.skin(study)) if meshed else 0,
         ),
         clumped=study.media.clumped,
         insertions=beds.body_sizes(study),
@@ -126,22 +112,22 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
             settled=SettlingCriterion(
                 energy_ratio=study.filling.energy_ratio, highest_m=study.bowl.height_m
             ),
-            limits=bed_limits(study, top, start.fastest_m_s),
+            limits=bed_space.bed_limits(study, top, start.fastest_m_s),
         ),
         steps=round(expected_time(study) / dt),
         files={
             "particles.data": lambda: _particles_data(study, top, len(types)),
-            **(bowl_files(study, top) if meshed else {}),
+            **(bed_space.bowl_files(study, top) if meshed else {}),
         },
         models={
             **_models(study),
             "settling by a criterion": f"kinetic energy below {study.filling.energy_ratio:g} m "
             f"g d per particle",
             "a separate time step": "falling particles collide faster than a packing at rest",
-            **liquid_models(study),
+            **liquids.liquid_models(study),
         },
         leaves_out={
-            **liquid_leaves_out(study),
+            **liquids.liquid_leaves_out(study),
             "the workpiece": LeftOut("added later; cases with other workpieces share this filling"),
             "contact output": LeftOut(
                 "contacts before the drag are not analysed", "filling_contacts"
@@ -181,7 +167,7 @@ def _check_capacity(case: Case) -> None:
     InputError
         The highest particle may lie above the rim.
     """
-    study, bed = case.study, expected_bed(case.study)
+    study, bed = case.study, bed_space.expected_bed(case.study)
     rim, over = study.bowl.height_m, bed.top_m - bed.surface_m
     if bed.top_m + bed.margin_m > rim:
         most = max(0, math.floor(study.particle_count * (rim - over) / bed.highest_m))
@@ -210,7 +196,7 @@ def _check_cells(case: Case) -> None:
         float(class_.radii_m[-1] * class_.clump.radii.max()) for class_ in beds.bed_classes(study)
     )
     floor = 4 * math.prod(beds.box_half_widths(study))
-    box = floor * (box_top(study) + study.media.typical_radius_m)
+    box = floor * (bed_space.box_top(study) + study.media.typical_radius_m)
     cells = box / (largest + beds.skin(study) / 2) ** 3
     if cells * _CELL_BYTES > _MOST_CELL_BYTES:
         raise InputError(
@@ -231,7 +217,10 @@ def _energy_unit(study: Study) -> float:
 
 def expected_time(study: Study) -> float:
     """Time in which the particles of a study come to rest, s. An estimate."""
-    return _arrival_speed(study, _start(study).top_m) / study.gravity_m_s2 + _SETTLING_ESTIMATE_S
+    return (
+        _arrival_speed(study, bed_space._start(study).top_m) / study.gravity_m_s2
+        + _SETTLING_ESTIMATE_S
+    )
 
 
 def _arrival_speed(study: Study, top_m: float) -> float:
@@ -245,7 +234,7 @@ def _particles_data(study: Study, top_m: float, types: int) -> str:
     if study.media.clumped:
         return data_file("the empty box", types, box, [])
     particles, names = (
-        first_particles(study),
+        bed_space.first_particles(study),
         [class_.material for class_ in beds.bed_classes(study)],
     )
     kinds = [1 + study.type_names().index(name) for name in names]
@@ -280,7 +269,7 @@ def _content(case: Case) -> Json:
 
 def _impact_speed(case: Case) -> float:
     """Speed of the highest particle that is thrown down and falls to the floor, m/s."""
-    start = _start(case.study)
+    start = bed_space._start(case.study)
     fall = mechanics.fall_speed(start.top_m, case.study.gravity_m_s2)
     return math.hypot(start.fastest_m_s, fall)
 

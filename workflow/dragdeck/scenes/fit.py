@@ -4,7 +4,6 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,12 +22,9 @@ from dragdeck.errors import InputError, together
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import round_to, rounded
 from dragdeck.scenes import motion as motions
+from dragdeck.scenes import workpiece as workpieces
 from dragdeck.study.paths.path import as_rows
 from dragdeck.study.workpiece import MeshShape
-
-if TYPE_CHECKING:
-    pass
-from dragdeck.scenes import workpiece as workpieces
 
 _FASTEST_PARTICLE, _STEPS_OF_LISTS = 1.9, 3
 """Speed of the fastest particle over that of the fastest motion, as measured from 1 to 3 m/s; steps

@@ -13,7 +13,8 @@ from dragdeck.cases.bed import bed_timestep, weight_acceleration
 from dragdeck.cases.case import Case, Stretch, of_each_workpiece
 from dragdeck.decks.deck import Materials
 from dragdeck.errors import InputError
-from dragdeck.scenes.motion import Stop, driven, output_periods
+from dragdeck.scenes.motion import driven, output_periods
+from dragdeck.scenes.process_deck import Stop
 from dragdeck.study.drive import Drive
 from dragdeck.study.fidelity import SoftStart
 from dragdeck.study.model import Study

@@ -1,17 +1,12 @@
 """The dimensionless numbers by which scenes are compared, and the buoyancy of a workpiece."""
 
-from typing import TYPE_CHECKING
-
 from dragdeck.cases import bed as beds
 from dragdeck.cases.case import Case, of_each_workpiece
 from dragdeck.mesh.surface import volume_below
 from dragdeck.physics.contact_mechanics import inertial_number
+from dragdeck.scenes import workpiece as workpieces
 from dragdeck.scenes.moving_bowl import path_tilt_deg
 from dragdeck.study.contact_law import compared_numbers
-
-if TYPE_CHECKING:
-    pass
-from dragdeck.scenes import workpiece as workpieces
 
 
 def workpiece_buoyancy(case: Case, surface_m: float) -> float:

@@ -8,7 +8,7 @@ from functools import partial
 from dragdeck.cases.bed import bed_rayleigh_time, bed_timestep, buoyancy_density
 from dragdeck.cases.case import Case, Stretch, mesh_file, of_each_workpiece
 from dragdeck.decks import PACKING_FILE, WORKPIECE_MESH, outputs
-from dragdeck.decks.deck import NOT_OF_LIQUID, LeftOut, Scene
+from dragdeck.decks.deck import NOT_OF_LIQUID, Scene
 from dragdeck.decks.outputs import Output
 from dragdeck.errors import Caution
 from dragdeck.files import file_checksum
@@ -20,38 +20,23 @@ from dragdeck.physics.run_limits import ENGINE_NEIGHBOURS, RunLimits, thrown_spe
 from dragdeck.records.bed import BowlOfRun
 from dragdeck.records.case import AssumptionOfRun, ProcessCase, StatisticsOfRun, WorkpieceOfRun
 from dragdeck.records.run import Phase, SteadyCriterion
+from dragdeck.scenes import bed_space, moving_bowl
 from dragdeck.scenes import filling as fillings
 from dragdeck.scenes import fit as fits
+from dragdeck.scenes import liquid as liquids
 from dragdeck.scenes import motion as motions
-from dragdeck.scenes import moving_bowl
 from dragdeck.scenes import scene as scenes
 from dragdeck.scenes import workpiece as workpieces
-from dragdeck.scenes.bed_space import (
-    bed_limits,
-    bowl_files,
-    bowl_neighbours,
-    box_top,
-    expected_bed,
-    rank_split,
-)
 from dragdeck.scenes.drop_test import DROP_TEST
 from dragdeck.scenes.lead import Covered, covered, mark_file, stops, with_lead
-from dragdeck.scenes.liquid import (
-    acting_gravity,
-    check_submerged,
-    liquid,
-    liquid_leaves_out,
-    liquid_models,
-)
 from dragdeck.scenes.numbers import describe, workpiece_buoyancy
 from dragdeck.scenes.process_cautions import process_cautions
+from dragdeck.scenes.process_texts import process_leaves_out, process_models
 from dragdeck.study.base import Json, without_fields
 from dragdeck.study.bowls.bowl import LID
-from dragdeck.study.contact_law import coefficient_words
 from dragdeck.study.drive import Drive, EngineMotion
 from dragdeck.study.model import Study
-from dragdeck.study.motion import Motion
-from dragdeck.study.workpiece import CylinderShape, MeshShape, Shape
+from dragdeck.study.workpiece import MeshShape, Shape
 
 _ENERGY_DRIFT = 0.1
 """Largest change of the mean kinetic energy while it is counted: 5 % in the bed's speed."""
@@ -77,14 +62,14 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
     each = of_each_workpiece(whole)
     study, counts = whole.study, [workpieces.workpiece_facets(workpiece) for workpiece in each]
     facets = study.bowl_facet_size_m is not None
-    settled = bed or expected_bed(study)
-    dt, top = bed_timestep(study, "timestep_fraction"), box_top(study)
+    settled = bed or bed_space.expected_bed(study)
+    dt, top = bed_timestep(study, "timestep_fraction"), bed_space.box_top(study)
     moving_bowl.check_bowl_motion(whole, settled, top)
     bed = moving_bowl.bed_in_motion(study, settled)
     periods, meshes = motions.output_periods(study, dt), _mesh_files(each)
     fits.check_apart(each, bed)
     fits.check_lid(whole, bed)
-    check_submerged(whole, bed)
+    liquids.check_submerged(whole, bed)
     courses, moved = (
         [
             motions.course(workpiece.study, bed, workpieces.reference_height(workpiece))
@@ -105,8 +90,8 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
             workpiece, way.start_m[2] + bed.margin_m - workpieces.reference_height(workpiece), top
         )
     skin = max(map(fits.process_skin, each))
-    gravity, down = moving_bowl.driven_gravity(study, acting_gravity(study))
-    types, parts = study.type_names(), rank_split(whole, skin)
+    gravity, down = moving_bowl.driven_gravity(study, liquids.acting_gravity(study))
+    types, parts = study.type_names(), bed_space.rank_split(whole, skin)
     bowl = study.bowl.closed
     primitive = tuple(wall for wall in bowl.walls if not facets or wall.name == LID)
     touches = study.outputs.first_touch_fraction if steps.end == drag.end else 0.0
@@ -120,11 +105,11 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         source=_source(whole),
         gravity_m_s2=gravity,
         gravity_direction=down,
-        liquid=liquid(study),
+        liquid=liquids.liquid(study),
         skin_m=skin,
         timestep_s=dt,
         rayleigh_time_s=bed_rayleigh_time(study),
-        neighbours=max(ENGINE_NEIGHBOURS, bowl_neighbours(study, skin), *counts),
+        neighbours=max(ENGINE_NEIGHBOURS, bed_space.bowl_neighbours(study, skin), *counts),
         outputs=_outputs(
             periods,
             drag,
@@ -152,7 +137,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
     number = max(case.number, 1) - 1
     files = {WORKPIECE_MESH: partial(_stl, each[number])}
     fastest = max(map(_fastest, each, courses))
-    limits = bed_limits(study, top, fastest)
+    limits = bed_space.bed_limits(study, top, fastest)
     jam = any(fits.may_jam(body, bed.surface_m) for body in each)
     models = {
         body.mesh: partial(_stl, body_case) for body_case, body in zip(each, moved, strict=True)
@@ -171,9 +156,9 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         ),
         steps=steps.end - steps.entry,
         facets=sum(counts),
-        files=files if number else {**models, **bowl_files(study, top)},
-        models=_models(study),
-        leaves_out=_leaves_out(study),
+        files=files if number else {**models, **bed_space.bowl_files(study, top)},
+        models=process_models(study),
+        leaves_out=process_leaves_out(study),
         warnings=[*_cautions(each), *rank_warnings(parts)],
     )
 
@@ -332,23 +317,13 @@ def _wake_from(each: Sequence[Case], number: int) -> float | None:
     if around is None or ahead is None:
         return None
     others = (workpiece.study.motion.path.ahead_deg or 0.0 for workpiece in each)
-    against = _against_bed(each[number].study.motion)
+    against = each[number].study.motion.against_bed
     if not against:
         return None
     sense = math.copysign(1.0, against)
     gap = min((sense * (other - ahead) - 1e-6) % 360 + 1e-6 for other in others)
     distance = around * gap / 360 / abs(against)
     return round_to(distance, 9) if distance < path.path_length_m * (1 - 1e-6) else None
-
-
-def _against_bed(motion: Motion) -> float:
-    """Angular speed of a workpiece on a circle against a bed that turns, over that of its path."""
-    path = motion.path
-    if motion.bowl is None:
-        return 1.0
-    rate = motion.nominal_speed_m_s / math.hypot(*path.start_point)
-    sense = math.sin(path.direction_rad - math.atan2(*reversed(path.start_point)))
-    return 1.0 - motion.bowl.rad_s / math.copysign(rate, sense)
 
 
 def _fastest(case: Case, way: motions.Course) -> float:
@@ -358,61 +333,6 @@ def _fastest(case: Case, way: motions.Course) -> float:
     if motion.superposed() or moved or motion.path.peak_speed_ratio > 1:
         speeds.append(fits.fastest_motion(case))
     return max(speeds)
-
-
-def _models(study: Study) -> dict[str, str]:
-    optional, superposed = coefficient_words(study.pairs.values())[0], study.motion.superposed()
-    exact, why = study.bowl_facet_size_m is None, "facets, as requested"
-    if study.motion.bowl:
-        why = "facets, because it moves"
-    if study.motion.bowl_rad_s:
-        why = "facets, whose surface moves with the rotation"
-    if study.bowl.container.rim:
-        why = "facets, because its width varies with height"
-    bowl = "exact planes and cylinders" if exact else why
-    return {
-        "particle-particle, particle-workpiece, particle-bowl": "force chains run through all",
-        f"bowl: {bowl}": "force chains end there; the force on each particle gives its contacts",
-        **{words: "as given in the study" for words in optional},
-        **liquid_models(study),
-        "workpiece as facets": "LIGGGHTS moves meshes only",
-        **{f"{name} of the workpiece": "as given in the study" for name in superposed},
-        f"total force, {study.outputs.workpiece_force_hz:g} Hz": "drag, its spread and its peaks",
-        f"workpiece contacts, "
-        f"{study.outputs.workpiece_contacts_hz:g} Hz": "few contacts, so a high rate is cheap",
-        f"network and particles, {study.outputs.network_hz:g} Hz": "force chains and positions",
-    }
-
-
-def _leaves_out(study: Study) -> dict[str, LeftOut]:
-    _, absent = coefficient_words(study.pairs.values())
-    workpiece, network = study.outputs.workpiece_contacts_hz, study.outputs.network_hz
-    reasons = {
-        **liquid_leaves_out(study),
-        "positions, torques, areas of contacts": LeftOut(
-            "the particles of the same step have the positions; no report uses the rest",
-            "contact_columns",
-        ),
-        "network during plunge and approach": LeftOut(
-            "no statistic counts them", "network_before_drag"
-        ),
-        "wear, stress and heat of the mesh": LeftOut("no report uses them"),
-        **{words: LeftOut("not given in the study") for words in absent},
-    }
-    if network < workpiece:
-        reasons[f"network at {workpiece:g} Hz"] = LeftOut(
-            "force chains do not require this rate", "network_rate"
-        )
-    if study.bowl_facet_size_m is None:
-        reasons["facets of the bowl"] = LeftOut(
-            "slower; no report uses contacts per facet of the bowl", "bowl_facets"
-        )
-    shape = study.workpiece.shape
-    if isinstance(shape, CylinderShape) and shape.facet_length_m > shape.facet_size_m:
-        reasons["short facets along the workpiece"] = LeftOut(
-            "a straight side needs none", "workpiece_short_facets"
-        )
-    return reasons
 
 
 def _partners(case: Case) -> list[tuple[str, str, float]]:

@@ -14,10 +14,9 @@ from dragdeck.cases.bed import bed_classes, bed_density, body_sizes
 from dragdeck.cases.case import Case, digest, slug
 from dragdeck.decks.deck import Deck, Materials, Scene, contact_law
 from dragdeck.errors import InputError
-from dragdeck.physics.contact_mechanics import ContactConstants, effective_modulus, effective_shear
+from dragdeck.physics import contact_mechanics as mechanics
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import round_to
-from dragdeck.physics.run_limits import ENGINE_SOFTEST_PA
 from dragdeck.records.bed import BowlOfRun, ClassOfRun, MediaOfRun
 from dragdeck.records.case import AssumptionOfRun, CaseOfRun, FidelityOfRun
 from dragdeck.records.packing import Packing
@@ -26,7 +25,8 @@ from dragdeck.study.contact_law import Pair
 from dragdeck.study.fidelity import LARGEST_TIMESTEP_FRACTION
 from dragdeck.study.model import Study
 
-C, D = TypeVar("C", bound=CaseOfRun), TypeVar("D", bound=Deck)
+C = TypeVar("C", bound=CaseOfRun)
+D = TypeVar("D", bound=Deck)
 
 
 StudyScene = Scene[CaseOfRun]
@@ -310,13 +310,15 @@ def _attractive(study: Study, material: str, scale: float) -> dict[str, dict[str
     return {body: values for body, values in forces.items() if values}
 
 
-def _contact_moduli(study: Study, material: str, scale: float) -> dict[str, ContactConstants]:
+def _contact_moduli(
+    study: Study, material: str, scale: float
+) -> dict[str, mechanics.ContactConstants]:
     """Contact constants of particles of a material by what they touch."""
     particle = study.materials[material]
     return {
-        name: ContactConstants(
-            modulus_pa=effective_modulus(particle, study.materials[other], scale),
-            shear_pa=effective_shear(particle, study.materials[other], scale),
+        name: mechanics.ContactConstants(
+            modulus_pa=mechanics.effective_modulus(particle, study.materials[other], scale),
+            shear_pa=mechanics.effective_shear(particle, study.materials[other], scale),
             restitution=study.pair(material, other).restitution,
             friction=study.pair(material, other).friction,
         )
@@ -390,14 +392,14 @@ def material_table(
 
 
 def _check_modulus(name: str, modulus_pa: float, scale: float, case: Case) -> None:
-    if modulus_pa >= ENGINE_SOFTEST_PA:
+    if modulus_pa >= mechanics.ENGINE_SOFTEST_PA:
         return
-    least = ENGINE_SOFTEST_PA / case.study.materials[name].youngs_modulus_pa
+    least = mechanics.ENGINE_SOFTEST_PA / case.study.materials[name].youngs_modulus_pa
     raise InputError(
         "the Young's modulus is below the minimum of LIGGGHTS",
         file=case.file,
         field="fidelity.youngs_modulus_scale",
         value=f"{scale:g}, which gives {modulus_pa:.3g} Pa for {name}",
-        limit=f"at least {ENGINE_SOFTEST_PA:.0e} Pa, a scale of {least:.3g} for {name}",
+        limit=f"at least {mechanics.ENGINE_SOFTEST_PA:.0e} Pa, a scale of {least:.3g} for {name}",
         remedy="choose a larger scale",
     )

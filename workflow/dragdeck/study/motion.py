@@ -180,6 +180,16 @@ class Motion(Superposed):
         return self.path.path_length_m
 
     @property
+    def against_bed(self) -> float:
+        """Angular speed on a circle against a bed that turns, over that of the path."""
+        if self.bowl is None:
+            return 1.0
+        x, y = self.path.start_point
+        rate = self.nominal_speed_m_s / math.hypot(x, y)
+        sense = math.sin(self.path.direction_rad - math.atan2(y, x))
+        return 1.0 - self.bowl.rad_s / math.copysign(rate, sense)
+
+    @property
     def plunge_point(self) -> Point:
         """Where the workpiece goes in, m."""
         return self.path.plunge_point if self.plunge_at_m is None else self.plunge_at_m

@@ -11,7 +11,7 @@ from pydantic import model_validator
 from dragdeck.arrays import Floats
 from dragdeck.mesh.surface import raised, surface, weld
 from dragdeck.physics import facets
-from dragdeck.physics.walls import Container, Wall
+from dragdeck.physics.walls import Container, Wall, four_planes
 from dragdeck.study.base import Number
 from dragdeck.study.bowls.bowl import Bowl
 
@@ -60,12 +60,7 @@ def _rim(corners_m: Floats) -> tuple[Wall, ...]:
     x, y = _widest_rectangle(outer)
     if 4 * x * y <= math.pi * radius**2:
         return (side,)
-    return (
-        Wall(name="west", shape="xplane", at_m=-x, inwards=1),
-        Wall(name="east", shape="xplane", at_m=x, inwards=-1),
-        Wall(name="south", shape="yplane", at_m=-y, inwards=1),
-        Wall(name="north", shape="yplane", at_m=y, inwards=-1),
-    )
+    return four_planes(x, y)
 
 
 def _widest_rectangle(outline_m: Floats) -> tuple[float, float]:

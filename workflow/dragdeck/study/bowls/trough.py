@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Literal
 
 from dragdeck.mesh import shapes
-from dragdeck.physics.walls import Container, Wall
+from dragdeck.physics.walls import Container, Wall, four_planes
 from dragdeck.study.base import Positive
 from dragdeck.study.bowls.bowl import Bowl
 
@@ -27,13 +27,7 @@ class TroughBowl(Bowl):
         """Between a floor and four planes."""
         x, y = self.length_m / 2, self.width_m / 2
         return Container(
-            walls=(
-                Wall(name="floor", shape="zplane", at_m=0.0, inwards=1),
-                Wall(name="west", shape="xplane", at_m=-x, inwards=1),
-                Wall(name="east", shape="xplane", at_m=x, inwards=-1),
-                Wall(name="south", shape="yplane", at_m=-y, inwards=1),
-                Wall(name="north", shape="yplane", at_m=y, inwards=-1),
-            ),
+            walls=(Wall(name="floor", shape="zplane"), *four_planes(x, y)),
             half_widths_m=(x, y),
             clear_m=min(x, y),
             levels=((0.0, self.length_m * self.width_m),),
