@@ -21,7 +21,8 @@ from dragdeck.project import Project
 from dragdeck.records.run import CheckCode
 from dragdeck.scenes.drop_test import DropDeck
 from dragdeck.scenes.filling import FillingDeck
-from dragdeck.scenes.process import PROCESS, ProcessDeck
+from dragdeck.scenes.process import PROCESS
+from dragdeck.scenes.process_deck import ProcessDeck
 
 DOCS = ROOT / "docs"
 NOTEBOOKS = sorted((ROOT / "docs/examples").glob("*.ipynb"))

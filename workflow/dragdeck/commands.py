@@ -196,7 +196,7 @@ def advise(
         raise explained(error, "command line") from None
     for case, wanted in zip(every, asked, strict=True):
         advice = advised_settings(case, wanted, tradeoff)
-        tables.append(forecasts.advised_case(case, advice, results))
+        tables.append(forecasts.advised_case(case, advice, results, tradeoff))
         show(forecasts.advice_tables(case, advice, tables[-1]))
     _keep(results / "advice.json", forecasts.advice_file(every[0], tables))
 

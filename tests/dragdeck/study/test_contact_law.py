@@ -16,6 +16,7 @@ from made_study import Made
 from scipy.optimize import brentq
 
 from dragchain.run.run_parts import iter_frames
+from dragdeck.arrays import Floats
 from dragdeck.cases.case import Case
 from dragdeck.decks import DECK_FILE
 from dragdeck.decks.outputs import load_outputs
@@ -36,7 +37,6 @@ from dragdeck.study.check import validate
 from dragdeck.study.contact_law import (
     Coefficient,
     Contact,
-    Floats,
     FrictionLimit,
     Pair,
     RollingModel,

@@ -12,6 +12,7 @@ from dragdeck.cases.case import Case, of_each_workpiece
 from dragdeck.records.tradeoff import TradeoffRecord
 from dragdeck.records.windows import Known, WindowsRecord, softening
 from dragdeck.scenes import lead as leads
+from dragdeck.scenes.bed_space import particles_step_s
 from dragdeck.scenes.filling import FILLING, expected_time
 from dragdeck.scenes.workpiece import FACET_STEP_S, PARTICLE_STEPS_PER_S, workpiece_facets
 from dragdeck.study.fidelity import Fidelity, Tolerance

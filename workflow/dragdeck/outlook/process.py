@@ -5,7 +5,13 @@ import math
 from dragdeck.cases.bed import particle_material, skin
 from dragdeck.cases.case import Case, of_each_workpiece
 from dragdeck.cases.ranks import cores_here
-from dragdeck.physics.contact_mechanics import FAST, effective_modulus, impact_overlap
+from dragdeck.physics.contact_mechanics import (
+    AT_SPEED,
+    FAST,
+    SOFT_AT_SPEED,
+    effective_modulus,
+    impact_overlap,
+)
 from dragdeck.scenes.bed_space import expected_bed, rank_split
 from dragdeck.scenes.filling_cautions import MOST_OVERLAP, floor_overlap
 from dragdeck.scenes.fit import clearances, closest, in_diameters

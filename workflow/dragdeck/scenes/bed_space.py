@@ -111,3 +111,20 @@ def bed_limits(study: Study, top_m: float, speed_m_s: float) -> RunLimits:
     if study.media.clumped:
         mass = beds.bed_density(study) * beds.bed_volume(study) / study.sphere_count
     return run_limits(study.sphere_count, mass, study.gravity_m_s2, top_m, speed_m_s)
+
+
+_CACHED, _PER_COUNT = 10_000, 0.218
+"""Particles up to which the cost of each is the same, and the power of their number with which it
+grows above: 1.65 times in a decade (docs/development/benchmarks.md)."""
+
+
+def particles_step_s(count: int, particle_steps_per_s: float) -> float:
+    """CPU time of a step for so many particles, s: large beds do not fit the caches.
+
+    Parameters
+    ----------
+    count : int
+    particle_steps_per_s : float
+        Particles times steps per second in a small bed.
+    """
+    return count / particle_steps_per_s * math.pow(max(1.0, count / _CACHED), _PER_COUNT)

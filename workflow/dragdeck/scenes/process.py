@@ -31,6 +31,7 @@ from dragdeck.scenes.drop_test import DROP_TEST
 from dragdeck.scenes.lead import Covered, covered, mark_file, stops, with_lead
 from dragdeck.scenes.numbers import describe, workpiece_buoyancy
 from dragdeck.scenes.process_cautions import process_cautions
+from dragdeck.scenes.process_deck import ProcessDeck, moved_workpiece
 from dragdeck.scenes.process_texts import process_leaves_out, process_models
 from dragdeck.study.base import Json, without_fields
 from dragdeck.study.bowls.bowl import LID
@@ -70,21 +71,18 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
     fits.check_apart(each, bed)
     fits.check_lid(whole, bed)
     liquids.check_submerged(whole, bed)
-    courses, moved = (
-        [
-            motions.course(workpiece.study, bed, workpieces.reference_height(workpiece))
-            for workpiece in each
-        ],
-        [],
-    )
+    deepest = max(workpiece.study.motion.immersion_depth_m for workpiece in each)
+    courses = [
+        motions.course(workpiece.study, bed, workpieces.reference_height(workpiece), deepest)
+        for workpiece in each
+    ]
+    moved = []
     drag, bowl_motion = courses[0].drag, courses[0].driven.bowl
     steps = covered(whole, drag)
     for workpiece, way in zip(each, courses, strict=True):
         fits.check_fit(workpiece, bed.lowest_m, dt)
         moved.append(
-            motions.moved_workpiece(
-                workpiece, way, meshes[workpiece.study.workpiece.shape], steps.entry
-            )
+            moved_workpiece(workpiece, way, meshes[workpiece.study.workpiece.shape], steps.entry)
         )
         fits.check_headroom(
             workpiece, way.start_m[2] + bed.margin_m - workpieces.reference_height(workpiece), top
@@ -96,7 +94,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
     primitive = tuple(wall for wall in bowl.walls if not facets or wall.name == LID)
     touches = study.outputs.first_touch_fraction if steps.end == drag.end else 0.0
     deck = scenes.deck_of_study(
-        motions.ProcessDeck,
+        ProcessDeck,
         whole,
         types,
         case=whole.name,
@@ -236,7 +234,7 @@ def _process_case(
     number: int,
     surface_m: float,
     way: motions.Course,
-    deck: motions.ProcessDeck,
+    deck: ProcessDeck,
     limits: RunLimits,
     steps: Covered,
     thrown_m_s: float | None,

@@ -130,7 +130,7 @@ def moved_workpiece(case: Case, motion: Course, mesh: str, entry_step: int) -> M
         places, rotation = motion.poses(legs[-1], np.array([entry_step - motion.drag.start]))
         x, y, z = places[0].tolist()
         place, turn = (x, y, z), float(rotation.turn_rad[0])
-        tilt = rotation.own
+        tilt = rotation.in_frame
     moving = motion.driven.superposed_on_engine()
     return MovedWorkpiece(
         ending=ending,

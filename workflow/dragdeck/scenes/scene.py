@@ -1,6 +1,5 @@
 """What a scene is to the rest of the project, and what all scenes share."""
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -61,23 +60,6 @@ _OF_PROCESS = (
     *("outputs", "reduction", "reference", "removal", "seed", "workpiece.shape", "workpieces"),
 )
 """Fields that no file of a run says, and those that only files of a process do."""
-
-
-_CACHED, _PER_COUNT = 10_000, 0.218
-"""Particles up to which the cost of each is the same, and the power of their number with which it
-grows above: 1.65 times in a decade (docs/development/benchmarks.md)."""
-
-
-def particles_step_s(count: int, particle_steps_per_s: float) -> float:
-    """CPU time of a step for so many particles, s: large beds do not fit the caches.
-
-    Parameters
-    ----------
-    count : int
-    particle_steps_per_s : float
-        Particles times steps per second in a small bed.
-    """
-    return count / particle_steps_per_s * math.pow(max(1.0, count / _CACHED), _PER_COUNT)
 
 
 @dataclass(frozen=True)

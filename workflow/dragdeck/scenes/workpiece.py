@@ -90,7 +90,7 @@ def _postures(case: Case) -> Iterator[NDArray[np.float64]]:
     mesh, motion = workpiece_mesh(case), case.study.motion
     way = DrivenMotion.of(motion, bed_timestep(case.study, "timestep_fraction"), 1.0)
     since = np.linspace(0.0, way.drive.steps, _LOOKS)
-    rotations = motion.path.own(way.drive, since)
+    rotations = motion.path.in_frame(way.drive, since)
     if motion.turns_about_inclined_axis:
         rotations = by_vector(np.linspace(0.0, math.tau, 25)[:, None] * way.drive.own_axis)
     for rotation in np.eye(3)[None] if rotations is None else rotations:

@@ -95,7 +95,7 @@ class DrivenMotion:
         """Orientations after (N,) steps of a workpiece whose front begins in a direction."""
         path = self.motion.path
         turn = start_rad + path.turn(self.drive, since)
-        return self._rotated(since, Orientations(turn, path.own(self.drive, since)))
+        return self._rotated(since, Orientations(turn, path.in_frame(self.drive, since)))
 
     def rotation_along(self, since: StepCounts, direction_rad: Floats) -> Orientations:
         """Orientations after (N,) steps, at (N,) directions of motion."""
@@ -105,7 +105,7 @@ class DrivenMotion:
         path = self.motion.path
         first = np.full_like(direction_rad, path.direction_rad)
         turn = direction_rad if path.turns(self.drive.orientation) else first
-        return Orientations(turn, path.own(self.drive, since))
+        return Orientations(turn, path.in_frame(self.drive, since))
 
     def _rotated(self, since: StepCounts, rotation: Orientations) -> Orientations:
         for superposed in self.superposed.values():

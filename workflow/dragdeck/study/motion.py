@@ -252,11 +252,19 @@ class Motion(Superposed):
         """Length of the path after a time, at the end of its start or later, m."""
         return (max(time_s, self.ramp_s) - self.ramp_s / 2) * self.nominal_speed_m_s
 
-    def turned(self, angle_deg: float) -> "Motion":
-        """The same motion turned about the bowl's axis, immersed where the drag begins."""
+    def turned(self, angle_deg: float, depth_m: float | None = None) -> "Motion":
+        """The same motion turned about the bowl's axis, immersed where the drag begins.
+
+        Parameters
+        ----------
+        angle_deg : float
+        depth_m : float, optional
+            Another immersion depth.
+        """
         path, place = self.path.turned(angle_deg), self.plunge_at_m
         at = path.start_point if place is None else turned(place, angle_deg)
-        return self.model_copy(update={"path": path, "plunge_at_m": at})
+        depth = depth_m or self.immersion_depth_m
+        return self.model_copy(update={"path": path, "plunge_at_m": at, "immersion_depth_m": depth})
 
     def at(self, pace: float, length_m: float) -> "Motion":
         """The drag at another pace and with another length, all of it counted.

@@ -49,34 +49,36 @@ class Orientations:
     ----------
     turn_rad : (N,) ndarray
         About the vertical.
-    own : (N, 3, 3) ndarray or None
+    in_frame : (N, 3, 3) ndarray or None
         Rotations in its own frame, before that; None if it stands as it starts.
     """
 
     turn_rad: Floats
-    own: Floats | None = None
+    in_frame: Floats | None = None
 
     @property
     def matrices(self) -> Floats:
         """The rotations as matrices, (N, 3, 3)."""
-        matrix = np.eye(3) if self.own is None else self.own
+        matrix = np.eye(3) if self.in_frame is None else self.in_frame
         columns = np.moveaxis(np.broadcast_to(matrix, (len(self.turn_rad), 3, 3)), -1, 0)
         return np.stack([rotated(column, self.turn_rad) for column in columns], axis=-1)
 
     @property
     def front_rad(self) -> Floats:
         """Direction of the front from +x, (N,)."""
-        if self.own is None:
+        if self.in_frame is None:
             return self.turn_rad
-        return np.asarray(self.turn_rad + np.arctan2(self.own[:, 1, 0], self.own[:, 0, 0]))
+        return np.asarray(
+            self.turn_rad + np.arctan2(self.in_frame[:, 1, 0], self.in_frame[:, 0, 0])
+        )
 
     def out_of(self, vectors: Floats) -> Floats:
         """Vectors of the workpiece's own frame, (N, 3), in the bowl's."""
-        if self.own is not None:
-            vectors = np.einsum("nij,nj->ni", self.own, vectors)
+        if self.in_frame is not None:
+            vectors = np.einsum("nij,nj->ni", self.in_frame, vectors)
         return rotated(vectors, self.turn_rad)
 
     def into(self, vectors: Floats) -> Floats:
         """Vectors of the bowl's frame, (N, 3), in the workpiece's own."""
         turned = rotated(vectors, -self.turn_rad)
-        return turned if self.own is None else np.einsum("nji,nj->ni", self.own, turned)
+        return turned if self.in_frame is None else np.einsum("nji,nj->ni", self.in_frame, turned)

@@ -61,9 +61,8 @@ class Station(Model):
     """angle of its path and motion about the bowl's axis, degrees; positive: counter-clockwise seen
     from above"""
     shape: Shape | None = None
-    immersion_depth_m: Positive | None = Field(
-        default=None, description="immersion depth of its tip, m; none: that of the motion"
-    )
+    immersion_depth_m: Positive | None = None
+    """immersion depth of its tip, m; none: that of the motion"""
 
 
 class Carousel(Model):

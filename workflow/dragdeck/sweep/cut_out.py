@@ -100,7 +100,16 @@ def with_cut_out(case: Case) -> Case:
     if problems:
         raise together(problems)
     low = dip(case) - study.motion.vertical_range_m[0]
-    return replace(case, study=cut_out(study, workpiece_reach(case), low))
+    cut = cut_out(study, workpiece_reach(case), low)
+    if cut.particle_count >= study.particle_count:
+        raise InputError(
+            "the cut-out is no smaller than the machine",
+            field="reduction.cut_out",
+            value=f"{cut.particle_count:,} particles",
+            limit=f"below {study.particle_count:,}, those of the machine",
+            remedy="simulate the machine: remove reduction; or use a shorter counted_m",
+        )
+    return replace(case, study=cut)
 
 
 def cut_out(study: Study, reach_m: float, low_m: float = 0.0) -> Study:

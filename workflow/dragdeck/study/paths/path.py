@@ -209,7 +209,7 @@ class WorkpiecePath(Model):
             return np.zeros(len(since))
         return np.asarray(self._heading(drive.share(since)) - self.direction_rad)
 
-    def own(self, drive: Drive, since: StepCounts) -> Floats | None:
+    def in_frame(self, drive: Drive, since: StepCounts) -> Floats | None:
         """Rotations in the workpiece's own frame, (N, 3, 3), by the path; None if there are none.
 
         They go before the turn about the vertical.

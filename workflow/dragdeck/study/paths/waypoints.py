@@ -258,7 +258,7 @@ class WaypointsPath(WorkpiecePath):
         moved = [integral(rates, time) for time in drive.time_s(since)]
         return np.asarray(begun + np.reshape(moved, (-1, 3)))
 
-    def own(self, drive: Drive, since: StepCounts) -> Floats | None:
+    def in_frame(self, drive: Drive, since: StepCounts) -> Floats | None:
         """The rotations of its stages, one after another."""
         if not self._inclined(drive):
             return None

@@ -96,7 +96,7 @@ class Spin(SuperposedMotion):
         """About the vertical, or the axis of a tilted workpiece."""
         angle = self.turn(drive, since)
         if not drive.tilt_deg:
-            return Orientations(before.turn_rad + angle, before.own)
+            return Orientations(before.turn_rad + angle, before.in_frame)
         return Orientations(before.turn_rad, by_vector(angle[:, None] * drive.own_axis))
 
     def velocity(
