@@ -11,6 +11,7 @@ from dragdeck.decks.deck import Body, Deck, LeftOut, Scene, data_file
 from dragdeck.errors import InputError
 from dragdeck.physics import contact_mechanics as mechanics
 from dragdeck.physics.packing import primes
+from dragdeck.physics.run_limits import ENGINE_NEIGHBOURS
 from dragdeck.physics.walls import Container
 from dragdeck.records.case import FillingCase
 from dragdeck.records.run import SettlingCriterion
@@ -93,8 +94,7 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
         most_checks=math.ceil(longest / (check_steps * dt)),
         max_time_s=longest,
         neighbours=max(
-            mechanics.ENGINE_NEIGHBOURS,
-            bed_space.bowl_neighbours(study, beds.skin(study)) if meshed else 0,
+            ENGINE_NEIGHBOURS, bed_space.bowl_neighbours(study, beds.skin(study)) if meshed else 0
         ),
         clumped=study.media.clumped,
         insertions=beds.body_sizes(study),

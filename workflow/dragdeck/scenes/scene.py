@@ -16,6 +16,7 @@ from dragdeck.errors import InputError
 from dragdeck.physics import contact_mechanics as mechanics
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import round_to
+from dragdeck.physics.run_limits import ENGINE_SOFTEST_PA
 from dragdeck.records.bed import BowlOfRun, ClassOfRun, MediaOfRun
 from dragdeck.records.case import AssumptionOfRun, CaseOfRun, FidelityOfRun
 from dragdeck.records.packing import Packing
@@ -374,14 +375,14 @@ def material_table(
 
 
 def _check_modulus(name: str, modulus_pa: float, scale: float, case: Case) -> None:
-    if modulus_pa >= mechanics.ENGINE_SOFTEST_PA:
+    if modulus_pa >= ENGINE_SOFTEST_PA:
         return
-    least = mechanics.ENGINE_SOFTEST_PA / case.study.materials[name].youngs_modulus_pa
+    least = ENGINE_SOFTEST_PA / case.study.materials[name].youngs_modulus_pa
     raise InputError(
         "the Young's modulus is below the minimum of LIGGGHTS",
         file=case.file,
         field="fidelity.youngs_modulus_scale",
         value=f"{scale:g}, which gives {modulus_pa:.3g} Pa for {name}",
-        limit=f"at least {mechanics.ENGINE_SOFTEST_PA:.0e} Pa, a scale of {least:.3g} for {name}",
+        limit=f"at least {ENGINE_SOFTEST_PA:.0e} Pa, a scale of {least:.3g} for {name}",
         remedy="choose a larger scale",
     )
