@@ -203,15 +203,17 @@ def test_media_that_cannot_be_are_refused(
         load_cases(write_study(mixed(small, **changes)))
 
 
+@pytest.mark.parametrize("in_class", [False, True])
 def test_a_sieve_analysis_is_read_from_a_file_beside_the_study(
-    small: Small, write_study: Write
+    in_class: bool, small: Small, write_study: Write
 ) -> None:
-    media = {"material": "ceramic", "count": 50, "sieve": "sieve.csv"}
+    grains = {"material": "ceramic", "sieve": "sieve.csv"}
+    media = {"count": 50, **({"classes": {"a": grains | {"fraction": 1}}} if in_class else grains)}
     file = write_study(small | {"media": media})
     table = file.with_name("sieve.csv")
     table.write_text("diameter_m,mass_passing\n0.004,0\n0.006,0.5\n0.007,1\n")
     (case,) = load_cases(file)
-    assert case.study.media.sieve == [(0.004, 0), (0.006, 0.5), (0.007, 1)]
+    assert case.study.media.main.sieve == [(0.004, 0), (0.006, 0.5), (0.007, 1)]
     table.write_text("diameter_m,mass_passing\n0.004,0\n0.006,x\n0.007,1\n")
     with pytest.raises(InputError, match=r"sieve\.csv") as caught:
         load_cases(file)
