@@ -34,7 +34,8 @@ from dragdeck.scenes.process import process_scene
 from dragdeck.scenes.scene import read_bed
 from dragdeck.study.base import Json
 from dragdeck.study.model import Study
-from dragdeck.sweep.cases import Design, Settings, Variation, settle_case
+from dragdeck.sweep.cases import settle_case
+from dragdeck.sweep.design import Design, Settings, Variation
 from evidence.beds import settled
 
 DESIGN = Path(__file__).with_suffix(".yaml")

@@ -20,7 +20,8 @@ from dragdeck.project import find_project
 from dragdeck.records.packing import Packing
 from dragdeck.scenes.filling import FILLING
 from dragdeck.study.yaml import read_yaml
-from dragdeck.sweep.cases import Design, Variation, settle_case
+from dragdeck.sweep.cases import settle_case
+from dragdeck.sweep.design import Design, Variation
 from evidence.beds import settled
 
 DESIGN = Path(__file__).with_suffix(".yaml")

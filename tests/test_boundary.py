@@ -100,7 +100,7 @@ def test_a_reader_that_has_seen_enough_is_no_error() -> None:
 
 PROGRAM = """
 import atexit, ctypes, sys
-from dragdeck.command_line import Argument, Command, Program
+from dragdeck.command_line import Command, Program
 
 def command(how):
     libc = ctypes.CDLL(None)  # as destructors of C++ libraries do now and then
@@ -111,7 +111,7 @@ def command(how):
     return "done"
 
 sys.modules["package.module"] = sys.modules[__name__]
-about = ("command", "help", "about", "module:command", (Argument("how"),))
+about = ("command", "help", "about", "module:command", {"how": {}})
 Program("package", "about", [Command(*about)])()
 """
 

@@ -20,14 +20,14 @@ PROGRAMS = {
 }
 OF_RUN = {
     name
-    for file in (ROOT / "run", ROOT / "workflow/run.sh", *SNAKEFILES)
+    for file in (*(ROOT / "workflow").glob("usage*.txt"), ROOT / "workflow/run.sh", *SNAKEFILES)
     for name in re.findall(r"(?:\./run |^rule )([a-z_]+)", file.read_text(), re.MULTILINE)
 }
 SHIPPED = [
     file
     for folder in ("workflow", "analysis", "evidence", "templates")
     for file in sorted((ROOT / folder).rglob("*"))
-    if file.suffix in (".py", ".j2", ".csv", ".rst", ".js") and file.name != "network.js"
+    if file.suffix in (".py", ".yaml", ".j2", ".csv", ".rst", ".js") and file.name != "network.js"
 ] + sorted((ROOT / ".github/workflows").iterdir())
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 FOLDERS = ("analysis", "benchmarks", "docs/tools", "evidence", "workflow")
-LIMIT = 20
+LIMIT = 1
 """It only falls."""
 
 

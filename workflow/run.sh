@@ -16,51 +16,7 @@ if [ -n "${DRAGDECK_ENGINE:-}" ]; then
 fi
 
 usage_of_studies() {
-    cat <<'END'
-usage: ./run TARGET... [--config study=STUDY] [OPTION...]
-
-Run a study: from its input scripts to its report. ./run starts Snakemake with these arguments,
-for example:  ./run all --config study=uhlmann2015
-
-targets of a study:
-  all               tables, figures and report of all cases
-  drop_test, filling, process
-                    runs and tables of one scene only
-  report            the report on the runs, results/STUDY/report/report.html
-  scaling           fit of a power law to the mean drag; needs scaling in the study
-  calibrate         fit of coefficients to a drop test or angles; needs calibration in the study
-  figures           figures of the process runs for a publication, as SVG, PDF and PNG
-  export            ParaView files of all process runs
-  crate             RO-Crate of inputs, runs and report
-options of Snakemake:
-  --config study=STUDY fidelity=NAME plan=NAME
-                    study to run, settings and plan to use (defaults: config/config.yaml)
-  --dry-run         list the jobs without running them
-  --cores N         number of cores (default: all)
-  --workflow-profile profiles/slurm
-                    use the queue of a cluster, see docs/howto/cluster.md
-
-other commands:
-  ./run status STUDY            show what is complete, running, failed or waiting, and time left
-  ./run open STUDY              print the path of the report; open it if there is a display
-  ./run dragdeck ARGUMENT...    input scripts and runs, see ./run dragdeck --help
-  ./run dragchain ARGUMENT...   tables, figures and reports, see ./run dragchain --help
-  ./run compare --config studies=A,B
-                                run studies to their reports, and write their cases side by side in
-                                results/compare/A+B/comparison.html; cases of a sweep: studies=A
-  ./run search --config study=STUDY
-                                search for a setting, as search in the study says: round by round,
-                                to results/STUDY/search/search.html; resumes where it was
-
-All results are written to the folder of this script, wherever it is called from.
-
-environment variables:
-  DRAGDECK_ENGINE   path of the LIGGGHTS binary (default: liggghts)
-  DRAGDECK_LAUNCHER command that starts several MPI ranks, for example "srun --mpi=pmix"
-                    (default: mpirun)
-  DRAGDECK_CORES    number of cores for MPI ranks: a number or auto (default: auto, all cores
-                    of this machine)
-END
+    cat "$shipped/workflow/usage.txt"
 }
 
 say() { printf '%s\n' "run: $*" >&2; }

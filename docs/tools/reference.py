@@ -1,12 +1,14 @@
 """Texts of the reference pages that are made from the code."""
 
 import argparse
+import ast
+import inspect
 import math
 import re
 import types
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache, partial
-from itertools import takewhile
+from itertools import pairwise, takewhile
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 import pandas as pd
@@ -22,7 +24,8 @@ from worked_examples import EXAMPLES, study_text
 from dragchain.cli import PROGRAM as DRAGCHAIN
 from dragdeck.cli import PROGRAM as DRAGDECK
 from dragdeck.script.findings import rules
-from dragdeck.study.model import BUILT_IN_FIDELITIES, Fidelity, Study
+from dragdeck.study.fidelity import BUILT_IN_FIDELITIES, Fidelity
+from dragdeck.study.model import Study
 from dragdeck.study.plausible import plausible_range
 
 NUMBERS = re.compile(r"[-+\u00d7 ]*\d[\d., %]*(e[-+]\d+)?( \(.*\))?|")
@@ -182,7 +185,7 @@ def _fields(
         if not inner or any(get_args(part)[:1] == (str,) for part in _parts(field.annotation)):
             numbers = path if not _is_row(field.annotation) else f"{path}.0"
             usual = "" if isinstance(field.default, str) else numbers
-            yield path, _usual(usual, _limits(field)), _default(field), field.description or ""
+            yield path, _usual(usual, _limits(field)), _default(field), _meanings(model)[name]
         known = [seen[part] for part, _ in inner if part in seen]
         if known:
             place = f"{path}.*" if inner[0][1] else path
@@ -193,6 +196,18 @@ def _fields(
             kind = f"[{_kind(part)}]" if len(inner) > 1 else ""
             seen[part] = f"{path}{kind}"
             yield from _fields(part, f"{path}{kind}.{'*.' if many else ''}", seen)
+
+
+@cache
+def _meanings(model: type[BaseModel]) -> dict[str, str]:
+    """The docstring below each field of a model, or of a model that it extends."""
+    meanings: dict[str, str] = {}
+    for part in reversed(model.__mro__[: model.__mro__.index(BaseModel)]):
+        (definition,) = ast.parse(inspect.getsource(part)).body
+        for field, text in pairwise(definition.body):
+            if isinstance(field, ast.AnnAssign) and isinstance(text, ast.Expr):
+                meanings[field.target.id] = " ".join(text.value.value.split())
+    return meanings
 
 
 def _is_row(annotation: Any) -> bool:

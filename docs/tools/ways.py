@@ -8,7 +8,7 @@ from dragdeck.advice.advise import ways_of
 from dragdeck.project import Project
 from dragdeck.records.tradeoff import measured_tradeoff
 from dragdeck.scenes.lead import FIRST_WINDOWS
-from dragdeck.study.model import Tolerance
+from dragdeck.study.fidelity import Tolerance
 
 STUDIES = ("uhlmann2015", "drag-depth", "shallow", "wet", "mixture", "stream")
 SCENE = STUDIES[0]

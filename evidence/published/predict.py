@@ -25,7 +25,8 @@ from dragdeck.records.run import RunRecord
 from dragdeck.scenes.angles import AngleRun, angle_scene
 from dragdeck.scenes.process import PROCESS
 from dragdeck.study.yaml import read_yaml
-from dragdeck.sweep.cases import Design, Variation, settle_case
+from dragdeck.sweep.cases import settle_case
+from dragdeck.sweep.design import Design, Variation
 from evidence.beds import dragged
 
 DESIGN = Path(__file__).with_name("design.yaml")

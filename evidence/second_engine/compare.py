@@ -31,7 +31,8 @@ from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import PROCESS, process_scene
 from dragdeck.scenes.scene import read_bed
 from dragdeck.study.yaml import read_study
-from dragdeck.sweep.cases import Design, Variation, settle_case, study_file
+from dragdeck.sweep.cases import settle_case, study_file
+from dragdeck.sweep.design import Design, Variation
 from evidence.beds import dragged
 from evidence.second_engine.script import SCRIPT_FILE, script, write_particles
 
@@ -102,9 +103,9 @@ def run_lammps(folder: Path, scene: Scene[ProcessCase], particles: Path) -> Path
     write_particles(folder, bed[bed.step == bed.step.max()], scene.case.media.density_kg_m3)
     (folder / SCRIPT_FILE).write_text(text)
     # The library of the package mpich is where no loader looks for it.
-    found = {**os.environ, "LD_LIBRARY_PATH": str(Path(sys.prefix, "lib"))}
+    variables = {**os.environ, "LD_LIBRARY_PATH": str(Path(sys.prefix, "lib"))}
     call = [str(Path(sys.prefix, "bin", "lmp")), "-in", SCRIPT_FILE, "-screen", "none"]
-    subprocess.run(call, cwd=folder, env=found, check=True)
+    subprocess.run(call, cwd=folder, env=variables, check=True)
     done.write_text(text)
     return folder
 

@@ -13,7 +13,7 @@ from dragdeck.decks.deck import Scene
 from dragdeck.errors import InputError
 from dragdeck.physics.contact_mechanics import ContactConstants
 from dragdeck.records.case import ProcessCase
-from dragdeck.scenes.motion import ProcessDeck
+from dragdeck.scenes.process_deck import ProcessDeck
 from dragdeck.study.paths.circle import CirclePath
 from dragdeck.study.workpiece import CylinderShape
 

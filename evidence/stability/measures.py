@@ -21,13 +21,8 @@ from dragchain.tables.write import workpiece_force_rows
 from dragdeck.decks import CASE_FILE
 from dragdeck.dumps.frame import Frame
 from dragdeck.engine.part import STATE_FILE
-from dragdeck.physics.contact_mechanics import (
-    damping_ratio,
-    fall_energy,
-    largest_eigenvalue,
-    sphere_mass,
-    touching,
-)
+from dragdeck.physics.contact_mechanics import damping_ratio, fall_energy, sphere_mass
+from dragdeck.physics.contact_network import largest_eigenvalue, touching
 from dragdeck.records.case import CaseOfRun
 from dragdeck.records.run import RunRecord
 from evidence.stability.points import MapPoint
@@ -163,7 +158,7 @@ class Contacts:
 def network_frequency(case: CaseOfRun, sticks: bool, radius_m: Floats, contacts: Contacts) -> float:
     """Largest eigenfrequency of the contacts' network, rotations included, rad/s.
 
-    Stiffnesses are those of `dragdeck.physics.contact_mechanics.stability_number`, without damping:
+    Stiffnesses are those of `dragdeck.physics.contact_network.stability_number`, without damping:
     ``k_n = 2 E* sqrt(R* d)`` (the derivative of Johnson 1985, eq. 4.23, by the overlap d) and
     ``k_t = 8 G* sqrt(R* d)`` (Mindlin 1949, no slip). Every contact sticks (a sliding one is
     softer, so the frequency is an upper bound). It is 0 where nothing touches.

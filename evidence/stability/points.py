@@ -12,7 +12,7 @@ from dragdeck.parts import Part
 from dragdeck.scenes.scene import Regime
 from dragdeck.study.base import Number
 from dragdeck.study.check import explained
-from dragdeck.sweep.cases import Design, Variation
+from dragdeck.sweep.design import Design, Variation
 from evidence.stability.scenes import BedKind
 
 REGIMES: tuple[Regime, ...] = get_args(Regime)

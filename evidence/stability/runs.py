@@ -19,7 +19,8 @@ from dragdeck.project import find_project, study_templates
 from dragdeck.scenes.filling import filling_scene
 from dragdeck.scenes.process import process_scene
 from dragdeck.scenes.scene import read_bed
-from dragdeck.study.model import Motion, Study
+from dragdeck.study.model import Study
+from dragdeck.study.motion import Motion
 from dragdeck.sweep.cases import load_cases, study_file
 from evidence.beds import settled
 from evidence.stability.measures import PointRun

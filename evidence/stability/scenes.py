@@ -21,8 +21,8 @@ from dragdeck.physics.walls import Container, round_container
 from dragdeck.records.bed import BowlOfRun, MediaOfRun
 from dragdeck.records.case import CaseOfRun
 from dragdeck.records.run import Phase
-from dragdeck.scenes.filling import box_top
-from dragdeck.scenes.scene import case_of_study, material_table
+from dragdeck.scenes.bed_space import box_top
+from dragdeck.scenes.scene import case_of_study, deck_of_study
 
 # --- single impacts, many at once: particles on a plate, or small particles on large ones ------
 
@@ -130,14 +130,14 @@ def impact_scene(
     side = 6 * radius * max(1.0, impact.size_ratio) * PHASES + travel
     height = 2 * radius * (2 + 2 * impact.size_ratio) + 2 * travel
     largest = max(1.0, impact.size_ratio) ** 3
-    deck = _ImpactDeck(
+    deck = deck_of_study(
+        _ImpactDeck,
+        case,
+        [study.media.main_material],
         title="Single impacts",
-        study=case.study_name,
         scene="impact",
         run=run,
         source="particles.data",
-        materials=material_table(study, [study.media.main_material], scale, case),
-        limit_force=study.contact.limit_force,
         gravity_m_s2=0.0,
         skin_m=radius,
         timestep_s=dt,
@@ -149,9 +149,8 @@ def impact_scene(
     content = case_of_study(
         ImpactCase,
         case,
-        run,
-        dt,
-        rayleigh,
+        deck,
+        rayleigh_time_s=rayleigh,
         media=MediaOfRun(
             count=len(bodies),
             radius_mean_m=radius,
@@ -277,14 +276,14 @@ def column_scene(
     top = 2 * radius * (_STACK + 4) if stack else box_top(study)
     types = study.type_names()
     gravity, mass = load.load_factor * study.gravity_m_s2, particle_mass(material, radius)
-    deck = _ColumnDeck(
+    deck = deck_of_study(
+        _ColumnDeck,
+        case,
+        types,
         title="Particles at rest under a load",
-        study=case.study_name,
         scene="column",
         run=run,
         source="particles.data" if stack else f"../../filling/{filling_run}/{PACKING_FILE}",
-        materials=material_table(study, types, scale, case),
-        limit_force=study.contact.limit_force,
         gravity_m_s2=gravity,
         skin_m=skin(study),
         timestep_s=dt,
@@ -305,9 +304,8 @@ def column_scene(
     content = case_of_study(
         ColumnCase,
         case,
-        run,
-        dt,
-        rayleigh,
+        deck,
+        rayleigh_time_s=rayleigh,
         phases=[Phase(name="test", start_step=0, end_step=_TEST_STEPS)],
         gravity_m_s2=gravity,
         media=MediaOfRun(

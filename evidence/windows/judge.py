@@ -26,7 +26,8 @@ from dragdeck.scenes.lead import with_leads
 from dragdeck.scenes.process import PROCESS
 from dragdeck.study.base import Json
 from dragdeck.study.yaml import read_yaml
-from dragdeck.sweep.cases import Design, Variation, settle_case
+from dragdeck.sweep.cases import settle_case
+from dragdeck.sweep.design import Design, Variation
 
 PLAIN = "-plain"
 """Ends the name of the study of plain runs beside one with a tolerance."""

@@ -12,7 +12,7 @@ from dragdeck.cases.bed import bed_rayleigh_time, bed_timestep, full_stiffness_n
 from dragdeck.physics import contact_mechanics as mechanics
 from dragdeck.project import Project
 from dragdeck.records.stability import stable_step_law
-from dragdeck.study.model import BUILT_IN_FIDELITIES
+from dragdeck.study.fidelity import BUILT_IN_FIDELITIES
 from evidence.verification.law import limited_restitution
 
 TEXT = "".join(page.read_text(encoding="utf-8") for page in PAGES)

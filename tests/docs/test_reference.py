@@ -21,7 +21,8 @@ from dragdeck.project import Project
 from dragdeck.records.run import CheckCode
 from dragdeck.scenes.drop_test import DropDeck
 from dragdeck.scenes.filling import FillingDeck
-from dragdeck.scenes.process import PROCESS, ProcessDeck
+from dragdeck.scenes.process import PROCESS
+from dragdeck.scenes.process_deck import ProcessDeck
 
 DOCS = ROOT / "docs"
 NOTEBOOKS = sorted((ROOT / "docs/examples").glob("*.ipynb"))
@@ -56,7 +57,7 @@ def section(page: str, start: str, end: str) -> str:
 
 
 def test_every_target_is_on_the_page_and_in_the_usage() -> None:
-    usage = "".join((ROOT / name).read_text() for name in ("run", "workflow/run.sh"))
+    usage = "".join(file.read_text() for file in (ROOT / "workflow").glob("[ur]*.*"))
     rules = "".join(file.read_text() for file in SNAKEFILES)
     targets = set(re.findall(r"^rule (\w+):", rules, re.M))
     assert first_cells(section("docs/reference/snakemake.md", "## Targets", "\n## ")) == targets

@@ -1,8 +1,10 @@
 """The command: what it prints, what it exits with, what it leaves alone."""
 
+import inspect
 import json
 import re
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +24,7 @@ from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import PROCESS
 from dragdeck.scenes.scene import SceneType
 from dragdeck.sweep.cases import load_cases
+from evidence.__main__ import PROGRAM as EVIDENCE
 
 
 @pytest.fixture(autouse=True)
@@ -36,6 +39,20 @@ def test_every_command_has_help(program: Program, capsys: pytest.CaptureFixture[
         with pytest.raises(SystemExit):
             program.main([*words, "--help"])
         assert " ".join(words) in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("program", [DRAGDECK, DRAGCHAIN, EVIDENCE])
+def test_every_command_calls_a_function_with_the_parameters_that_it_has(program: Program) -> None:
+    for command in (*program.commands, *program.steps):
+        module, _, name = command.calls.partition(":")
+        function = getattr(import_module(f"{program.package}.{module}"), name)
+        given = {
+            options.get("dest", name.removeprefix("--").replace("-", "_"))
+            for name, options in command.arguments.items()
+        }
+        parameters = inspect.signature(function).parameters.values()
+        needed = {item.name for item in parameters if item.default is item.empty}
+        assert needed <= given <= {item.name for item in parameters}, command.name
 
 
 @pytest.mark.parametrize("command", ["check", "explain", "cases"])

@@ -20,7 +20,8 @@ from dragdeck.outlook.process import workpiece_notes
 from dragdeck.preview.layout import COLOURS, CaseLayout, layout
 from dragdeck.preview.picture import swept
 from dragdeck.project import Project
-from dragdeck.scenes.workpiece import check_fit, clearances, process_cautions
+from dragdeck.scenes.fit import check_fit, clearances
+from dragdeck.scenes.process_cautions import process_cautions
 
 BAR = {"workpiece.shape": {"kind": "mesh", "file": "bar.stl", "unit": "m"}}
 """The small study drags a hexagonal bar from a file."""

@@ -11,9 +11,10 @@ from paths import ROOT
 from snakemake.cli import parse_config
 from snakemake_interface_common.exceptions import WorkflowError
 
+from dragdeck.calls import checked_settings
 from dragdeck.errors import InputError
 from dragdeck.project import Project, scaling_of
-from dragdeck.rules import Workflow, checked_settings, of_whole_run
+from dragdeck.rules import Workflow, of_whole_run
 
 SCHEMA = yaml.safe_load((ROOT / "workflow/schemas/config.schema.yaml").read_text())["properties"]
 

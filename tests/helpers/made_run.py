@@ -19,7 +19,7 @@ from run_files import OF_EVERY_RUN
 
 from dragdeck.decks.outputs import OutputOfRun
 from dragdeck.study.driven import DrivenMotion
-from dragdeck.study.model import Motion
+from dragdeck.study.motion import Motion
 
 BOX = "ITEM: BOX BOUNDS ff ff ff\n-0.05 0.05\n-0.05 0.05\n0 0.4\n"
 

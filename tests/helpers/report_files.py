@@ -33,7 +33,7 @@ from dragchain.report.findings import (
     ProcessFindings,
 )
 from dragchain.statistics.estimate import Estimate, EstimateColumns
-from dragdeck.records.run import figures_of
+from dragdeck.records.figures import figures_of
 
 PNG = base64.b64decode(
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="

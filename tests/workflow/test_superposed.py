@@ -30,7 +30,8 @@ from dragdeck.project import Project
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import PROCESS
 from dragdeck.scenes.scene import read_bed
-from dragdeck.study.drive import Drive, rotated
+from dragdeck.study.drive import Drive
+from dragdeck.study.rotations import rotated
 from dragdeck.study.superposed.spin import Spin
 from dragdeck.sweep.cases import load_cases
 

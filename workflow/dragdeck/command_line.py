@@ -10,26 +10,27 @@ import shutil
 import sys
 import tempfile
 import traceback
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections import ChainMap
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NoReturn
+
+import yaml
 
 from dragdeck import __version__
 from dragdeck.errors import DragdeckError
 from dragdeck.files import FULL_DISK
 
+_Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+
 _OF_FIGURES = {"MPLBACKEND": "agg", "MATPLOTLIBRC": os.devnull}
 """Figures have the defaults of matplotlib, not a user's: a notebook's backend draws no file."""
 
 
-class Argument:
-    """An argument as argparse takes it; its name is that of the function's parameter."""
-
-    def __init__(self, *names: str, **options: Any) -> None:
-        self.names = names
-        self.options = options
+_TYPES = {"path": Path, "float": float, "int": int}
+"""Types of arguments by their names in a table of commands."""
 
 
 @dataclass(frozen=True)
@@ -38,18 +39,25 @@ class Command:
 
     `help` is for the list of commands, `about` for the command's own help. What the function
     returns is printed if it is text, and the exit status if it is a number.
+
+    Attributes
+    ----------
+    calls : str
+        Module within the package and function, ``module:function``.
+    arguments : mapping
+        By name, what argparse takes of each; its name is that of the function's parameter.
     """
 
     name: str
     help: str
     about: str
-    function: str
-    arguments: tuple[Argument, ...]
+    calls: str
+    arguments: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     example: str = ""
 
     def run(self, package: str, options: Mapping[str, object]) -> int:
         """Import the function, which is named within a package, and call it: its exit status."""
-        module, _, name = self.function.partition(":")
+        module, _, name = self.calls.partition(":")
         said = getattr(import_module(f"{package}.{module}"), name)(**options)
         if isinstance(said, str):
             print(said)
@@ -70,6 +78,8 @@ class Program:
         What a user calls, and what the rules call: ``PROGRAM step NAME``.
     call : str
         How it is called; like its package if empty.
+    shared : mapping
+        Arguments that several commands have.
     """
 
     package: str
@@ -77,6 +87,25 @@ class Program:
     commands: Sequence[Command]
     steps: Sequence[Command] = ()
     call: str = ""
+    shared: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+
+    @classmethod
+    def read(cls, package: str, file: Path, *others: "Program") -> "Program":
+        """A program from the table of its commands in YAML.
+
+        An argument without options is one of ``shared`` there, or in the table of another program.
+        """
+        table = yaml.load(file.read_bytes(), Loader=_Loader)
+        shared = dict(ChainMap(table["shared"], *(dict(other.shared) for other in others)))
+
+        def commands(kind: str) -> Iterator[Command]:
+            for name, entry in table.get(kind, {}).items():
+                given = entry.pop("arguments", {})
+                arguments = {key: options or shared[key] for key, options in given.items()}
+                yield Command(name, arguments=arguments, **entry)
+
+        about, call = table["about"], table.get("call", "")
+        return cls(package, about, [*commands("commands")], [*commands("steps")], call, shared)
 
     def __call__(self) -> NoReturn:
         """Run the command of this process, and end it without the destructors of C++ libraries.
@@ -148,9 +177,19 @@ def _add(parsers: Any, commands: Sequence[Command]) -> None:
         parser = parsers.add_parser(
             command.name, help=command.help, description=command.about, epilog=example
         )
-        for argument in command.arguments:
-            parser.add_argument(*argument.names, **argument.options)
+        for name, options in command.arguments.items():
+            parser.add_argument(name, **_of_argparse(options))
         parser.set_defaults(_command=command)
+
+
+def _of_argparse(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Options of an argument with a type for its name, and tuples, which YAML does not have."""
+    given = dict(options)
+    if "type" in given:
+        given["type"] = _TYPES[given["type"]]
+    if isinstance(given.get("metavar"), list):
+        given["metavar"] = tuple(given["metavar"])
+    return given
 
 
 def guarded(program: str, call: Callable[[], int | None]) -> int:

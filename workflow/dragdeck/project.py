@@ -11,7 +11,6 @@ from dragdeck.errors import InputError, choices
 from dragdeck.outlook.timestep import check_timestep
 from dragdeck.records.tradeoff import TradeoffRecord
 from dragdeck.scenes.lead import FIRST_WINDOWS, LEAD, with_leads
-from dragdeck.scenes.motion import deepest
 from dragdeck.scenes.process import PROCESS, SCENES
 from dragdeck.scenes.scene import SceneType
 from dragdeck.scenes.workpiece import workpiece_length
@@ -44,6 +43,31 @@ OUTCOMES = (POINTS, WINDOWS)
 def run_path(study: str, place: str, run: str) -> str:
     """Path of the folder of a run from the project's root."""
     return f"results/{study}/{place}/{run}"
+
+
+RECORD = {place: "outcome.json" if place in OUTCOMES else "run.json" for place in PLACES}
+"""How a run in each folder of runs ended."""
+
+ENGINE_RUN = "[A-Za-z0-9._-]+-[0-9a-f]{8}"
+"""A run of LIGGGHTS, as a pattern."""
+
+FURTHER_WORKPIECE = f"{ENGINE_RUN}[.][0-9]+"
+"""A further workpiece of one: its number follows the run's name."""
+
+
+def of_run(place: str, file: str) -> str:
+    """Path of a file of a run, as a pattern."""
+    return f"{run_path('{study}', place, '{run}')}/{file}"
+
+
+def tables_of(place: str, names: Iterable[str]) -> list[str]:
+    """Paths of tables of a run, as patterns."""
+    return [of_run(place, f"tables/{name}") for name in names]
+
+
+def deck_files(place: str, inputs: Iterable[str]) -> list[str]:
+    """Paths of what is written of a run before it starts, as patterns."""
+    return [of_run(place, name) for name in ("in.liggghts", "case.json", "columns.json", *inputs)]
 
 
 @dataclass(frozen=True)
@@ -175,7 +199,7 @@ def check_search(file: Path) -> Mapping[str, Sequence[Case]]:
             name = f"search.vary.{field}"
             raise InputError("no run depends on it", file=file, field=name, remedy="remove it")
     every = [case for cases in bounds.values() for case in cases]
-    depth = max(deepest(case.study.motion) for case in every)
+    depth = max(case.study.motion.deepest_m for case in every)
     for name, measure in search.measures.items():
         if measure.heights_m is None:
             continue

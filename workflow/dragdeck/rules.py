@@ -6,38 +6,23 @@ they pass as wildcards is anything with the attributes of `Wildcards`.
 
 import json
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator
 from functools import cache, partial
 from importlib.util import find_spec
 from pathlib import Path
 from shlex import quote
-from typing import Any, NoReturn, Protocol, TypeVar
-from uuid import uuid4
+from typing import Any, Protocol
 
-from jsonschema import Draft202012Validator
 from snakemake_interface_common.exceptions import WorkflowError
 
+from dragdeck import project as projects
+from dragdeck.calls import V, _stop, or_stop
 from dragdeck.cases.case import Case, digest
 from dragdeck.decks import RUN_FILE
 from dragdeck.decks.templates import environment, template_files
-from dragdeck.engine.process import find_engine
-from dragdeck.errors import DragdeckError, EngineError, InputError, choices
-from dragdeck.files import file_checksum, write_text
+from dragdeck.engine.status import other_engines
+from dragdeck.errors import InputError
 from dragdeck.outlook.runs import StudyRun, expected_runs
-from dragdeck.project import (
-    OUTCOMES,
-    PLACES,
-    POINTS,
-    WINDOWS,
-    Project,
-    by_folder,
-    by_run,
-    run_path,
-    study_files,
-    study_templates,
-)
-from dragdeck.records.run import RunRecord
 from dragdeck.scenes.lead import (
     FIRST_WINDOWS,
     whole_drag,
@@ -47,20 +32,8 @@ from dragdeck.scenes.lead import (
     with_leads,
 )
 from dragdeck.scenes.process import SCENES
-from dragdeck.study.base import Json
 from dragdeck.study.calibration import measurements
 from dragdeck.study.recorded import recorded_file
-
-RECORD = {place: "outcome.json" if place in OUTCOMES else "run.json" for place in PLACES}
-"""How a run in each folder of runs ended."""
-
-ENGINE_RUN = "[A-Za-z0-9._-]+-[0-9a-f]{8}"
-"""A run of LIGGGHTS, as a pattern."""
-
-FURTHER_WORKPIECE = f"{ENGINE_RUN}[.][0-9]+"
-"""A further workpiece of one: its number follows the run's name."""
-
-V = TypeVar("V")
 
 
 class Wildcards(Protocol):
@@ -87,123 +60,11 @@ FromRun = Callable[[Wildcards], V]
 """A parameter or an input of a rule for runs."""
 
 
-def or_stop(function: Callable[..., V], *arguments: object) -> V:
-    """The value of a function; what is wrong with its input stops the workflow."""
-    try:
-        return function(*arguments)
-    except DragdeckError as error:
-        _stop(error)
-
-
-def _stop(error: DragdeckError) -> NoReturn:
-    raise WorkflowError(str(error)) from None
-
-
-def checked_settings(
-    config: Mapping[str, object], known: Mapping[str, Json], typed: Iterable[str] = ()
-) -> dict[str, str]:
-    """The keys of config/config.yaml and of --config as text; `known` has the schema of each.
-
-    Snakemake and YAML read a name such as 2024_05 as a number. `typed` has what stands behind
-    --config as it was typed, ``key=value`` each.
-
-    Raises
-    ------
-    WorkflowError
-        A key is unknown, or a value does not fit or is no text.
-    """
-    given = {key: "" if value is None else value for key, value in config.items()}
-    given |= dict(word.split("=", 1) for word in typed if "=" in word)
-    for key, text in given.items():
-        rule = known.get(key)
-        if rule is None:
-            problem, limit = "unknown key", choices(key, known)
-        elif not isinstance(text, str):
-            problem, limit = "not text", "text: in quotes in config/config.yaml"
-        elif not Draft202012Validator(rule).is_valid(text):
-            problem, limit = str(rule["title"]), str(rule["description"])
-        else:
-            continue
-        raise WorkflowError(f"--config {key}={text}: {problem}\n  limit:  {limit}")
-    return {key: str(text) for key, text in given.items()}
-
-
-def of_run(place: str, file: str) -> str:
-    """Path of a file of a run, as a pattern."""
-    return f"{run_path('{study}', place, '{run}')}/{file}"
-
-
-def tables_of(place: str, names: Iterable[str]) -> list[str]:
-    """Paths of tables of a run, as patterns."""
-    return [of_run(place, f"tables/{name}") for name in names]
-
-
-def deck_files(place: str, inputs: Iterable[str]) -> list[str]:
-    """Paths of what is written of a run before it starts, as patterns."""
-    return [of_run(place, name) for name in ("in.liggghts", "case.json", "columns.json", *inputs)]
-
-
 def of_whole_run(place: str, file: str) -> FromRun[str]:
     """A file of the run that a further workpiece shares."""
     return lambda wildcards: (
-        f"{run_path(wildcards.study, place, wildcards.run.rpartition('.')[0])}/{file}"
+        f"{projects.run_path(wildcards.study, place, wildcards.run.rpartition('.')[0])}/{file}"
     )
-
-
-def add_records(rules: Iterable[Any], environment_file: str = "../envs/python.yaml") -> None:
-    """Give each of Snakemake's rules that has a command a log, a benchmark and an environment.
-
-    They stand in ``logs/`` and ``benchmarks/`` of the folder of its run or study, and are called
-    like the rule, without the place of its runs. Rules that have a log already are left alone.
-    """
-    for rule in rules:
-        if rule.norun or rule.log:
-            continue
-        folders, name = str(next(iter(rule.output), "results")).split("/"), rule.name
-        depth = 2
-        if "run" in rule.wildcard_names:
-            depth, name = 4, name.removesuffix(f"_{folders[2]}").removesuffix("_of")
-        folder = "/".join(folders[:depth])
-        others = sorted(rule.wildcard_names - {"study", "run"})
-        name += "".join(f"-{{{wildcard}}}" for wildcard in others)
-        rule.log_modifier = rule.benchmark_modifier = rule.output_modifier
-        rule.set_log(f"{folder}/logs/{name}.log")
-        rule.benchmark = f"{folder}/benchmarks/{name}.tsv"
-        rule.conda_env = environment_file
-        rule.set_params(content=_content_of(list(rule.input), bool(rule.wildcard_names)))
-
-
-def _content_of(inputs: Sequence[Any], of_runs: bool) -> Callable[[Any], str]:
-    """Checksum of the project's own files among a rule's inputs: a restored file may be older."""
-
-    def content(wildcards: Any) -> str:
-        given = [input_(wildcards) if callable(input_) else input_ for input_ in inputs
-                 if not (of_runs and callable(input_))]  # fmt: skip
-        names = [name for item in given for name in ([item] if isinstance(item, str) else item)]
-        paths = (Path(name) for name in names if not name.startswith(("results/", _HOMES)))
-        return " ".join(file_checksum(file)[:12] for file in paths if file.is_file())
-
-    return content
-
-
-_HOMES = ".snakemake/dragdeck"
-
-
-def home_of(study: str, *, idle: bool) -> str:
-    """A file that is newer than results that were copied here, or whose records are gone.
-
-    Without its records in ``.snakemake``, Snakemake takes any file for up to date. A mark among the
-    results says where they were made: elsewhere, all that they are made from is checked. An `idle`
-    call makes no folder for it.
-    """
-    home, mark = Path(_HOMES, study), Path("results", study, ".made")
-    made = home.read_text() if home.is_file() else ""
-    if not made or (mark.read_text() if mark.is_file() else "") != made:
-        made = uuid4().hex
-        write_text(home, made)
-        if mark.parent.is_dir() or not idle:
-            write_text(mark, made)
-    return str(home)
 
 
 class Workflow:
@@ -225,7 +86,7 @@ class Workflow:
 
     def __init__(
         self,
-        project: Project,
+        project: projects.Project,
         study: str,
         fidelity: str,
         plan: str,
@@ -260,7 +121,10 @@ class Workflow:
 
     def every_folder(self, place: str) -> list[str]:
         """The folder of every run of the study's cases."""
-        return [run_path(self.study, place, run) for run in by_folder(self.cases, PLACES[place])]
+        return [
+            projects.run_path(self.study, place, run)
+            for run in projects.by_folder(self.cases, projects.PLACES[place])
+        ]
 
     def every(self, place: str, *files: str) -> list[str]:
         """Files of every run of the study's cases."""
@@ -268,12 +132,12 @@ class Workflow:
 
     def every_table(self, place: str) -> list[str]:
         """The tables of every run of the study's cases."""
-        return self.every(place, *(f"tables/{name}" for name in PLACES[place].tables))
+        return self.every(place, *(f"tables/{name}" for name in projects.PLACES[place].tables))
 
     def every_point(self, place: str, file: str, plan: str = "") -> list[str]:
         """One file of every run of a plan, that of the trade-off if no other is named."""
-        runs = self.points_by_run(PLACES[place].name, plan or self.plan)
-        return [f"{run_path(self.study, place, run)}/{file}" for run in runs]
+        runs = self.points_by_run(projects.PLACES[place].name, plan or self.plan)
+        return [f"{projects.run_path(self.study, place, run)}/{file}" for run in runs]
 
     def relative(self, file: Path) -> str:
         """Path from the project, where the workflow runs; other paths stay as they are."""
@@ -284,7 +148,7 @@ class Workflow:
 
     def _templates_of(self, scene: str) -> list[str]:
         """Every template that a scene's deck is made of."""
-        folders = study_templates(self.cases[0])
+        folders = projects.study_templates(self.cases[0])
         templates = or_stop(environment, self.project.templates, folders)
         return [self.relative(file) for file in or_stop(template_files, templates, scene)]
 
@@ -339,7 +203,7 @@ class Workflow:
 
     def crate_inputs(self) -> list[str]:
         """Study files, templates and meshes of all scenes."""
-        files = map(self.relative, or_stop(study_files, self.cases))
+        files = map(self.relative, or_stop(projects.study_files, self.cases))
         templates = (file for scene in SCENES for file in self.templates_of(scene))
         return list(dict.fromkeys([*files, *templates]))
 
@@ -348,27 +212,27 @@ class Workflow:
     def _points_by_run(self, scene: str, plan: str, leads: bool = False) -> dict[str, Case]:
         """A case of a plan for each run of a scene; those that lead to others too, if asked."""
         kind, cases = SCENES[scene], self.points_of(plan).of(SCENES[scene])
-        return by_run(with_leads(cases) if leads and kind.needs_bed else cases, kind)
+        return projects.by_run(with_leads(cases) if leads and kind.needs_bed else cases, kind)
 
     def _runs_of(self, place: str) -> dict[str, Case]:
         """A case of the study for each folder of runs; of those that lead to others too."""
-        scene, cases = PLACES[place], self.cases
-        if place == WINDOWS:
+        scene, cases = projects.PLACES[place], self.cases
+        if place == projects.WINDOWS:
             cases = [part for case in cases for part in (*windows_of(case), *whole_drag(case))]
         elif scene.needs_bed:
             cases = with_leads(cases)
-        return by_folder(cases, scene)
+        return projects.by_folder(cases, scene)
 
     def _origins(self, place: str) -> Iterator[tuple[str, dict[str, Case]]]:
         """Where cases of a folder's runs come from: how to name them, and by run."""
-        scene = PLACES[place]
-        if place != POINTS:
+        scene = projects.PLACES[place]
+        if place != projects.POINTS:
             yield self.fidelity_option, self.runs_of(place)
         for plan in (self.plan, self.validation):
             try:
                 runs = self.points_by_run(scene.name, plan, leads=True)
             except WorkflowError:  # a plan that does not fit the study matters to its points alone
-                if place == POINTS:
+                if place == projects.POINTS:
                     raise
             else:
                 yield f"--plan {plan}", runs
@@ -387,30 +251,20 @@ class Workflow:
 
     def other_engines(self) -> Iterator[str]:
         """What to say of runs that another version of LIGGGHTS made than would now be called."""
-        files = (self.project.root / file for name in SCENES for file in self.every(name, RUN_FILE))
-        made = Counter[str]()
-        for file in files:
-            with suppress(DragdeckError):
-                made[RunRecord.read(file).engine_version] += 1
-        try:
-            here = find_engine().version if made else ""
-        except EngineError:
-            return
-        for version in sorted({*made} - {here}):
-            yield (
-                f"LIGGGHTS {version} made {made[version]} run(s), which LIGGGHTS {here} would not "
-                "make anew; remove their folders if it should"
-            )
+        runs = (file for name in SCENES for file in self.every(name, RUN_FILE))
+        return other_engines(self.project.root / file for file in runs)
 
     def planned_runs(self, jobs: Iterable[Any]) -> list[StudyRun]:
         """The engine runs of Snakemake's jobs: what is expected of each, and how far it is."""
-        places = {f"run_{place}": place for place in PLACES}
+        places = {f"run_{place}": place for place in projects.PLACES}
         cases: dict[str, dict[Path, Case]] = {}
         for job in jobs:
             if place := places.get(job.rule.name):
                 folder = self.project.root / Path(job.output[0]).parent
                 cases.setdefault(place, {})[folder] = self.case_of(place, job.wildcards.run)
-        several = (expected_runs(PLACES[place], folders) for place, folders in cases.items())
+        several = (
+            expected_runs(projects.PLACES[place], folders) for place, folders in cases.items()
+        )
         return [run.now() for runs in several for run in runs]
 
     # --- parameters of rules ---------------------------------------------------------------
@@ -425,11 +279,11 @@ class Workflow:
         return lambda wildcards: self.digest(place, wildcards.run)
 
     def _digest(self, place: str, run: str) -> str:
-        return PLACES[place].digest(self.case_of(place, run))
+        return projects.PLACES[place].digest(self.case_of(place, run))
 
     def ranks_of(self, place: str) -> int | FromRun[int]:
         """Number of LIGGGHTS processes of a run."""
-        if PLACES[place].single_particle:
+        if projects.PLACES[place].single_particle:
             return 1
         return lambda wildcards: self.case_of(place, wildcards.run).ranks
 
@@ -442,9 +296,9 @@ class Workflow:
 
         def name(wildcards: Wildcards) -> str:
             filling = SCENES["filling"].run_id(self.case_of(place, wildcards.run))
-            return f"{run_path(wildcards.study, 'filling', filling)}/{file}"
+            return f"{projects.run_path(wildcards.study, 'filling', filling)}/{file}"
 
-        return name if PLACES[place].needs_bed else []
+        return name if projects.PLACES[place].needs_bed else []
 
     def of_its_lead(self, place: str) -> FromRun[list[str]] | list[str]:
         """The record of the run from which a run goes on, if there is one."""
@@ -454,9 +308,9 @@ class Workflow:
             if lead is None:
                 return []
             run = SCENES["process"].run_id(lead)
-            return [f"{run_path(wildcards.study, 'process', run)}/run.json"]
+            return [f"{projects.run_path(wildcards.study, 'process', run)}/run.json"]
 
-        return names if PLACES[place].needs_bed else []
+        return names if projects.PLACES[place].needs_bed else []
 
     @property
     def needed_advice(self) -> list[str]:
@@ -499,7 +353,7 @@ class Workflow:
 
     def _window_folders(self, wildcards: RoundOfRun, windows: list[Case]) -> list[str]:
         runs = [SCENES["process"].run_id(window) for window in windows]
-        return [run_path(wildcards.study, WINDOWS, run) for run in runs]
+        return [projects.run_path(wildcards.study, projects.WINDOWS, run) for run in runs]
 
     def measured_of_round(self, wildcards: RoundOfRun) -> list[str]:
         """The quantities of the runs that a round judges."""

@@ -14,8 +14,8 @@ SHIPPED = _INSIDE if _INSIDE.is_dir() else Path(__file__).parents[2]
 
 def own_or_shipped(root: Path, name: str) -> Path:
     """A file or folder of a project by its path from the root, or else that of dragdeck."""
-    own = root / name
-    return own if own.exists() else SHIPPED / name
+    file = root / name
+    return file if file.exists() else SHIPPED / name
 
 
 def files() -> str:

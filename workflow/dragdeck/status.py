@@ -11,13 +11,7 @@ from dragdeck.cases.case import Case
 from dragdeck.cases.ranks import cores_here
 from dragdeck.engine.status import RunState
 from dragdeck.errors import InputError
-from dragdeck.outlook.runs import (
-    StudyRun,
-    by_their_speeds,
-    cost_in_words,
-    done_fraction,
-    expected_runs,
-)
+from dragdeck.outlook import runs as study_runs
 from dragdeck.project import Project, find_project
 from dragdeck.scenes.process import SCENES
 
@@ -32,19 +26,19 @@ def status(study: str, fidelity: str | None, plan: str | None, verbose: bool) ->
     project = find_project(Path.cwd())
     points = project.points(study, plan) if plan else None
     every = [] if points else project.cases(study, fidelity)
-    runs: list[StudyRun] = []
+    runs: list[study_runs.StudyRun] = []
     for kind in SCENES.values():
         cases = points.of(kind) if points else every
         folders = project.run_folders(cases, kind, of_plan=points is not None)
-        runs += [run.now() for run in expected_runs(kind, folders)]
-    runs = by_their_speeds(runs)
+        runs += [run.now() for run in study_runs.expected_runs(kind, folders)]
+    runs = study_runs.by_their_speeds(runs)
     for state in _ORDER:
         _show_state(state, [run for run in runs if run.status.state == state], verbose)
     left = [run for run in runs if not run.status.final]
     counts = {state: sum(run.status.state == state for run in runs) for state in _ORDER}
     said = ", ".join(f"{count} {state}" for state, count in counts.items() if count)
-    cost = f"; still to run: {cost_in_words(left, cores_here())}" if left else ""
-    print(f"{study}: runs {100 * done_fraction(runs):.0f} % done: {said}{cost}")
+    cost = f"; still to run: {study_runs.cost_in_words(left, cores_here())}" if left else ""
+    print(f"{study}: runs {100 * study_runs.done_fraction(runs):.0f} % done: {said}{cost}")
     if not plan:
         file = project.report(study)
         known = file if file.is_file() else "none yet"
@@ -60,7 +54,7 @@ def _not_current(project: Project, study: str, cases: Sequence[Case]) -> str:
     return f"{old}; make it with: ./run all --config study={study}"
 
 
-def _show_state(state: RunState, runs: Sequence[StudyRun], verbose: bool) -> None:
+def _show_state(state: RunState, runs: Sequence[study_runs.StudyRun], verbose: bool) -> None:
     """Print the runs of a state, those that need attention with the reason."""
     shown = runs if verbose or state == "failed" else runs[:_SHOWN]
     for run in shown:

@@ -22,22 +22,16 @@ from dragdeck.project import (
     project_here,
     run_path,
     scaling_of,
-)
-from dragdeck.records.run import figures_of
-from dragdeck.rules import (
     ENGINE_RUN,
     FURTHER_WORKPIECE,
     RECORD,
-    Workflow,
-    add_records,
     of_run,
-    of_whole_run,
-    or_stop,
-    checked_settings,
     deck_files,
-    home_of,
     tables_of,
 )
+from dragdeck.records.figures import figures_of
+from dragdeck.rules import Workflow, of_whole_run
+from dragdeck.calls import add_records, or_stop, checked_settings, home_of
 from dragdeck.scenes.process import SCENES
 from dragdeck.shipped import own_or_shipped
 from dragdeck.snakemake_lock import hold_lock

@@ -18,7 +18,7 @@ from dragchain.network.frame import BODY_NAMES, PARTICLE, WORKPIECE, NetworkFram
 from dragchain.tables.by_step import RisingSteps, read_steps
 from dragchain.tables.columns import CONTACTS, KINEMATICS, ORIENTATION
 from dragchain.tables.run_folder import Run, workpiece_places
-from dragdeck.study.drive import Orientations
+from dragdeck.study.rotations import Orientations
 
 _BODY = {name: body for body, name in BODY_NAMES.items()}
 _PARTICLES = ("step", *KINEMATICS)

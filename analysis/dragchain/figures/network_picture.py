@@ -31,7 +31,7 @@ from dragchain.run.workpiece import placed, read_workpiece_mesh
 from dragchain.tables.by_step import read_table
 from dragchain.tables.run_folder import workpiece_places
 from dragdeck.records.case import CaseOfRun
-from dragdeck.study.drive import Orientations
+from dragdeck.study.rotations import Orientations
 
 View = Literal["xy", "xz"]
 

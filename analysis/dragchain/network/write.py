@@ -22,7 +22,7 @@ from dragchain.network.frame import BODY_NAMES, FLOOR, SIDE, NetworkFrame, netwo
 from dragchain.network.statistics import cluster_rows, frame_clusters, frame_statistics
 from dragchain.tables.parquet import table_writer, write_parquet
 from dragdeck.records.case import load_case
-from dragdeck.study.drive import wrap_angle
+from dragdeck.study.rotations import wrap_angle
 
 
 def chain_table(frame: NetworkFrame) -> pd.DataFrame:

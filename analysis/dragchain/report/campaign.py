@@ -2,7 +2,7 @@
 
 Trade-off, stability map, verification, validation, calibration, scalings and costs are campaigns:
 
-1. **A design of runs**, in YAML: `dragdeck.sweep.cases`.
+1. **A design of runs**, in YAML: `dragdeck.sweep.design`.
 2. **Runs.** Those of a study are jobs of their own (``workflow/rules/runs.smk``); many short ones
    are a batch (`dragdeck.engine.batch.Batch.each`), which the same command judges and reports on.
    One that fails is a finding.

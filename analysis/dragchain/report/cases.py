@@ -207,19 +207,22 @@ class ReportedRun(Run, Generic[F]):
 
 def case_title(case: CaseOfRun, packings: int) -> str:
     """A case by its stiffness, the values that a sweep gives it and its packings."""
-    name, own = case.case or case.run, case.fidelity
-    if not name.startswith(own.name):
+    name, fidelity = case.case or case.run, case.fidelity
+    if not name.startswith(fidelity.name):
         return name
-    swept = dict(re.findall(r"_([a-z_]+?)-([^_]+)", name.removeprefix(own.name)))
+    swept = dict(re.findall(r"_([a-z_]+?)-([^_]+)", name.removeprefix(fidelity.name)))
     seed = swept.pop(_SEED, "")
-    stiffness = "physical stiffness" if own.youngs_modulus_scale == 1.0 else "soft"
-    settings = [f"E {TIMES} {own.youngs_modulus_scale:g}", f"step {own.timestep_fraction:g}"]
-    settings += [f"speed {TIMES} {own.speed_factor:g}"] if own.speed_factor != 1.0 else []
-    how = ", ".join(settings) if own.name.startswith("E") else own.name.replace("-", " ")
-    one = f"packing {seed}" if seed else "one packing"
+    stiffness = "physical stiffness" if fidelity.youngs_modulus_scale == 1.0 else "soft"
+    settings = [
+        f"E {TIMES} {fidelity.youngs_modulus_scale:g}",
+        f"step {fidelity.timestep_fraction:g}",
+    ]
+    settings += [f"speed {TIMES} {fidelity.speed_factor:g}"] if fidelity.speed_factor != 1.0 else []
+    how = ", ".join(settings) if fidelity.name.startswith("E") else fidelity.name.replace("-", " ")
+    packing = f"packing {seed}" if seed else "one packing"
     values = [f"{field.replace('_', ' ')} {value}" for field, value in swept.items()]
     return ", ".join(
-        [f"{stiffness} ({how})", *values, one if packings == 1 else f"{packings} packings"]
+        [f"{stiffness} ({how})", *values, packing if packings == 1 else f"{packings} packings"]
     )
 
 

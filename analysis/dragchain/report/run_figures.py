@@ -33,7 +33,7 @@ from dragchain.run.kinematics import process_time
 from dragchain.run.reference import ReferenceDrag, reference_drags
 from dragchain.statistics.estimate import Estimate
 from dragdeck.records.case import CaseOfRun
-from dragdeck.records.run import figures_of
+from dragdeck.records.figures import figures_of
 
 # --- panels --------------------------------------------------------------------------------------
 

@@ -36,7 +36,8 @@ from dragchain.statistics.noisy_map import LARGEST_ERROR
 from dragdeck.errors import DragdeckError
 from dragdeck.files import write_bytes
 from dragdeck.records.case import AssumptionOfRun, load_case
-from dragdeck.records.run import FIGURES, RunRecord, causes, figures_of
+from dragdeck.records.figures import FIGURES, figures_of
+from dragdeck.records.run import RunRecord, causes
 
 if TYPE_CHECKING:
     from dragchain.report.measured_signal import SignalComparison

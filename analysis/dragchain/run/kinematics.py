@@ -11,8 +11,8 @@ from dragchain.arrays import Floats, Ints
 from dragchain.errors import TableError
 from dragdeck.records.case import CaseOfRun
 from dragdeck.records.run import Phase
-from dragdeck.study.drive import Orientations, about_vertical, rotated, wrap_angle
 from dragdeck.study.driven import DrivenMotion
+from dragdeck.study.rotations import Orientations, about_vertical, rotated, wrap_angle
 
 
 def drag_start_s(case: CaseOfRun) -> float:

@@ -10,7 +10,7 @@ from dragchain.arrays import Floats
 from dragchain.errors import TableError
 from dragchain.run.kinematics import needed
 from dragdeck.records.case import CaseOfRun
-from dragdeck.study.drive import Orientations, rotated
+from dragdeck.study.rotations import Orientations, rotated
 
 
 def read_workpiece_mesh(run_dir: Path, case: CaseOfRun) -> Any:

@@ -46,7 +46,8 @@ from dragdeck.study.search import (
     SearchPoint,
 )
 from dragdeck.study.yaml import read_study
-from dragdeck.sweep.cases import Settings, settle_case, study_file
+from dragdeck.sweep.cases import settle_case, study_file
+from dragdeck.sweep.design import Settings
 
 _MOST_REFUSED = 20
 """Settings of a round that the study's checks may refuse one after the other."""

@@ -21,8 +21,8 @@ from dragdeck.decks.outputs import OutputOfRun, load_outputs
 from dragdeck.dumps.frame import Columns, Frame
 from dragdeck.records.case import CaseOfRun, load_case
 from dragdeck.study.contact_law import FrictionLimit
-from dragdeck.study.drive import Orientations
 from dragdeck.study.model import Study
+from dragdeck.study.rotations import Orientations
 
 ON_WORKPIECE = ("workpiece_particles", "workpiece_contacts")
 """The outputs that are joined, unless others of their columns are asked for."""

@@ -50,7 +50,7 @@ from dragdeck.decks.outputs import TOUCHES
 from dragdeck.dumps.frame import Columns
 from dragdeck.errors import RejectedRunError
 from dragdeck.records.case import CaseOfRun
-from dragdeck.study.drive import wrap_angle
+from dragdeck.study.rotations import wrap_angle
 
 
 @dataclass(frozen=True)

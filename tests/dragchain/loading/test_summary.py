@@ -36,7 +36,7 @@ from dragchain.run.workpiece import Surface, off_facet, read_surface
 from dragchain.tables.workpiece_contacts import WallContacts
 from dragchain.tables.write import workpiece_contact_rows
 from dragdeck.records.case import load_case
-from dragdeck.study.drive import rotated
+from dragdeck.study.rotations import rotated
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,7 @@ import pytest
 from paths import ROOT
 
 from dragchain.report import run_figures
-from dragdeck.records.run import FIGURES
+from dragdeck.records.figures import FIGURES
 from dragdeck.scenes.process import SCENES
 
 REGISTRY = "workflow/dragdeck/records/figures.csv"

@@ -26,9 +26,9 @@ from dragchain.run.reference import reference_drags
 from dragchain.statistics.estimate import Estimate
 from dragdeck.physics.walls import round_container
 from dragdeck.records.case import CaseOfRun, load_case
-from dragdeck.records.run import figures_of
-from dragdeck.study.drive import Orientations
+from dragdeck.records.figures import figures_of
 from dragdeck.study.reference import Drag, Reference
+from dragdeck.study.rotations import Orientations
 
 pytestmark = pytest.mark.slow  # its data take seconds to make
 

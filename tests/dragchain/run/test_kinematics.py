@@ -23,7 +23,7 @@ from dragchain.run.kinematics import (
 )
 from dragdeck.records.case import CaseOfRun, StatisticsOfRun
 from dragdeck.records.run import Phase
-from dragdeck.study.drive import wrap_angle
+from dragdeck.study.rotations import wrap_angle
 
 DT = 1e-3
 CIRCLE = {"kind": "circle", "radius_m": 0.02}

@@ -26,7 +26,7 @@ from dragdeck.scenes.drop_test import drop_scene
 from dragdeck.scenes.filling import filling_scene
 from dragdeck.scenes.lead import FIRST_WINDOWS, with_leads
 from dragdeck.scenes.process import PROCESS, SCENES, process_scene
-from dragdeck.study.model import BUILT_IN_FIDELITIES, Tolerance
+from dragdeck.study.fidelity import BUILT_IN_FIDELITIES, Tolerance
 from dragdeck.sweep.cases import load_cases
 
 Write = Callable[..., Path]

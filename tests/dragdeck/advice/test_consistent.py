@@ -17,12 +17,12 @@ from dragdeck.outlook.timestep import (
     settling_cautions,
     stable_step_cautions,
 )
-from dragdeck.scenes.filling import filling_cautions
+from dragdeck.scenes.filling_cautions import filling_cautions
 from dragdeck.scenes.lead import with_leads
 from dragdeck.scenes.process import PROCESS, SCENES
+from dragdeck.scenes.process_cautions import process_cautions
 from dragdeck.scenes.scene import SceneType
-from dragdeck.scenes.workpiece import process_cautions
-from dragdeck.study.model import Fidelity
+from dragdeck.study.fidelity import Fidelity
 from dragdeck.sweep.cases import settle_case
 
 FILE = Path("studies/random/study.yaml")

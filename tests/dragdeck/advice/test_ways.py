@@ -12,7 +12,7 @@ from dragdeck.advice.ways import Ways
 from dragdeck.project import Project
 from dragdeck.records.windows import Known, WindowsRecord
 from dragdeck.scenes.lead import FIRST_WINDOWS
-from dragdeck.study.model import Tolerance
+from dragdeck.study.fidelity import Tolerance
 
 KNOWN = Known(
     per_softness=0.1, per_softness_std=0.05, scenes=20, covered=0.95, slope=0.6, slope_std=0.1,

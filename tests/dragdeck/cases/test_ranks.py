@@ -12,7 +12,7 @@ from dragdeck.physics.domain_split import FilledBowl, split
 from dragdeck.records.tradeoff import measured_tradeoff
 from dragdeck.study.bowls.annulus import AnnulusBowl
 from dragdeck.study.bowls.cylinder import CylinderBowl
-from dragdeck.study.model import Fidelity, Tolerance
+from dragdeck.study.fidelity import Fidelity, Tolerance
 
 
 @pytest.mark.parametrize(("cores", "ranks"), [("1", 1), ("2", 2), ("8", 2)])

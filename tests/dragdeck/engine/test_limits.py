@@ -10,7 +10,7 @@ from run_files import rewrite
 from dragdeck.cases.case import Case
 from dragdeck.decks.render import write_run
 from dragdeck.decks.templates import environment
-from dragdeck.engine.log import Sample, breach, read_samples, within
+from dragdeck.engine.log import Sample, breach, thermo_samples, within
 from dragdeck.engine.run_folder import run
 from dragdeck.errors import RejectedRunError
 from dragdeck.physics.packing import Bed
@@ -42,7 +42,7 @@ def test_the_speed_limit_is_that_of_the_same_energy() -> None:
 
 
 def samples(*rows: str) -> list[Sample]:
-    return read_samples(rows, COLUMNS)
+    return thermo_samples(rows, COLUMNS)
 
 
 def test_a_calm_run_meets_no_limit() -> None:

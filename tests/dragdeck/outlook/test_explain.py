@@ -11,9 +11,9 @@ from made_tradeoff import made_tradeoff
 
 from dragdeck.cases.case import Case
 from dragdeck.outlook.explain import expected_cost, explanation, measured_speeds, price_of
+from dragdeck.scenes.bed_space import particles_step_s
 from dragdeck.scenes.filling import FILLING, filling_scene
 from dragdeck.scenes.process import PROCESS, process_scene
-from dragdeck.scenes.scene import particles_step_s
 
 
 def measured(results: Path, name: str, particles: int, steps_per_s: float) -> None:

@@ -24,9 +24,10 @@ from dragdeck.outlook.timestep import (
 from dragdeck.physics.contact_mechanics import effective_modulus, rayleigh_time
 from dragdeck.records.stability import RestitutionErrors, StableStepLaw, stable_step_law
 from dragdeck.scenes.filling import FILLING
+from dragdeck.scenes.numbers import describe
 from dragdeck.scenes.process import PROCESS
-from dragdeck.scenes.workpiece import describe, workpiece_radius
-from dragdeck.study.model import Fidelity
+from dragdeck.scenes.workpiece import workpiece_radius
+from dragdeck.study.fidelity import Fidelity
 from dragdeck.sweep.cases import load_cases
 
 TABLE = RestitutionErrors(

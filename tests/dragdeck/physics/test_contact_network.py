@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from dragdeck.physics.contact_mechanics import ContactConstants, stability_number
+from dragdeck.physics.contact_mechanics import ContactConstants
+from dragdeck.physics.contact_network import stability_number
 from dragdeck.physics.walls import round_container
 
 RADIUS, DENSITY, BOWL, OVERLAP = 3e-3, 2500.0, round_container(0.05), 1e-5

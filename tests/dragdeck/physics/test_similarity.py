@@ -10,7 +10,7 @@ from dragdeck.cases.bed import softest_scale
 from dragdeck.cases.case import Case
 from dragdeck.physics.estimates import SOLID_FRACTION_ESTIMATE
 from dragdeck.physics.rounding import rounded
-from dragdeck.scenes.workpiece import describe
+from dragdeck.scenes.numbers import describe
 
 
 def test_numbers_of_a_scene_by_hand(case: Case) -> None:

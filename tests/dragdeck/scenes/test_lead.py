@@ -20,7 +20,8 @@ from dragdeck.scenes.motion import course
 from dragdeck.scenes.process import PROCESS, process_scene
 from dragdeck.scenes.workpiece import reference_height
 from dragdeck.study.base import Json
-from dragdeck.study.drive import Drive, by_vector, rotated
+from dragdeck.study.drive import Drive
+from dragdeck.study.rotations import by_vector, rotated
 from dragdeck.sweep.cases import load_cases
 
 START = {"youngs_modulus_scale": 0.01, "timestep_fraction": 0.5}

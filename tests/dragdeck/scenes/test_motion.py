@@ -24,9 +24,9 @@ from dragdeck.errors import InputError
 from dragdeck.preview.layout import layout
 from dragdeck.records.case import CaseOfRun as ReadCase
 from dragdeck.records.case import load_case
-from dragdeck.scenes.motion import course, farthest_reach, path_heights
+from dragdeck.scenes.fit import clearances
+from dragdeck.scenes.motion import course
 from dragdeck.scenes.process import process_scene
-from dragdeck.scenes.workpiece import clearances
 from dragdeck.study.check import warnings
 
 CIRCLE = {"kind": "circle", "radius_m": 0.010, "revolutions": 0.1}
@@ -204,8 +204,8 @@ def test_the_fraction_of_a_path_that_is_driven_has_to_fit(moved: Made) -> None:
     """Waypoints beyond it are never reached."""
     points = [[0, 0, 0], [0.5, 0.01, 0], [1, 0.03, 0, 0.03]]
     case = moved(path={"kind": "waypoints", "points": points, "fraction": 0.5})
-    assert farthest_reach(case.study.motion) == pytest.approx(0.01)
-    assert path_heights(case.study.motion) == (0, 0)
+    assert case.study.motion.farthest_m == pytest.approx(0.01)
+    assert case.study.motion.path_heights_m == (0, 0)
     process_scene(case, BED)
 
 
@@ -226,9 +226,5 @@ def test_a_line_that_starts_where_it_plunges_has_no_approach(moved: Made) -> Non
 
 
 def test_farthest_reach_counts_the_end_of_a_line_and_the_plunge(moved: Made) -> None:
-    assert farthest_reach(moved(path=LINE).study.motion) == pytest.approx(
-        math.hypot(*path_end(LINE, 0))
-    )
-    assert farthest_reach(moved(path=CIRCLE, plunge_at_m=[0, 0.03]).study.motion) == pytest.approx(
-        0.03
-    )
+    assert moved(path=LINE).study.motion.farthest_m == pytest.approx(math.hypot(*path_end(LINE, 0)))
+    assert moved(path=CIRCLE, plunge_at_m=[0, 0.03]).study.motion.farthest_m == pytest.approx(0.03)

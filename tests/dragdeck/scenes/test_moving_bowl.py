@@ -13,9 +13,10 @@ from dragdeck.errors import InputError
 from dragdeck.outlook.process import dimensionless, workpiece_notes
 from dragdeck.physics.turning_bed import surface_rise, surface_tilt
 from dragdeck.project import Project
+from dragdeck.scenes.fit import clearances, fastest_motion
 from dragdeck.scenes.moving_bowl import bed_in_motion
 from dragdeck.scenes.process import process_scene
-from dragdeck.scenes.workpiece import clearances, fastest_motion, fastest_surface
+from dragdeck.scenes.workpiece import fastest_surface
 from dragdeck.script.formula import value_of
 from dragdeck.study.bowl_motions.vibration import Vibration
 

@@ -11,8 +11,9 @@ from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
 from dragdeck.outlook.process import workpiece_notes
 from dragdeck.project import Project
+from dragdeck.scenes.fit import fastest_motion
+from dragdeck.scenes.numbers import describe
 from dragdeck.scenes.process import process_scene
-from dragdeck.scenes.workpiece import describe, fastest_motion
 
 REST = {"kind": "rest", "radius_m": 0.01, "bowl_rpm": -30, "revolutions": 0.5}
 RATE = 30 * 2 * math.pi / 60

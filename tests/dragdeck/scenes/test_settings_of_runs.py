@@ -6,8 +6,9 @@ import pytest
 from made_study import Made
 
 from dragdeck.physics.contact_mechanics import effective_modulus
+from dragdeck.scenes.bed_space import expected_bed
 from dragdeck.scenes.drop_test import drop_scene
-from dragdeck.scenes.filling import expected_bed, filling_scene
+from dragdeck.scenes.filling import filling_scene
 from dragdeck.scenes.process import PROCESS
 
 QUICK = {

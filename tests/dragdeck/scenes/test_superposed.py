@@ -13,11 +13,12 @@ from pydantic import ValidationError
 from dragdeck.cases.bed import bed_timestep, widest_skin
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
-from dragdeck.scenes.motion import surface_speed
+from dragdeck.scenes.fit import fastest_motion
+from dragdeck.scenes.numbers import describe
 from dragdeck.scenes.process import PROCESS, process_scene
-from dragdeck.scenes.workpiece import describe, fastest_motion, workpiece_length
+from dragdeck.scenes.workpiece import workpiece_length
 from dragdeck.study.drive import Drive
-from dragdeck.study.model import Motion
+from dragdeck.study.motion import Motion
 from dragdeck.study.superposed.oscillation import Oscillation
 from dragdeck.study.superposed.spin import Spin
 
@@ -104,11 +105,11 @@ def test_the_highest_surface_speed_counts_all_that_moves(moved: Made) -> None:
     case = moved(**motion)
     radius = 0.004
     whole = 0.02 + RATE * radius + 2e-3 * 2 * math.pi * 5
-    assert surface_speed(case.study.motion, radius) == pytest.approx(whole)
+    assert case.study.motion.surface_speed_m_s(radius) == pytest.approx(whole)
     assert fastest_motion(case) == pytest.approx(whole, rel=0.01)
     assert describe(case)["superposed_speed"] == pytest.approx(whole / 0.02 - 1, rel=0.01)
     plain = case.study.motion.model_copy(update={"spin": None, "oscillation": None})
-    assert surface_speed(plain, radius) == 0.02
+    assert plain.surface_speed_m_s(radius) == 0.02
 
 
 def test_a_drag_at_another_pace_spins_as_much_faster(moved: Made) -> None:

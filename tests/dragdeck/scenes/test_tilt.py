@@ -10,11 +10,11 @@ from made_study import Made
 
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
+from dragdeck.scenes.fit import clearances
 from dragdeck.scenes.motion import course
+from dragdeck.scenes.numbers import describe
 from dragdeck.scenes.process import PROCESS, process_scene
 from dragdeck.scenes.workpiece import (
-    clearances,
-    describe,
     dip,
     reference_height,
     workpiece_length,

@@ -14,11 +14,12 @@ from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
 from dragdeck.preview.layout import layout
 from dragdeck.project import Project
-from dragdeck.scenes.motion import surface_speed
+from dragdeck.scenes.fit import clearances, fastest_motion
+from dragdeck.scenes.numbers import describe
 from dragdeck.scenes.process import PROCESS, process_scene
-from dragdeck.scenes.workpiece import clearances, describe, fastest_motion, workpiece_length
+from dragdeck.scenes.workpiece import workpiece_length
 from dragdeck.study.check import warnings
-from dragdeck.study.drive import in_steps
+from dragdeck.study.stages import in_steps
 from dragdeck.sweep.cases import load_cases
 
 POINTS = [[2, -0.01, 0], [2.2, -0.006, 0], [2.3, -0.006, 0, 0.001], [2.5, -0.006, 0, 0.001],
@@ -228,7 +229,7 @@ def test_speeds_follow_from_the_times(made: Made) -> None:
     motion, peak = case.study.motion, math.hypot(0.008, 0.001) / 0.2
     assert motion.nominal_speed_m_s == pytest.approx(LENGTH / 0.7)
     assert motion.path_length_m == pytest.approx(LENGTH)
-    assert surface_speed(motion, 0.004) == pytest.approx(peak)
+    assert motion.surface_speed_m_s(0.004) == pytest.approx(peak)
     assert fastest_motion(case) == pytest.approx(0.1)  # the plunge
     assert describe(case)["superposed_speed"] == pytest.approx(peak * 0.7 / LENGTH - 1)
     steady = made(points=[[0, 0, 0], [0.1, 0.003, 0], [0.3, 0.003, 0.006]])

@@ -17,8 +17,9 @@ from dragdeck.mesh.contacts import gap_fraction
 from dragdeck.mesh.files import stl_text
 from dragdeck.mesh.shapes import prism
 from dragdeck.mesh.surface import surface
+from dragdeck.scenes.fit import clearances
 from dragdeck.scenes.process import PROCESS, process_scene
-from dragdeck.scenes.workpiece import clearances, fastest_surface, workpiece_mesh, workpiece_radius
+from dragdeck.scenes.workpiece import fastest_surface, workpiece_mesh, workpiece_radius
 from dragdeck.sweep.cases import load_cases
 
 Dragged = Callable[..., Case]

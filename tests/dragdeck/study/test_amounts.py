@@ -15,7 +15,7 @@ import pytest
 import yaml
 from made_study import put
 
-from dragdeck.commands import check
+from dragdeck.checking import check_study
 from dragdeck.errors import DragdeckError, InputError
 from dragdeck.mesh.shapes import cylinder
 from dragdeck.project import Project
@@ -98,7 +98,7 @@ def _said(folder: Path, answer: Connection) -> None:
     text = io.StringIO()
     with contextlib.redirect_stderr(text), contextlib.redirect_stdout(text):
         try:
-            check("huge", None, False)
+            check_study("huge", None, False)
         except DragdeckError as error:
             text.write(f"REFUSED {error}")
         except BaseException as error:

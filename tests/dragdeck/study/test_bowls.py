@@ -10,9 +10,9 @@ from made_study import Made, plain_study
 from scipy.spatial import KDTree
 
 from dragdeck.errors import InputError
-from dragdeck.physics.contact_mechanics import touching
+from dragdeck.physics.contact_network import touching
 from dragdeck.physics.domain_split import FilledBowl, split
-from dragdeck.scenes.filling import first_particles
+from dragdeck.scenes.bed_space import first_particles
 from dragdeck.scenes.process import process_scene
 from dragdeck.study.bowls.bowl import Bowl
 from dragdeck.study.check import validate

@@ -24,9 +24,10 @@ from dragdeck.physics.contact_mechanics import fall_energy
 from dragdeck.physics.packing import Bed
 from dragdeck.project import Project
 from dragdeck.scenes.drop_test import DROP_TEST
-from dragdeck.scenes.filling import FILLING, filling_scene, floor_overlap
+from dragdeck.scenes.filling import FILLING, filling_scene
+from dragdeck.scenes.filling_cautions import floor_overlap
+from dragdeck.scenes.numbers import describe, workpiece_buoyancy
 from dragdeck.scenes.process import PROCESS, process_scene
-from dragdeck.scenes.workpiece import describe, workpiece_buoyancy
 from dragdeck.study.contact_law import Pair
 from dragdeck.study.workpiece import Material
 from evidence.verification.experiment import ExactPlane, PlacedSphere, collide_scene, experiment

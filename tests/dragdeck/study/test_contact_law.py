@@ -16,6 +16,7 @@ from made_study import Made
 from scipy.optimize import brentq
 
 from dragchain.run.run_parts import iter_frames
+from dragdeck.arrays import Floats
 from dragdeck.cases.case import Case
 from dragdeck.decks import DECK_FILE
 from dragdeck.decks.outputs import load_outputs
@@ -27,7 +28,8 @@ from dragdeck.engine.run_folder import run
 from dragdeck.errors import InputError
 from dragdeck.physics.contact_mechanics import effective_modulus, pull_off_force
 from dragdeck.project import Project
-from dragdeck.scenes.filling import bond_numbers, filling_scene
+from dragdeck.scenes.filling import filling_scene
+from dragdeck.scenes.filling_cautions import bond_numbers
 from dragdeck.scenes.process import SCENES, process_scene
 from dragdeck.scenes.scene import material_table
 from dragdeck.study import contact_law
@@ -35,7 +37,6 @@ from dragdeck.study.check import validate
 from dragdeck.study.contact_law import (
     Coefficient,
     Contact,
-    Floats,
     FrictionLimit,
     Pair,
     RollingModel,

@@ -14,7 +14,7 @@ from dragdeck.study import force_record
 from dragdeck.study.check import validate
 from dragdeck.study.driven import directions
 from dragdeck.study.force_record import in_words, low_passed, measured_signal
-from dragdeck.study.model import Motion
+from dragdeck.study.motion import Motion
 from dragdeck.study.reference import Signal
 from dragdeck.study.yaml import read_study
 

@@ -29,7 +29,9 @@ from dragdeck.physics.contact_mechanics import rayleigh_time
 from dragdeck.physics.packing import Bed
 from dragdeck.project import Project
 from dragdeck.records.packing import Packing
-from dragdeck.scenes.filling import expected_bed, filling_cautions, filling_scene, first_particles
+from dragdeck.scenes.bed_space import expected_bed, first_particles
+from dragdeck.scenes.filling import filling_scene
+from dragdeck.scenes.filling_cautions import filling_cautions
 from dragdeck.scenes.process import process_scene
 from dragdeck.study.media import Grains
 from dragdeck.study.shapes import SOLID_FRACTION_STD, AnyShape, ParticleShape, solid_fraction
@@ -201,15 +203,17 @@ def test_media_that_cannot_be_are_refused(
         load_cases(write_study(mixed(small, **changes)))
 
 
+@pytest.mark.parametrize("in_class", [False, True])
 def test_a_sieve_analysis_is_read_from_a_file_beside_the_study(
-    small: Small, write_study: Write
+    in_class: bool, small: Small, write_study: Write
 ) -> None:
-    media = {"material": "ceramic", "count": 50, "sieve": "sieve.csv"}
+    grains = {"material": "ceramic", "sieve": "sieve.csv"}
+    media = {"count": 50, **({"classes": {"a": grains | {"fraction": 1}}} if in_class else grains)}
     file = write_study(small | {"media": media})
     table = file.with_name("sieve.csv")
     table.write_text("diameter_m,mass_passing\n0.004,0\n0.006,0.5\n0.007,1\n")
     (case,) = load_cases(file)
-    assert case.study.media.sieve == [(0.004, 0), (0.006, 0.5), (0.007, 1)]
+    assert case.study.media.main.sieve == [(0.004, 0), (0.006, 0.5), (0.007, 1)]
     table.write_text("diameter_m,mass_passing\n0.004,0\n0.006,x\n0.007,1\n")
     with pytest.raises(InputError, match=r"sieve\.csv") as caught:
         load_cases(file)

@@ -19,12 +19,13 @@ from dragdeck.mesh.bowl_file import bowl_facets
 from dragdeck.mesh.files import stl_text
 from dragdeck.mesh.surface import open_edges, raised, surface, weld
 from dragdeck.physics import facets
-from dragdeck.physics.contact_mechanics import touching
+from dragdeck.physics.contact_network import touching
 from dragdeck.physics.domain_split import FilledBowl, split
 from dragdeck.physics.walls import Container
 from dragdeck.preview.layout import layout
 from dragdeck.project import Project
-from dragdeck.scenes.filling import FILLING, filling_scene, first_particles
+from dragdeck.scenes.bed_space import first_particles
+from dragdeck.scenes.filling import FILLING, filling_scene
 from dragdeck.scenes.process import PROCESS, process_scene
 from dragdeck.study.model import Study
 

@@ -10,7 +10,8 @@ from paths import ROOT
 
 from dragdeck.errors import InputError
 from dragdeck.study.check import validate
-from dragdeck.study.model import BUILT_IN_FIDELITIES, Study
+from dragdeck.study.fidelity import BUILT_IN_FIDELITIES
+from dragdeck.study.model import Study
 from dragdeck.study.yaml import read_study
 
 FILE = Path("study.yaml")

@@ -10,10 +10,10 @@ import pytest
 from made_scenes import script
 
 from dragdeck.project import Project
-from dragdeck.study.drive import rotated
 from dragdeck.study.driven import DrivenMotion
-from dragdeck.study.model import AnyPath, Motion
+from dragdeck.study.motion import AnyPath, Motion
 from dragdeck.study.paths.figure_eight import FigureEightPath
+from dragdeck.study.rotations import rotated
 from dragdeck.sweep.cases import load_cases
 
 POINTS = [[2, 0.001, 0, 0.002], [2.2, 0.006, 0.002], [2.3, 0.006, 0.002], [2.7, 0.001, 0.003]]

@@ -14,7 +14,7 @@ from dragdeck.errors import InputError
 from dragdeck.study import rows, table
 from dragdeck.study.force_record import in_words, read_samples
 from dragdeck.study.reference import Signal
-from dragdeck.study.table import read_table
+from dragdeck.study.table import user_table
 
 TIME, FORCE = [0.0, 0.005, 0.01, 0.015], [-0.06, 0.42, -1234.5, 2.0]
 
@@ -179,7 +179,7 @@ def test_no_digit_is_ever_lost(
     text = text.replace(".", ",") if comma else text
     file = written(tmp_path_factory.mktemp("table"), text)
     try:
-        _, (got,) = read_table(file).numbers(["fx_n"])
+        _, (got,) = user_table(file).numbers(["fx_n"])
     except InputError as error:
         assert comma and digits
         assert "decimal comma" in str(error)
@@ -265,6 +265,6 @@ def test_a_series_below_its_unit_needs_no_times(tmp_path: Path) -> None:
 def test_a_huge_file_is_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(table, "_MOST_BYTES", 10)
     with pytest.raises(InputError, match="too large"):
-        read_table(written(tmp_path, HEAD + "0,1\n"))
+        user_table(written(tmp_path, HEAD + "0,1\n"))
     with pytest.raises(InputError, match="cannot be read: No such file"):
-        read_table(tmp_path / "none.csv")
+        user_table(tmp_path / "none.csv")

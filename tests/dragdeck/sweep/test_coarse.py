@@ -8,7 +8,7 @@ from made_study import Made
 from dragdeck.cases.bed import bed_volume, expected_surface
 from dragdeck.errors import InputError
 from dragdeck.scenes.process import PROCESS, process_scene
-from dragdeck.sweep.coarse import LEAST_GAP
+from dragdeck.sweep.cases import LEAST_GAP
 
 ROOMY: dict[str, Any] = {
     "media.radius_mean_m": 1.5e-3, "media.radius_std_m": 1e-4, "media.count": 4000,

@@ -18,10 +18,12 @@ from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
 from dragdeck.outlook.process import reduced
 from dragdeck.physics.walls import Wall
-from dragdeck.scenes.filling import FILLING, expected_bed
+from dragdeck.scenes.bed_space import expected_bed
+from dragdeck.scenes.filling import FILLING
+from dragdeck.scenes.fit import clearances
 from dragdeck.scenes.moving_bowl import bed_in_motion, path_tilt_deg
 from dragdeck.scenes.process import PROCESS, process_scene
-from dragdeck.scenes.workpiece import clearances, workpiece_radius
+from dragdeck.scenes.workpiece import workpiece_radius
 from dragdeck.study.bowls.trough import TroughBowl
 from dragdeck.study.paths.line import LinePath
 from dragdeck.sweep.cases import load_cases

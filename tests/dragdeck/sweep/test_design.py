@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from dragdeck.errors import InputError
-from dragdeck.sweep.cases import Design, Variation
+from dragdeck.sweep.design import Design, Variation
 
 BASE = {"base": {"friction": 0.3}, "reference": {"vary": {"step": [0.1]}}}
 

@@ -13,9 +13,9 @@ from dragdeck.errors import InputError
 from dragdeck.mesh import checks
 from dragdeck.mesh.checks import MeshDefect
 from dragdeck.project import Project
-from dragdeck.scenes.filling import expected_bed
+from dragdeck.scenes.bed_space import expected_bed
+from dragdeck.scenes.fit import clearances, in_diameters
 from dragdeck.scenes.process import PROCESS
-from dragdeck.scenes.workpiece import clearances, in_diameters
 from dragdeck.study.workpiece import MeshShape
 from dragdeck.sweep import own_part
 from dragdeck.sweep.cases import load_cases, new_study

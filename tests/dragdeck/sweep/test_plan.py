@@ -12,7 +12,7 @@ from dragdeck.errors import InputError
 from dragdeck.project import Project
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import PROCESS, SCENES
-from dragdeck.study.model import Fidelity
+from dragdeck.study.fidelity import Fidelity
 from dragdeck.sweep.cases import load_cases
 from dragdeck.sweep.plan import Plan, Points, plan_points
 

@@ -12,7 +12,7 @@ from dragdeck.decks.templates import environment
 from dragdeck.engine.batch import Batch
 from dragdeck.errors import InputError
 from dragdeck.project import Project
-from dragdeck.scenes.filling import expected_bed
+from dragdeck.scenes.bed_space import expected_bed
 from dragdeck.scenes.motion import course
 from dragdeck.scenes.process import process_scene
 from evidence.second_engine.compare import compared, rows_of_case

@@ -6,12 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from dragdeck.physics.contact_mechanics import (
-    ContactConstants,
-    largest_eigenvalue,
-    sphere_mass,
-    touching,
-)
+from dragdeck.physics.contact_mechanics import ContactConstants, sphere_mass
+from dragdeck.physics.contact_network import largest_eigenvalue, touching
 from dragdeck.physics.walls import round_container
 from dragdeck.records.bed import MediaOfRun
 from dragdeck.records.case import CaseOfRun

@@ -10,7 +10,7 @@ from dragchain.quantities.document import EXTRAPOLATED, MEASURED_FILE, Extrapola
 from dragchain.statistics.estimate import Estimate
 from dragdeck.project import Project
 from dragdeck.scenes.process import PROCESS
-from dragdeck.study.model import Tolerance
+from dragdeck.study.fidelity import Tolerance
 from evidence.__main__ import main
 
 

@@ -21,7 +21,7 @@ from dragdeck.dumps.reader import read_dump, read_prints
 from dragdeck.errors import DragdeckError
 from dragdeck.mesh.checks import findings
 from dragdeck.mesh.files import _polygons, _triangles, read
-from dragdeck.study.table import read_table
+from dragdeck.study.table import user_table
 from dragdeck.sweep.cases import load_cases
 
 _TOKENS = [
@@ -173,7 +173,7 @@ def _try_table(folder: Path, content: bytes) -> None:
     file, names = folder / "a.csv", ["time_s", "force_n"]
     file.write_bytes(content)
     try:
-        table = read_table(file)
+        table = user_table(file)
         known = sorted(name for name in table.names if name in names) == sorted(names)
         read_lines, found = table.numbers(names) if known else ([], [])
     except DragdeckError as error:

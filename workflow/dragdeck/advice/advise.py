@@ -14,27 +14,24 @@ from dragdeck.advice.ways import Way, Ways, Work
 from dragdeck.cases.bed import expected_surface, full_stiffness_number, softest_scale, widest_skin
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
-from dragdeck.outlook.timestep import (
-    largest_fraction,
-    settling_cautions,
-    stable_fraction,
-    stable_step_cautions,
-)
+from dragdeck.outlook import timestep as timesteps
 from dragdeck.physics.contact_mechanics import FAST
 from dragdeck.physics.rounding import rounded
 from dragdeck.records.advised import AdvisedSettings
 from dragdeck.records.tradeoff import DropEntry, TradeoffRecord, measured_tradeoff
 from dragdeck.records.windows import WindowsRecord, front_of
-from dragdeck.scenes.filling import filling_cautions
+from dragdeck.scenes.filling_cautions import filling_cautions
+from dragdeck.scenes.fit import JAMMING_GAP, may_jam
 from dragdeck.scenes.lead import FIRST_WINDOWS
-from dragdeck.scenes.workpiece import JAMMING_GAP, describe, may_jam, process_cautions
-from dragdeck.study.model import (
+from dragdeck.scenes.numbers import describe
+from dragdeck.scenes.process_cautions import process_cautions
+from dragdeck.study import model as models
+from dragdeck.study.fidelity import (
     BUILT_IN_FIDELITIES,
     LARGEST_TIMESTEP_FRACTION,
     RESTITUTION,
     Fidelity,
     SoftStart,
-    Study,
     Tolerance,
     Windows,
 )
@@ -100,7 +97,7 @@ class Option:
         return text
 
 
-def with_option(study: Study, option: Option) -> Study:
+def with_option(study: models.Study, option: Option) -> models.Study:
     """A study with the settings of an option."""
     update: dict[str, object] = {"fidelity": option.fidelity}
     if (fraction := option.drop_timestep_fraction) is not None:
@@ -115,7 +112,7 @@ def consistent(case: Case) -> Fidelity:
     change the process. Warnings that remain are about the scene itself.
     """
     fidelity, lowest = case.study.chosen_fidelity(), describe(case)["lowest_restitution"]
-    filling = min(fidelity.filling_timestep_fraction, largest_fraction("settle", lowest))
+    filling = min(fidelity.filling_timestep_fraction, timesteps.largest_fraction("settle", lowest))
     remedy: Mapping[str, float] = {
         "youngs_modulus_scale": max(fidelity.youngs_modulus_scale, softest_scale(case.study)),
         "filling_timestep_fraction": filling,
@@ -129,8 +126,8 @@ def consistent(case: Case) -> Fidelity:
 
 def _remedies(case: Case) -> Iterator[Mapping[str, float]]:
     """What checks that a case's settings do not pass take; the next one may need less after it."""
-    stable = stable_step_cautions(case, surely=True)
-    settling = settling_cautions(case)
+    stable = timesteps.stable_step_cautions(case, surely=True)
+    settling = timesteps.settling_cautions(case)
     cautions = chain(filling_cautions(case), settling, process_cautions(case), stable)
     yield from (caution.settings for caution in cautions if caution.settings)
 
@@ -151,13 +148,13 @@ def soft_settings(case: Case) -> Fidelity:
     """Those of the soft run from which others go on, with its largest stable step."""
     scale = min((_SOFT_STIFFNESS / full_stiffness_number(case.study)) ** 1.5, 1.0)
     scale = max(rounded(scale, up=True), softest_scale(case.study))
-    stable = stable_fraction(_with(case, youngs_modulus_scale=scale))
+    stable = timesteps.stable_fraction(_with(case, youngs_modulus_scale=scale))
     return consistent(_with(case, youngs_modulus_scale=scale, timestep_fraction=_step(stable)))
 
 
 def stiff_settings(case: Case) -> Fidelity:
     """Those of a run at the physical modulus, begun softer if that saves anything."""
-    stable = _step(stable_fraction(_with(case), math.log(_STABILITY_NUMBER)))
+    stable = _step(timesteps.stable_fraction(_with(case), math.log(_STABILITY_NUMBER)))
     if describe(case)["inertial_number"] > FAST:
         stable = min(stable, _PLAIN_FRACTION)
     chosen = consistent(_with(case, timestep_fraction=stable))
@@ -216,7 +213,7 @@ def finest_drop(case: Case, tradeoff: TradeoffRecord) -> Option:
 def _beside_drop(case: Case) -> tuple[Fidelity, float]:
     """If the drop test is asked about: settings of the process, and largest step of the drop."""
     named = {**BUILT_IN_FIDELITIES, **case.study.fidelities}[_PROCESS_OF_DROP]
-    limit = largest_fraction("impact", describe(case)["lowest_restitution"])
+    limit = timesteps.largest_fraction("impact", describe(case)["lowest_restitution"])
     study = case.study.model_copy(update={"fidelity": named})
     return consistent(replace(case, study=study)), limit
 

@@ -20,7 +20,7 @@ from dragdeck.scenes.drop_test import DROP_TEST
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.lead import FIRST_WINDOWS, with_leads
 from dragdeck.scenes.process import PROCESS, process_scene
-from dragdeck.study.model import RESTITUTION, Tolerance
+from dragdeck.study.fidelity import RESTITUTION, Tolerance
 
 _DEFAULT_TOLERANCE = Tolerance(tolerance=0.1)
 """What is advised for where a study asks for nothing."""

@@ -10,9 +10,9 @@ from dragdeck.errors import InputError
 from dragdeck.records.advice import WayEntry
 from dragdeck.records.tradeoff import TradeoffRecord
 from dragdeck.records.windows import WindowsRecord, front_of
-from dragdeck.scenes.workpiece import describe
+from dragdeck.scenes.numbers import describe
 from dragdeck.study.reduction import Reduction
-from dragdeck.sweep.coarse import with_larger_particles
+from dragdeck.sweep.cases import with_larger_particles
 from dragdeck.sweep.cut_out import with_cut_out
 
 _FACTORS = 1.5, 2.0

@@ -11,18 +11,12 @@ from dragdeck.cases.bed import bed_timestep, expected_surface, full_stiffness_nu
 from dragdeck.cases.case import Case, of_each_workpiece
 from dragdeck.records.tradeoff import TradeoffRecord
 from dragdeck.records.windows import Known, WindowsRecord, softening
+from dragdeck.scenes import lead as leads
+from dragdeck.scenes.bed_space import particles_step_s
 from dragdeck.scenes.filling import FILLING, expected_time
-from dragdeck.scenes.lead import (
-    FIRST_WINDOWS,
-    counted_blocks,
-    covered_fraction,
-    window_count,
-    window_fraction,
-)
-from dragdeck.scenes.motion import plunge_point
-from dragdeck.scenes.scene import particles_step_s
 from dragdeck.scenes.workpiece import FACET_STEP_S, PARTICLE_STEPS_PER_S, workpiece_facets
-from dragdeck.study.model import Fidelity, Study, Tolerance
+from dragdeck.study.fidelity import Fidelity, Tolerance
+from dragdeck.study.model import Study
 
 
 @dataclass(frozen=True)
@@ -51,7 +45,7 @@ class Work:
     def of(cls, case: Case, tradeoff: TradeoffRecord) -> "Work":
         """Of a case; its own fidelity does not matter."""
         study, motion = case.study, case.study.motion
-        way = math.dist(plunge_point(motion), motion.path.start_point)
+        way = math.dist(motion.plunge_point, motion.path.start_point)
         entry_s = (
             expected_surface(study) / motion.plunge_speed_m_s + way / motion.approach_speed_m_s
         )
@@ -69,7 +63,7 @@ class Work:
             How many are run, if the settings have any.
         """
         study = self.study.model_copy(update={"fidelity": fidelity})
-        start, entry = study.at_start(), covered_fraction(study)
+        start, entry = study.at_start(), leads.covered_fraction(study)
         drag_s = self.process_s - self.entry_s
         softer = self.entry_s + entry * drag_s
         steps = self._steps(start, softer) + self._steps(study, self.process_s - softer)
@@ -81,7 +75,7 @@ class Work:
                 }
             )
             stiffer = self.study.model_copy(update={"fidelity": stiff})
-            steps += windows * self._steps(stiffer, window_fraction(study) * drag_s)
+            steps += windows * self._steps(stiffer, leads.window_fraction(study) * drag_s)
         return steps
 
     def cpu_time(self, fidelity: Fidelity, windows: int = 0) -> float:
@@ -174,7 +168,7 @@ class Ways:
     @cached_property
     def most(self) -> int:
         """How many windows there can be."""
-        return window_count(self._study)
+        return leads.window_count(self._study)
 
     @property
     def of_other_scenes(self) -> Way:
@@ -208,14 +202,14 @@ class Ways:
     @cached_property
     def enough_windows(self) -> Way | None:
         """With the fewest windows that are expected to do; None if none are."""
-        for count in range(FIRST_WINDOWS, self.most + 1):
+        for count in range(leads.FIRST_WINDOWS, self.most + 1):
             if self._windows_half_width(count) <= self.asked.tolerance:
                 return self.with_windows(count)
         return None
 
     def __iter__(self) -> Iterator[Way]:
         yield self.of_other_scenes
-        counts = {FIRST_WINDOWS, self.most}
+        counts = {leads.FIRST_WINDOWS, self.most}
         if enough := self.enough_windows:
             counts.add(enough.windows)
         yield from map(self.with_windows, sorted(counts))
@@ -239,7 +233,7 @@ class Ways:
     @cached_property
     def _blocks(self) -> tuple[float, float]:
         """Blocks of the counted path, and of a window's sample."""
-        return counted_blocks(self._study)
+        return leads.counted_blocks(self._study)
 
     def _largest(self, half_width: Callable[[Known], float]) -> float:
         """The largest half-width of the quantities."""

@@ -11,7 +11,7 @@ from dragdeck.arrays import Floats, Ints
 from dragdeck.audit.materials import ScriptMaterials, radii_of, types_of
 from dragdeck.audit.walls import WallAtStep, Walls, speeds
 from dragdeck.dumps.frame import Frame
-from dragdeck.physics.contact_mechanics import network_number, touching
+from dragdeck.physics.contact_network import network_number, touching
 from dragdeck.physics.coulomb import within_friction
 from dragdeck.physics.run_limits import run_limits, thrown_speed
 from dragdeck.script.facts import Facts

@@ -13,7 +13,7 @@ from dragdeck.errors import InputError
 from dragdeck.physics.facets import nearest_of
 from dragdeck.physics.walls import from_primitive
 from dragdeck.script.facts import Facts, Fix, as_numbers
-from dragdeck.study.drive import by_vector
+from dragdeck.study.rotations import by_vector
 
 Place = Callable[[Floats, float], Floats]
 """Points of a wall, (..., 3), at a time step."""

@@ -5,6 +5,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from dragdeck.arrays import Floats
 from dragdeck.errors import InputError
 from dragdeck.mesh.clump import SPHERE, Clump, fit_clump
 from dragdeck.physics.contact_mechanics import (
@@ -18,7 +19,7 @@ from dragdeck.physics.contact_mechanics import (
 from dragdeck.physics.rounding import round_to, rounded, timestep
 from dragdeck.physics.run_limits import ENGINE_SOFTEST_PA
 from dragdeck.records.bed import BodiesOfRun
-from dragdeck.study.media import LEVELS, Array, Media, few_sizes
+from dragdeck.study.media import LEVELS, Media, few_sizes
 from dragdeck.study.model import Study
 from dragdeck.study.shapes import AnyShape
 from dragdeck.study.workpiece import Material
@@ -47,7 +48,7 @@ class BedClass:
 
     name: str
     material: str
-    radii_m: Array
+    radii_m: Floats
     clump: Clump = SPHERE
 
 
@@ -134,7 +135,7 @@ def body_sizes(study: Study) -> list[BodySize]:
     return sizes
 
 
-def bed_radii(study: Study) -> Array:
+def bed_radii(study: Study) -> Floats:
     """Radii of a study's particles, class by class and ascending in each, (count,), m."""
     return np.concatenate([class_.radii_m for class_ in bed_classes(study)])
 

@@ -11,7 +11,8 @@ from typing import Any
 from dragdeck.cases.ranks import auto_ranks, cores_here, ranks_within
 from dragdeck.records.advised import AdvisedSettings
 from dragdeck.study.base import Json
-from dragdeck.study.model import Study, Tolerance
+from dragdeck.study.fidelity import Tolerance
+from dragdeck.study.model import Study
 from dragdeck.study.workpiece import MeshShape
 from dragdeck.study.yaml import mesh_beside
 

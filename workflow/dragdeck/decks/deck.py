@@ -11,14 +11,7 @@ from dragdeck.physics.domain_split import ENGINE_CHOOSES
 from dragdeck.physics.rounding import round_to
 from dragdeck.physics.run_limits import ENGINE_HARD_PA, ENGINE_NEIGHBOURS
 from dragdeck.records.run import CaseFile
-from dragdeck.study.contact_law import (
-    Contact,
-    Pair,
-    contact_model,
-    contact_settings,
-    present,
-    softened,
-)
+from dragdeck.study import contact_law as contact_laws
 
 
 @dataclass(frozen=True)
@@ -86,7 +79,7 @@ class Materials:
             replace(
                 table,
                 values=[
-                    softened(coefficient, table.modulus_power, scale)
+                    contact_laws.softened(coefficient, table.modulus_power, scale)
                     for coefficient in table.values
                 ],
             )
@@ -96,14 +89,18 @@ class Materials:
         return Properties(moduli, tables)
 
 
-def contact_law(pairs: Sequence[Sequence[Pair]], contact: Contact) -> ContactLaw:
+def contact_law(
+    pairs: Sequence[Sequence[contact_laws.Pair]], contact: contact_laws.Contact
+) -> ContactLaw:
     """The contact law of a square table of pairs: a row and a column for each type."""
     every = [pair for row in pairs for pair in row]
     tables = [
         PairTable(name, row.engine, [getattr(pair, name) for pair in every], row.modulus_power)
-        for name, row in present(every).items()
+        for name, row in contact_laws.present(every).items()
     ]
-    return ContactLaw(tables, contact_model(every, contact), contact_settings(every))
+    return ContactLaw(
+        tables, contact_laws.contact_model(every, contact), contact_laws.contact_settings(every)
+    )
 
 
 NOT_OF_LIQUID = (

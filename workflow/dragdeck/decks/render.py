@@ -8,18 +8,9 @@ from pathlib import Path
 import jinja2
 
 from dragdeck.decks import CASE_FILE, COLUMNS_FILE, DECK_FILE, END, OUTCOME_FILE, RUN_FILE
+from dragdeck.decks import templates as deck_templates
 from dragdeck.decks.deck import AnyScene
 from dragdeck.decks.outputs import WORKPIECE_FORCE, ColumnsFile, in_writing_order
-from dragdeck.decks.templates import (
-    edited,
-    file_of,
-    own_blocks,
-    replaced,
-    template_errors,
-    used,
-    without,
-    without_block,
-)
 from dragdeck.errors import InputError
 from dragdeck.files import file_checksum, write_text
 from dragdeck.script.commands import (
@@ -49,7 +40,7 @@ def deck_text(scene: AnyScene, templates: jinja2.Environment) -> str:
     """
     names = ", ".join(_used(scene, templates))
     text = _rendered(scene, templates, names)
-    file = file_of(templates, scene.template)
+    file = deck_templates.file_of(templates, scene.template)
     if f'\nprint "{END}"\n' not in text or not all(c.isprintable() or c in "\n\t" for c in text):
         raise InputError(
             "the input script is not printable text, or lacks its last command",
@@ -75,19 +66,19 @@ def deck_text(scene: AnyScene, templates: jinja2.Environment) -> str:
                 remedy="write the block contact_model in this order",
             )
     if overriding(scene, templates) and scene.override is None:
-        _check_outputs(scene, text, _rendered(scene, without(templates)), file)
+        _check_outputs(scene, text, _rendered(scene, deck_templates.without(templates)), file)
     return text
 
 
 def _used(scene: AnyScene, templates: jinja2.Environment) -> list[str]:
-    with template_errors(scene.template):
-        return used(templates, scene.template)
+    with deck_templates.template_errors(scene.template):
+        return deck_templates.used(templates, scene.template)
 
 
 def _rendered(scene: AnyScene, templates: jinja2.Environment, names: str = "") -> str:
     """A deck, whose header names these templates."""
     deck = replace(scene.deck, templates=names, outputs=in_writing_order(scene.deck.outputs))
-    with template_errors(scene.template):
+    with deck_templates.template_errors(scene.template):
         return templates.get_template(scene.template).render(deck=deck)
 
 
@@ -118,7 +109,7 @@ def _check_outputs(scene: AnyScene, text: str, original: str, file: Path) -> Non
 
 def overriding(scene: AnyScene, templates: jinja2.Environment) -> set[str]:
     """Names of the project's templates in whose place a scene uses a study's own."""
-    return {name for name in _used(scene, templates) if replaced(templates, name)}
+    return {name for name in _used(scene, templates) if deck_templates.replaced(templates, name)}
 
 
 def _added_forces(text: str) -> list[str]:
@@ -131,7 +122,7 @@ def of_its_templates(
     text: str, scene: AnyScene, templates: jinja2.Environment
 ) -> dict[str, tuple[str, ...]]:
     """What ``case.json`` says of the deck of a scene, `text`, and what templates change in it."""
-    original = _rendered(scene, without(templates))
+    original = _rendered(scene, deck_templates.without(templates))
     law, limit = scene.deck.materials.law, ["limitForce on"] if scene.deck.limit_force else []
     options = [*limit, *law.settings]
     unchanged = {
@@ -177,12 +168,18 @@ def changed_scripts(text: str, scene: AnyScene, templates: jinja2.Environment) -
 
     changed = []
     for name in sorted(overriding(scene, templates)):
-        if changes(without(templates, name)):
-            blocks = own_blocks(templates, name)
-            named = [block for block in blocks if changes(without_block(templates, name, block))]
+        if changes(deck_templates.without(templates, name)):
+            blocks = deck_templates.own_blocks(templates, name)
+            named = [
+                block
+                for block in blocks
+                if changes(deck_templates.without_block(templates, name, block))
+            ]
             changed.append(f"{name} ({', '.join(named)})" if named else name)
     names = _used(scene, templates)
-    return *changed, *(f"templates/{name} of the project" for name in edited(templates, names))
+    return *changed, *(
+        f"templates/{name} of the project" for name in deck_templates.edited(templates, names)
+    )
 
 
 def write_workpiece(

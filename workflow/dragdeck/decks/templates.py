@@ -101,7 +101,7 @@ def environment(project: Path, study: Path | None = None) -> jinja2.Environment:
     )
     for name in _TRUSTING:
         del sandbox.filters[name]
-    sandbox.filters.update(num=exact_number, nums=numbers, comment=comment)
+    sandbox.filters.update(num=exact_number, nums=exact_numbers, comment=comment)
     if folders and study is not None:
         with template_errors(study):
             _check_own(sandbox, study, project)
@@ -115,7 +115,7 @@ def exact_number(value: float) -> str:
     return repr(value if isinstance(value, int) else float(value))
 
 
-def numbers(values: Iterable[float]) -> str:
+def exact_numbers(values: Iterable[float]) -> str:
     """Numbers that read back exactly, with spaces between."""
     return " ".join(exact_number(value) for value in values)
 

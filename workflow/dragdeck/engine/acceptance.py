@@ -12,14 +12,13 @@ from dragdeck.decks.outputs import WORKPIECE_FORCE, OutputOfRun
 from dragdeck.engine import log
 from dragdeck.engine.checkpoints import is_whole
 from dragdeck.engine.completeness import coverage, part_files, some_frames
-from dragdeck.physics.contact_mechanics import stability_number
+from dragdeck.physics.contact_network import stability_number
 from dragdeck.physics.rigid import RigidBodies, pose
 from dragdeck.physics.run_limits import SPEED_FACTOR
 from dragdeck.records.bed import CaseOfBed
 from dragdeck.records.run import (
     AcceptanceCheck,
     CaseFile,
-    CheckCode,
     CheckReason,
     Decomposition,
     RunPart,
@@ -81,26 +80,6 @@ def check_run(
     return checks
 
 
-def _check(
-    code: CheckCode,
-    name: str,
-    passed: bool,
-    seen: str,
-    limit: str,
-    reason: CheckReason | None = None,
-    number: float | None = None,
-) -> AcceptanceCheck:
-    return AcceptanceCheck(
-        code=code,
-        reason=None if passed else reason,
-        name=name,
-        passed=passed,
-        seen=seen,
-        limit=limit,
-        number=number if number is not None and math.isfinite(number) else None,
-    )
-
-
 def _text(file: Path) -> str:
     return file.read_text(encoding="utf-8", errors="replace") if file.is_file() else ""
 
@@ -109,7 +88,7 @@ def _ended(screen: str, exit_status: int) -> AcceptanceCheck:
     at_end = log.reached_end(screen)
     seen = f"exit status {exit_status}, end {'reached' if at_end else 'not reached'}"
     passed = at_end and exit_status == 0
-    return _check("ended", "LIGGGHTS ended normally", passed, seen, "exit status 0, end reached")
+    return AcceptanceCheck.of("ended", passed, seen, "exit status 0, end reached")
 
 
 def _no_errors(
@@ -121,7 +100,7 @@ def _no_errors(
     if "Lost atoms" in seen:
         seen += _through_the_top(folder, outputs, parts, screen)
         reason = "lost_particles"
-    return _check("no_engine_error", "no LIGGGHTS error", not errors, seen, "none", reason)
+    return AcceptanceCheck.of("no_engine_error", not errors, seen, "none", reason)
 
 
 def _through_the_top(
@@ -148,7 +127,7 @@ def _through_the_top(
 
 def _at_rest(screen: str) -> AcceptanceCheck:
     rests, seen = log.settling(screen)
-    return _check("at_rest", "packing settled", rests, seen, "SETTLED")
+    return AcceptanceCheck.of("at_rest", rests, seen, "SETTLED")
 
 
 def _steady(samples: Sequence[log.Sample], asked: SteadyCriterion) -> AcceptanceCheck:
@@ -161,13 +140,13 @@ def _steady(samples: Sequence[log.Sample], asked: SteadyCriterion) -> Acceptance
     seen = f"mean kinetic energy changes by {100 * drift:.2g} % during the statistics"
     limit = f"at most {100 * asked.energy_drift:g} %"
     passed = drift <= asked.energy_drift
-    return _check("steady_bed", "packing in steady motion", passed, seen, limit, number=drift)
+    return AcceptanceCheck.of("steady_bed", passed, seen, limit, number=drift)
 
 
 def _packing(file: Path, particles: int, ranks: int) -> AcceptanceCheck:
     whole = file.is_file() and is_whole(file, particles, ranks)
     seen = "all particles present" if whole else f"{file.name} is missing or truncated"
-    return _check("packing_whole", "packing complete", whole, seen, f"{particles} particles")
+    return AcceptanceCheck.of("packing_whole", whole, seen, f"{particles} particles")
 
 
 def _in_bowl(
@@ -183,16 +162,15 @@ def _in_bowl(
     beyond = int((CaseOfBed.read(folder / CASE_FILE).bowl.distance(centres) <= 0).sum())
     seen, limit = f"highest point {top:.4g} m", f"rim of the bowl, {highest_m:.4g} m"
     seen += f", {beyond} particles beyond a wall" if beyond else ""
-    name = "packing within the bowl"
     passed = top <= highest_m and not beyond
-    return [_check("packing_in_bowl", name, passed, seen, limit, number=top)]
+    return [AcceptanceCheck.of("packing_in_bowl", passed, seen, limit, number=top)]
 
 
 def _samples(folder: Path, output: OutputOfRun, parts: Sequence[RunPart]) -> list[log.Sample]:
     """All whole rows of all parts."""
     texts = [_text(folder / output.pattern.format(part=part.part)) for part in parts]
     return [
-        sample for text in texts for sample in log.read_samples(text.splitlines(), output.columns)
+        sample for text in texts for sample in log.thermo_samples(text.splitlines(), output.columns)
     ]
 
 
@@ -201,8 +179,8 @@ def _thermo(samples: list[log.Sample], count: int) -> list[AcceptanceCheck]:
     fewest = min((sample.n_particles for sample in samples), default=0)
     seen, limit = f"smallest number of particles {fewest}", f"{count} particles"
     return [
-        _check("particles_kept", "no particle lost", fewest == count, seen, limit),
-        _check("finite_numbers", "finite numbers", finite, f"{len(samples)} thermo rows", "no NaN"),
+        AcceptanceCheck.of("particles_kept", fewest == count, seen, limit),
+        AcceptanceCheck.of("finite_numbers", finite, f"{len(samples)} thermo rows", "no NaN"),
     ]
 
 
@@ -225,7 +203,7 @@ def _thrown(
         f"{limit_m_s:.3g} m/s, a fall through the simulation box plus {SPEED_FACTOR:g} times the "
         "largest speed of the scene"
     )
-    return _check("none_thrown", "no particle thrown", passed, seen, limit, number=fastest)
+    return AcceptanceCheck.of("none_thrown", passed, seen, limit, number=fastest)
 
 
 def _complete(
@@ -247,7 +225,7 @@ def _complete(
     else:
         passed = True
     limit = "every frame complete" if output.last_step is None else f"to step {output.last_step}"
-    return _check("output_complete", f"output {name} complete", passed, seen, limit)
+    return AcceptanceCheck.of("output_complete", passed, seen, limit, output=name)
 
 
 def _stable_timestep(
@@ -265,7 +243,7 @@ def _stable_timestep(
         limit = f"1; exceeded on purpose: {reason}" if reason else f"1; {stable}"
     seen = f"stability number {number:.3g} of the contacts, median of {len(numbers)} frames"
     passed, median = number <= 1 or bool(reason), number if numbers else None
-    return _check("stable_timestep", "stable time step", passed, seen, limit, number=median)
+    return AcceptanceCheck.of("stable_timestep", passed, seen, limit, number=median)
 
 
 def _stability_number(case: CaseOfBed, step: int, rows: Floats) -> float:
@@ -316,4 +294,4 @@ def ranks_check(split: Decomposition | None, ranks: int) -> AcceptanceCheck:
             least, most = split.particles.least, split.particles.most
             seen += f", {least:,} to {most:,} particles per rank"
     limit = f"{ranks} rank{'s' if ranks > 1 else ''}"
-    return _check("ranks", "MPI ranks as requested", passed, seen, limit)
+    return AcceptanceCheck.of("ranks", passed, seen, limit)

@@ -100,7 +100,7 @@ class Sample:
         )
 
 
-def read_samples(rows: Sequence[str], columns: Sequence[str]) -> list[Sample]:
+def thermo_samples(rows: Sequence[str], columns: Sequence[str]) -> list[Sample]:
     """Rows of a ``thermo`` file; headers, and a row that was cut short, are left out."""
     samples = []
     for row in rows:
@@ -130,7 +130,8 @@ def breach(samples: Sequence[Sample], limits: RunLimits) -> AcceptanceCheck | No
         past = _past(sample, limits)
         if past is not None:
             reason, seen, limit = past
-            return _within_limits(False, f"{seen} at step {sample.step:,}", limit, reason)
+            when = f"{seen} at step {sample.step:,}"
+            return AcceptanceCheck.of("within_limits", False, when, limit, reason)
     return None
 
 
@@ -153,17 +154,5 @@ def _past(sample: Sample, limits: RunLimits) -> tuple[CheckReason, str, str] | N
 def within(limits: RunLimits) -> AcceptanceCheck:
     """The acceptance check of a run that passed no limit."""
     most = limits.mean_kinetic_energy_j
-    return _within_limits(True, "no limit exceeded", f"{most:.3g} J per particle, {limits.why}")
-
-
-def _within_limits(
-    passed: bool, seen: str, limit: str, reason: CheckReason | None = None
-) -> AcceptanceCheck:
-    return AcceptanceCheck(
-        code="within_limits",
-        reason=reason,
-        name="energy and speed within limits",
-        passed=passed,
-        seen=seen,
-        limit=limit,
-    )
+    limit = f"{most:.3g} J per particle, {limits.why}"
+    return AcceptanceCheck.of("within_limits", True, "no limit exceeded", limit)

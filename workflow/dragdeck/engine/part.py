@@ -8,14 +8,8 @@ from pathlib import Path
 
 from dragdeck.decks import DECK_FILE
 from dragdeck.decks.outputs import ColumnsFile
-from dragdeck.engine import log
+from dragdeck.engine import checkpoints, log
 from dragdeck.engine.acceptance import check_run
-from dragdeck.engine.checkpoints import (
-    checkpoint_files,
-    checkpoint_step,
-    newest_checkpoint,
-    take_forced_restarts,
-)
 from dragdeck.engine.completeness import cut_outputs, first_gap, part_files
 from dragdeck.engine.process import Ending, Engine, command, execute, keeps_last_words, last_words
 from dragdeck.engine.reports import Report
@@ -23,7 +17,7 @@ from dragdeck.engine.space import SPARE_BYTES, check_space, free_bytes, space_le
 from dragdeck.engine.watch import EngineEnded, LimitMet, Watcher, cut_screen
 from dragdeck.errors import EngineError, RejectedRunError
 from dragdeck.records.run import (
-    REMEDIES,
+    CHECKS,
     AcceptanceCheck,
     CaseFile,
     CheckCode,
@@ -111,8 +105,8 @@ class PartOfRun:
         count, ranks = self.inputs.media.n_spheres, self.inputs.fidelity.ranks
         check_space(self.folder, outputs, count)
         gap = first_gap(self.folder, outputs, parts) if parts else -1
-        newest = newest_checkpoint(self.folder, count, ranks, gap, self.report)
-        first = checkpoint_step(newest) if newest else self.inputs.entry_step
+        newest = checkpoints.newest_checkpoint(self.folder, count, ranks, gap, self.report)
+        first = checkpoints.checkpoint_step(newest) if newest else self.inputs.entry_step
         for damage in cut_outputs(self.folder, outputs, parts, first if newest else -1):
             self.report(f"{damage}; the run writes it again from step {first:,}")
         checkpoint = newest.name if newest else None
@@ -167,7 +161,7 @@ class PartOfRun:
 
     def _conclude(self, ending: Ending) -> RunRecord:
         screen = self._screen.read_text(errors="replace")
-        asked = take_forced_restarts(self.folder) or ending.asked
+        asked = checkpoints.take_forced_restarts(self.folder) or ending.asked
         why = None if log.reached_end(screen) else self._interruption(screen, asked, ending)
         if why is not None:
             raise self._stopped(why)
@@ -182,7 +176,7 @@ class PartOfRun:
         )
         self._refuse_new_gap(checks)
         self._judge(checks)
-        for checkpoint in checkpoint_files(self.folder):
+        for checkpoint in checkpoints.checkpoint_files(self.folder):
             checkpoint.unlink()
         steps, wall_s = self._record.steps, self._record.wall_time_s
         self.report(f"complete: {steps:,} steps in {wall_s:.1f} s")
@@ -228,7 +222,7 @@ class PartOfRun:
         """Note the checks, and that the run is complete or failed."""
         passed, told = all(check.passed for check in checks), causes(checks)
         checks = [
-            check.model_copy(update={"remedy": REMEDIES.get(check.code)})
+            check.model_copy(update={"remedy": CHECKS[check.code]["remedy"] or None})
             if check in told
             else check
             for check in checks
@@ -248,12 +242,12 @@ class PartOfRun:
         count, ranks = self.inputs.media.n_spheres, self._record.ranks
         parts = self._record.parts
         gap = first_gap(self.folder, self.columns.outputs, parts)
-        newest = newest_checkpoint(self.folder, count, ranks, gap, self.report)
+        newest = checkpoints.newest_checkpoint(self.folder, count, ranks, gap, self.report)
         lines = [f"{self.folder}: {why}", f"  log:    {self._screen}"]
         if newest is None:
             lines.append(f"  remedy: {first}run it again from its start: no usable checkpoint")
         else:
-            lines.append(f"  value:  checkpoint at step {checkpoint_step(newest):,}")
+            lines.append(f"  value:  checkpoint at step {checkpoints.checkpoint_step(newest):,}")
             lines.append(f"  remedy: {first}run it again; it resumes from there")
         return EngineError("\n".join(lines))
 

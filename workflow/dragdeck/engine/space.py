@@ -86,13 +86,20 @@ def check_space(folder: Path, outputs: Mapping[str, OutputOfRun], particles: int
     EngineError
         Less is free than the run will still write by the definition of its outputs.
     """
+    if free_bytes(folder) < _still_needed(folder, outputs, particles):
+        problem = f"{folder}: too little disk space for this run"
+        raise _too_little(problem, folder, outputs, particles)
+
+
+def _too_little(
+    problem: str, folder: Path, outputs: Mapping[str, OutputOfRun], particles: int, then: str = ""
+) -> EngineError:
     free, needed = free_bytes(folder), _still_needed(folder, outputs, particles)
-    if free < needed:
-        raise EngineError(
-            f"{folder}: too little disk space for this run\n  value:  {shown_bytes(free)} free\n"
-            f"  limit:  {shown_bytes(needed)}, estimated from its outputs\n"
-            "  remedy: free disk space, or reduce the rates under outputs in the study"
-        )
+    return EngineError(
+        f"{problem}\n  value:  {shown_bytes(free)} free\n"
+        f"  limit:  {shown_bytes(needed)}, estimated from its outputs\n"
+        f"  remedy: free disk space, or reduce the rates under outputs in the study{then}"
+    )
 
 
 @contextlib.contextmanager
@@ -111,14 +118,9 @@ def full_disk_named(
     except OSError as error:
         if error.errno not in FULL_DISK:
             raise
-        free, needed = free_bytes(folder), _still_needed(folder, outputs, particles)
-        raise EngineError(
-            f"{error.filename or folder}: the disk is full ({error.strerror})\n"
-            f"  value:  {shown_bytes(free)} free\n"
-            f"  limit:  {shown_bytes(needed)}, estimated from its outputs\n"
-            "  remedy: free disk space, or reduce the rates under outputs in the study; "
-            "then run it again"
-        ) from None
+        problem = f"{error.filename or folder}: the disk is full ({error.strerror})"
+        again = "; then run it again"
+        raise _too_little(problem, folder, outputs, particles, again) from None
 
 
 def space_left(folder: Path, outputs: Mapping[str, OutputOfRun], particles: int) -> str:

@@ -1,6 +1,9 @@
 """How far the run in a folder is, as its records and LIGGGHTS' outputs say, whoever runs it."""
 
 import re
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -8,11 +11,11 @@ from typing import Literal
 from dragdeck.decks import CASE_FILE, COLUMNS_FILE
 from dragdeck.decks.outputs import ColumnsFile
 from dragdeck.engine.completeness import part_files
-from dragdeck.engine.log import Sample, last_step, read_samples
+from dragdeck.engine.log import Sample, last_step, thermo_samples
 from dragdeck.engine.part import STATE_FILE, why_rejected
-from dragdeck.engine.process import is_held
+from dragdeck.engine.process import find_engine, is_held
 from dragdeck.engine.reports import printable
-from dragdeck.errors import InputError
+from dragdeck.errors import DragdeckError, EngineError, InputError
 from dragdeck.physics.contact_mechanics import fall_energy
 from dragdeck.records.bed import CaseOfBed
 from dragdeck.records.run import CaseFile, RunRecord
@@ -115,7 +118,7 @@ def _newest(folder: Path, record: RunRecord) -> tuple[Sample | None, float]:
     (file,) = part_files(folder, {"thermo": thermo}, [record.last_part])
     if not file.is_file():
         return None, 0.0
-    rows = read_samples(_tail(file).splitlines(), thermo.columns)
+    rows = thermo_samples(_tail(file).splitlines(), thermo.columns)
     seconds = file.stat().st_mtime - (folder / STATE_FILE).stat().st_mtime
     return (rows[-1] if rows else None), seconds
 
@@ -151,3 +154,20 @@ def _tail(file: Path) -> str:
     with file.open("rb") as stream:
         stream.seek(max(0, file.stat().st_size - _TAIL_BYTES))
         return stream.read().decode("utf-8", errors="replace")
+
+
+def other_engines(records: Iterable[Path]) -> Iterator[str]:
+    """What to say of runs, by their ``run.json``, that another LIGGGHTS made than is here."""
+    made = Counter[str]()
+    for file in records:
+        with suppress(DragdeckError):
+            made[RunRecord.read(file).engine_version] += 1
+    try:
+        here = find_engine().version if made else ""
+    except EngineError:
+        return
+    for version in sorted({*made} - {here}):
+        yield (
+            f"LIGGGHTS {version} made {made[version]} run(s), which LIGGGHTS {here} would not "
+            "make anew; remove their folders if it should"
+        )

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from dragdeck.engine.checkpoints import drop_old_checkpoints, name_whole_checkpoints
-from dragdeck.engine.log import Sample, breach, read_samples
+from dragdeck.engine.log import Sample, breach, thermo_samples
 from dragdeck.engine.reports import shown_bytes
 from dragdeck.engine.space import SPARE_BYTES, free_bytes, size_of
 from dragdeck.physics.run_limits import RunLimits
@@ -100,7 +100,7 @@ class Watcher:
             stream.seek(self._place)
             new, end, _ = stream.read().rpartition(b"\n")
         self._place += len(new) + len(end)
-        samples = read_samples(new.decode("ascii", errors="replace").splitlines(), self.columns)
+        samples = thermo_samples(new.decode("ascii", errors="replace").splitlines(), self.columns)
         self._newest = samples[-1] if samples else self._newest
         return samples
 

@@ -11,7 +11,8 @@ from rich.console import Console
 from rich.table import Table
 
 from dragdeck.records.tradeoff import CostEntry, TradeoffRecord
-from dragdeck.scenes.scene import SceneType, StudyScene, particles_step_s
+from dragdeck.scenes.bed_space import particles_step_s
+from dragdeck.scenes.scene import SceneType, StudyScene
 from dragdeck.scenes.workpiece import FACET_STEP_S
 
 

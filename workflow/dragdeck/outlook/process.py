@@ -12,9 +12,12 @@ from dragdeck.physics.contact_mechanics import (
     effective_modulus,
     impact_overlap,
 )
-from dragdeck.scenes.filling import MOST_OVERLAP, expected_bed, floor_overlap, rank_split
+from dragdeck.scenes.bed_space import expected_bed, rank_split
+from dragdeck.scenes.filling_cautions import MOST_OVERLAP, floor_overlap
+from dragdeck.scenes.fit import clearances, closest, in_diameters
 from dragdeck.scenes.moving_bowl import bed_in_motion
-from dragdeck.scenes.workpiece import clearances, closest, describe, fastest_surface, in_diameters
+from dragdeck.scenes.numbers import describe
+from dragdeck.scenes.workpiece import fastest_surface
 from dragdeck.study.contact_law import compared_labels
 
 _RATIOS = {

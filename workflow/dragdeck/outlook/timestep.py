@@ -12,22 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dragdeck.cases.bed import (
-    bed_density,
-    floor_pressure,
-    particle_material,
-    smallest_radius,
-    tip_pressure,
-)
+from dragdeck.cases import bed as beds
 from dragdeck.cases.case import Case
 from dragdeck.errors import Caution, InputError
-from dragdeck.physics.contact_mechanics import (
-    effective_modulus,
-    hertz_contact_time,
-    particle_mass,
-    rayleigh_time,
-    stiffness_number,
-)
+from dragdeck.physics import contact_mechanics as mechanics
 from dragdeck.physics.estimates import SOLID_FRACTION_ESTIMATE
 from dragdeck.physics.rounding import rounded
 from dragdeck.records.stability import RestitutionErrors, stability_map, stable_step_law
@@ -105,20 +93,22 @@ def outlook(case: Case, scene: SceneType, timestep_s: float) -> Iterator[PairOut
     scene : SceneType
     timestep_s : float
     """
-    study, particle = case.study, particle_material(case.study)
+    study, particle = case.study, beds.particle_material(case.study)
     scale = 1.0 if scene.single_particle else study.chosen_fidelity().youngs_modulus_scale
-    radius = study.media.typical_radius_m if scene.single_particle else smallest_radius(study)
-    mass, speed = particle_mass(particle, radius), scene.impact_speed(case)
+    radius = study.media.typical_radius_m if scene.single_particle else beds.smallest_radius(study)
+    mass, speed = mechanics.particle_mass(particle, radius), scene.impact_speed(case)
     table = stability_map().restitution_error
     for name, other, others_radius in scene.partners(case):
         partner = study.materials[other]
-        times = {"particle": rayleigh_time(particle, radius, scale)}
-        times.setdefault(name, rayleigh_time(partner, others_radius, scale))
+        times = {"particle": mechanics.rayleigh_time(particle, radius, scale)}
+        times.setdefault(name, mechanics.rayleigh_time(partner, others_radius, scale))
         limiting = min(times, key=lambda body: times[body])
         # the engine meets walls and facets as planes: half of it all for two particles
         part = 0.5 if name == "particle" else 1.0
-        modulus = effective_modulus(particle, partner, scale)
-        steps = hertz_contact_time(part * mass, part * radius, modulus, speed) / timestep_s
+        modulus = mechanics.effective_modulus(particle, partner, scale)
+        steps = (
+            mechanics.hertz_contact_time(part * mass, part * radius, modulus, speed) / timestep_s
+        )
         restitution = study.pair(study.media.main_material, other).restitution
         yield PairOutlook(
             bodies=f"particle on {name}",
@@ -205,15 +195,15 @@ def stable_fraction(case: Case, margin: float = 0.0) -> float:
     margin : float
         Logarithm of the stability number that the step then is forecast to have.
     """
-    density = SOLID_FRACTION_ESTIMATE * bed_density(case.study)
-    pressure = tip_pressure(case.study) + _MOMENTUM * density * case.axis_speed_m_s**2
+    density = SOLID_FRACTION_ESTIMATE * beds.bed_density(case.study)
+    pressure = beds.tip_pressure(case.study) + _MOMENTUM * density * case.axis_speed_m_s**2
     return _stable_under(case.study, pressure, math.exp(margin))
 
 
 def _stable_under(study: Study, pressure_pa: float, number: float) -> float:
     """The step over the Rayleigh time that has a stability number under a pressure."""
     softer = study.chosen_fidelity().youngs_modulus_scale ** (2 / 3)
-    kappa = softer * stiffness_number(particle_material(study), pressure_pa)
+    kappa = softer * mechanics.stiffness_number(beds.particle_material(study), pressure_pa)
     restitution = study.pair(study.media.main_material, study.media.main_material).restitution
     spread = study.media.typical_std_m / study.media.typical_radius_m
     return stable_step_law().largest_fraction(kappa, restitution, spread, number)
@@ -226,7 +216,7 @@ def settling_cautions(case: Case) -> Iterator[Caution]:
     rest (measured: docs/evidence/stability.md).
     """
     step, study = case.study.chosen_fidelity().filling_timestep_fraction, case.study.at_filling()
-    limit = _stable_under(study, floor_pressure(study), 1.0)
+    limit = _stable_under(study, beds.floor_pressure(study), 1.0)
     if step > limit * (1 + 1e-9):
         yield Caution(
             "stable_timestep",

@@ -287,6 +287,16 @@ class Container(Part):
                 yield np.array([[*point, 0.0], [*point, height_m]])
 
 
+def four_planes(x_m: float, y_m: float) -> tuple[Wall, ...]:
+    """The sides of a rectangle about the z axis with half its length and width."""
+    return (
+        Wall(name="west", shape="xplane", at_m=-x_m),
+        Wall(name="east", shape="xplane", at_m=x_m, inwards=-1),
+        Wall(name="south", shape="yplane", at_m=-y_m),
+        Wall(name="north", shape="yplane", at_m=y_m, inwards=-1),
+    )
+
+
 def round_container(radius_m: float) -> Container:
     """The inside of a cylinder about the z axis with its floor at z = 0."""
     return Container(

@@ -11,12 +11,12 @@ from importlib import resources
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dragdeck.arrays import Floats
 from dragdeck.cases.case import Case, of_each_workpiece
 from dragdeck.mesh.surface import surface
 from dragdeck.physics.packing import Bed
-from dragdeck.scenes.filling import expected_bed
+from dragdeck.scenes.bed_space import expected_bed
 from dragdeck.scenes.motion import Course, course
 from dragdeck.scenes.moving_bowl import bed_in_motion
 from dragdeck.scenes.workpiece import reference_height, workpiece_mesh, workpiece_radius
@@ -25,8 +25,6 @@ from dragdeck.study.model import Study
 if TYPE_CHECKING:
     from trimesh import Trimesh
 
-
-Floats = NDArray[np.float64]
 
 _POSES = 1000
 """Of a leg."""

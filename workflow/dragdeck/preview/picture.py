@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from dragdeck.arrays import Floats
 from dragdeck.mesh.surface import surface
-from dragdeck.preview.layout import COLOURS, CaseLayout, Floats, MovingWorkpiece, Projection, views
+from dragdeck.preview.layout import COLOURS, CaseLayout, MovingWorkpiece, Projection, views
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

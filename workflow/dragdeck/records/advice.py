@@ -6,7 +6,7 @@ from dragdeck.documents import Document
 from dragdeck.parts import Part
 from dragdeck.records.advised import AdvisedSettings
 from dragdeck.study.base import Json
-from dragdeck.study.model import Fidelity
+from dragdeck.study.fidelity import Fidelity
 
 
 class SettingsOfOption(Fidelity):

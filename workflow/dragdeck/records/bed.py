@@ -10,7 +10,7 @@ from dragdeck.parts import Part, omitted
 from dragdeck.physics.contact_mechanics import ContactConstants
 from dragdeck.physics.walls import Container
 from dragdeck.records.run import CaseFile, CountOfRun
-from dragdeck.study.bowl_motions.registry import AnyBowlMotion
+from dragdeck.study.motion import AnyBowlMotion
 
 
 class MediaOfRun(CountOfRun):

@@ -1,9 +1,10 @@
 """What the runner reads of ``case.json``, and what it writes: ``run.json`` and its like."""
 
+import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import Literal, NamedTuple, Self
+from typing import TYPE_CHECKING, Literal, Self
 
 from pydantic import Field, PositiveFloat, model_validator
 
@@ -152,41 +153,20 @@ def changed_in_words(scripts: Sequence[str]) -> str:
 
 
 State = Literal["running", "stopped", "failed", "complete"]
-CheckCode = Literal[
-    "ended",
-    "no_engine_error",
-    "neighbour_builds",  # of runs of version 0.2
-    "at_rest",
-    "steady_bed",
-    "stable_timestep",
-    "particles_kept",
-    "finite_numbers",
-    "within_limits",
-    "none_thrown",
-    "output_complete",
-    "packing_whole",
-    "packing_in_bowl",
-    "ranks",
-]
+
+
+CHECKS = {row["code"]: row for row in table_rows(Path(__file__).with_name("checks.csv"))}
+"""The registry of acceptance checks by code: the name of each, and what to do where it did not
+pass; of some, its words or the screen output say it."""
+
+
+if TYPE_CHECKING:
+    CheckCode = str
+else:
+    CheckCode = Literal[tuple(CHECKS)]
+
+
 CheckReason = Literal["lost_particles", "other", "particles", "finite_numbers", "energy", "speed"]
-
-
-_SMALLER_STEP = "choose a smaller timestep_fraction or a larger youngs_modulus_scale"
-REMEDIES: Mapping[CheckCode, str] = {
-    "at_rest": "choose a smaller fidelity.filling_timestep_fraction if the energy no longer falls, "
-    "else a larger filling.max_time_s or filling.energy_ratio",
-    "packing_in_bowl": "use fewer particles, or a wider or higher bowl",
-    "steady_bed": "choose a longer motion.transient_m, or more motion.path.revolutions",
-    "particles_kept": _SMALLER_STEP,
-    "finite_numbers": _SMALLER_STEP,
-    "stable_timestep": _SMALLER_STEP,
-    "within_limits": _SMALLER_STEP,
-    "none_thrown": "a contact was found too late: look at the workpiece where the force peaks, try "
-    "./run dragdeck mesh FILE on its mesh, or choose a smaller timestep_fraction",
-    "output_complete": "start the run again with: ./run dragdeck run --again RUN_DIR",
-    "ranks": "use the mpirun that belongs to this LIGGGHTS (DRAGDECK_LAUNCHER)",
-}
-"""What to do where a check did not pass; of others, its words or the screen output say it."""
 
 
 class ParticlesPerRank(Part):
@@ -245,6 +225,28 @@ class AcceptanceCheck(Part):
     limit: str
     number: float | None = None
     remedy: str | None = None
+
+    @classmethod
+    def of(
+        cls,
+        code: CheckCode,
+        passed: bool,
+        seen: str,
+        limit: str,
+        reason: CheckReason | None = None,
+        number: float | None = None,
+        output: str = "",
+    ) -> Self:
+        """A check with its name from the registry; `output` is that which it is about."""
+        return cls(
+            code=code,
+            reason=None if passed else reason,
+            name=CHECKS[code]["name"].format(output),
+            passed=passed,
+            seen=seen,
+            limit=limit,
+            number=number if number is not None and math.isfinite(number) else None,
+        )
 
 
 def causes(checks: Sequence[AcceptanceCheck]) -> Sequence[AcceptanceCheck]:
@@ -394,35 +396,3 @@ def read_accepted(run_dir: Path) -> RunRecord:
     if (reason := refusal(record)) is not None:
         raise RejectedRunError(f"{run_dir} cannot be used: {reason}")
     return record
-
-
-# --- figures -------------------------------------------------------------------------------------
-
-
-class FigureOfRun(NamedTuple):
-    """A figure of a run, ``figures/<name>.png``.
-
-    Attributes
-    ----------
-    scene : str
-        Whose runs have it; that of the loading of the workpiece is drawn apart.
-    caption : str
-    seen : str
-        What is seen in it, for those who do not see it.
-    """
-
-    scene: str
-    caption: str
-    seen: str
-
-
-FIGURES: Mapping[str, FigureOfRun] = {
-    row.pop("name"): FigureOfRun(**row)
-    for row in table_rows(Path(__file__).with_name("figures.csv"))
-}
-"""The registry of figures by name, in the order of the report."""
-
-
-def figures_of(scene: str) -> Sequence[str]:
-    """Names of the figures of a scene's runs."""
-    return [name for name, figure in FIGURES.items() if figure.scene == scene]

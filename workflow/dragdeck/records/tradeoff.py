@@ -13,7 +13,7 @@ from pydantic import BeforeValidator, PlainSerializer
 
 from dragdeck.documents import Document
 from dragdeck.parts import Part
-from dragdeck.study.model import Fidelity
+from dragdeck.study.fidelity import Fidelity
 
 _FILE = Path(str(resources.files("dragdeck"))) / "data" / "tradeoff.json"
 """The trade-off that was measured with this version."""

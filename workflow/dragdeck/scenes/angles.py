@@ -10,14 +10,8 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from dragdeck.cases.bed import (
-    bed_radii,
-    bed_rayleigh_time,
-    bed_timestep,
-    bed_volume,
-    particle_material,
-    widest_skin,
-)
+from dragdeck.arrays import Floats
+from dragdeck.cases import bed as beds
 from dragdeck.cases.case import Case
 from dragdeck.decks import outputs
 from dragdeck.decks.deck import Body, Deck, Scene, data_file
@@ -33,10 +27,10 @@ from dragdeck.physics.rounding import rounded
 from dragdeck.physics.run_limits import ENGINE_SOFTEST_PA
 from dragdeck.physics.walls import round_container
 from dragdeck.records.case import CaseOfRun
-from dragdeck.scenes.scene import case_of_study, material_table
+from dragdeck.scenes.scene import case_of_study, deck_of_study
 from dragdeck.study.calibration import Drum, Repose, Rig
-from dragdeck.study.media import Array
-from dragdeck.study.model import Fidelity, Study
+from dragdeck.study.fidelity import Fidelity
+from dragdeck.study.model import Study
 
 STIFFNESS = 1e4
 """Young's modulus over density, gravity, and radius of the cylinder or drum: soft, but the angles
@@ -116,8 +110,8 @@ class AngleDeck(Deck):
 class _Placed(NamedTuple):
     """Glued and free particles as centres and radii, (N, 4); a mesh; the box; times, s."""
 
-    glued: Array
-    media: Array
+    glued: Floats
+    media: Floats
     mesh: str
     edge_m: float
     bottom_m: float
@@ -139,23 +133,22 @@ def angle_scene(case: Case, run: AngleRun, stiffness: float = STIFFNESS) -> Scen
     drum, size = (rig if isinstance(rig, Drum) else None), study.media.typical_radius_m
     speed = 0.0 if drum else _LIFT * math.sqrt(2 * study.gravity_m_s2 * size)
     placed = _drum(study, rig) if isinstance(rig, Drum) else _heap(study, rig, speed)
-    dt, rayleigh = bed_timestep(study, "timestep_fraction"), bed_rayleigh_time(study)
+    dt, rayleigh = beds.bed_timestep(study, "timestep_fraction"), beds.bed_rayleigh_time(study)
     start, stop, end = (round(time / dt) for time in placed.times_s)
     period, glued, of = -(-end // _FRAMES), len(placed.glued), Case(case.file, {}, study)
-    steps, fidelity = _FRAMES * period, study.chosen_fidelity()
+    steps = _FRAMES * period
     read_with = {"glued": glued, "drum_radius_m": drum.radius_m if drum else 0.0}
     names = [study.media.main_material, study.bowl.material]
-    deck = AngleDeck(
+    deck = deck_of_study(
+        AngleDeck,
+        of,
+        names,
         title=f"{run.rig}: {study.title}",
-        study=case.study_name,
         scene="angles",
         run=run.rig,
         source="particles.data",
-        materials=material_table(study, names, fidelity.youngs_modulus_scale, of),
-        limit_force=study.contact.limit_force,
-        gravity_m_s2=study.gravity_m_s2,
         gravity_direction=(0, -1, 0) if drum else (0, 0, -1),
-        skin_m=widest_skin(study),
+        skin_m=beds.widest_skin(study),
         timestep_s=dt,
         rayleigh_time_s=rayleigh,
         outputs=(outputs.thermo(period, steps), outputs.particles(period, 0, steps, ())),
@@ -168,13 +161,13 @@ def angle_scene(case: Case, run: AngleRun, stiffness: float = STIFFNESS) -> Scen
         lift_steps=(start, stop),
         steps=steps,
     )
-    density = particle_material(study).density_kg_m3
+    density = beds.particle_material(study).density_kg_m3
     rows = np.concatenate([placed.glued, placed.media]).tolist()
     bodies = [Body(1, radius, density, (x, y, z)) for x, y, z, radius in rows]
     side = -placed.edge_m - size, placed.edge_m + size
     box = side, side, (placed.bottom_m - size, placed.top_m + size)
     angle = run.model_copy(update={**read_with, "counted_from": stop})
-    content = case_of_study(AngleCase, of, run.rig, dt, rayleigh, angle=angle)
+    content = case_of_study(AngleCase, of, deck, angle=angle)
     media = content.media.model_copy(update={"count": len(bodies)})
     files = {
         "particles.data": lambda: data_file(deck.title, len(names), box, bodies),
@@ -185,7 +178,7 @@ def angle_scene(case: Case, run: AngleRun, stiffness: float = STIFFNESS) -> Scen
 
 def _study(study: Study, rig: Repose | Drum, run: AngleRun, stiffness: float) -> Study:
     """The study with the media of a heap or drum, softened, and with its coefficients."""
-    main, particle = study.media.main_material, particle_material(study)
+    main, particle = study.media.main_material, beds.particle_material(study)
     count, length = _total(study, rig)
     modulus = stiffness * particle.density_kg_m3 * study.gravity_m_s2 * length
     least = min(study.materials[name].youngs_modulus_pa for name in (main, study.bowl.material))
@@ -210,9 +203,9 @@ def _total(study: Study, rig: Repose | Drum) -> tuple[int, float]:
 
 def _heap(study: Study, rig: Repose, speed_m_s: float) -> _Placed:
     """The cylinder on its glued layer, whose tops are at z = 0."""
-    size, inner, radii = study.media.typical_radius_m, rig.cylinder_radius_m, bed_radii(study)
+    size, inner, radii = study.media.typical_radius_m, rig.cylinder_radius_m, beds.bed_radii(study)
     poured = pour([radii], round_container(inner), study.seed)
-    volume = bed_volume(study) / SOLID_FRACTION_ESTIMATE
+    volume = beds.bed_volume(study) / SOLID_FRACTION_ESTIMATE
     edge = max((3 * volume / math.pi / _FLATTEST) ** (1 / 3), inner) + 4 * size
     line = np.arange(-edge + size, edge - size, 2 * size)
     flat = np.stack(np.meshgrid(line, line)).reshape(2, -1)
@@ -233,7 +226,7 @@ def _drum(study: Study, rig: Drum) -> _Placed:
     rows = np.linspace(size - half, half - size, math.floor(half / size))
     angle, z = np.stack(np.meshgrid(math.tau * around / len(around), rows)).reshape(2, -1)
     ring = (radius - size) * np.stack([np.cos(angle), np.sin(angle)])
-    radii = np.random.default_rng(study.seed).permutation(bed_radii(study))
+    radii = np.random.default_rng(study.seed).permutation(beds.bed_radii(study))
     step = 2.01 * float(radii.max())
     x, z_free = (np.arange(step / 2 - length, length - step / 2, step) for length in (radius, half))
     sites = np.stack(np.meshgrid(x, x, z_free)).reshape(3, -1).T

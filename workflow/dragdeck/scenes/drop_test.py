@@ -10,7 +10,7 @@ from dragdeck.decks.deck import Body, Deck, LeftOut, Scene, data_file
 from dragdeck.physics.contact_mechanics import fall_speed, rayleigh_time
 from dragdeck.physics.rounding import timestep
 from dragdeck.records.case import DropTestCase
-from dragdeck.scenes.scene import SceneType, case_of_study, material_table
+from dragdeck.scenes.scene import SceneType, case_of_study, deck_of_study, material_table
 from dragdeck.study.base import Json, without_fields
 from dragdeck.study.model import Study
 
@@ -68,15 +68,15 @@ def drop_scene(case: Case, fidelity: DropFidelity | None = None) -> Scene[DropTe
     dt = fidelity.timestep_s or timestep(rayleigh, study.drop_test.timestep_fraction)
     contact_steps = _slowest_contact_time(study, scale) / dt
     margin = max(10, round(_MARGIN * contact_steps))
-    deck = DropDeck(
+    deck = deck_of_study(
+        DropDeck,
+        case,
+        names,
         title=f"Drop test: {study.title}",
-        study=case.study_name,
         scene="drop_test",
         run=DROP_TEST.run_id(case),
         source="particle.data",
         materials=material_table(study, names, scale, case, one_particle=True),
-        limit_force=study.contact.limit_force,
-        gravity_m_s2=study.gravity_m_s2,
         skin_m=radius,
         timestep_s=dt,
         rayleigh_time_s=rayleigh,
@@ -92,10 +92,8 @@ def drop_scene(case: Case, fidelity: DropFidelity | None = None) -> Scene[DropTe
         case=case_of_study(
             DropTestCase,
             case,
-            DROP_TEST.run_id(case),
-            dt,
-            rayleigh,
-            settings={"youngs_modulus_scale": scale, "skin_m": deck.skin_m, "ranks": 1},
+            deck,
+            settings={"ranks": 1},
             inputs=_content(case),
             bodies=(),
             restitution=study.pair(study.media.main_material, study.workpiece.material).restitution,

@@ -1,85 +1,35 @@
 """The fill: the particles fall into the bowl and come to rest."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
-from itertools import combinations_with_replacement, product
-from typing import NamedTuple
 
-import numpy as np
-
-from dragdeck.cases.bed import (
-    JUST_BEYOND,
-    MESHED_PART,
-    BodySize,
-    bed_classes,
-    bed_density,
-    bed_radii,
-    bed_rayleigh_time,
-    bed_timestep,
-    bed_volume,
-    body_sizes,
-    box_half_widths,
-    buoyancy_density,
-    expected_surface,
-    farthest_point,
-    floor_pressure,
-    media_classes,
-    particle_material,
-    skin,
-    smallest_radius,
-    weight_density,
-)
+from dragdeck.cases import bed as beds
 from dragdeck.cases.case import Case
 from dragdeck.decks import outputs
 from dragdeck.decks.deck import Body, Deck, LeftOut, Scene, data_file
-from dragdeck.errors import Caution, InputError
-from dragdeck.mesh.files import stl_text
-from dragdeck.physics.contact_mechanics import (
-    bed_overlap,
-    effective_modulus,
-    fall_energy,
-    fall_speed,
-    particle_mass,
-    pull_off_force,
-    rayleigh_time,
-    sphere_mass,
-    wedge_ratio,
-)
-from dragdeck.physics.domain_split import FilledBowl, Split, rank_warnings, split
-from dragdeck.physics.packing import Bed, Particles, pour, primes, room_to_insert
-from dragdeck.physics.rounding import rounded
-from dragdeck.physics.run_limits import ENGINE_NEIGHBOURS, RunLimits, run_limits
+from dragdeck.errors import InputError
+from dragdeck.physics import contact_mechanics as mechanics
+from dragdeck.physics.packing import primes
+from dragdeck.physics.run_limits import ENGINE_NEIGHBOURS
 from dragdeck.physics.walls import Container
 from dragdeck.records.case import FillingCase
 from dragdeck.records.run import SettlingCriterion
-from dragdeck.scenes.scene import (
-    SceneType,
-    acting_gravity,
-    case_of_study,
-    check_submerged,
-    liquid,
-    liquid_leaves_out,
-    liquid_models,
-    material_table,
-    media_of_run,
-)
+from dragdeck.scenes import bed_space
+from dragdeck.scenes import liquid as liquids
+from dragdeck.scenes import scene as scenes
+from dragdeck.scenes.filling_cautions import filling_cautions
 from dragdeck.study.base import Json, without_fields
-from dragdeck.study.contact_law import FrictionLimit
-from dragdeck.study.media import MOST_SIZES, Media
+from dragdeck.study.media import MOST_SIZES
 from dragdeck.study.model import Study
-from dragdeck.study.shapes import SOLID_FRACTION_STD
 
 _CHECK_INTERVAL_S = 0.02
 """Time between two looks at the kinetic energy, about the fall over one particle."""
 
-MOST_OVERLAP = 0.01
-"""Overlap over the diameter, by the weight of the bed, above which a warning is given: an
-assumption; forces on the workpiece are several times those of the weight."""
 
 _CELL_BYTES, _MOST_CELL_BYTES = 8, 2e9
 """Memory of LIGGGHTS for a cell of its contact search, and for all of them together."""
+
 
 _SETTLING_ESTIMATE_S = 0.5
 """Time from the last particle's arrival to rest, an estimate used for expectations only."""
@@ -96,7 +46,7 @@ class FillingDeck(Deck):
     check_steps: int
     most_checks: int
     max_time_s: float
-    insertions: Sequence[BodySize] = ()
+    insertions: Sequence[beds.BodySize] = ()
     seeds: Sequence[int] = ()
     space_top_m: float = 0.0
 
@@ -113,31 +63,29 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
     study = case.study
     _check_capacity(case)
     _check_cells(case)
-    check_submerged(case, expected_bed(study))
-    fidelity = study.chosen_fidelity()
-    rayleigh = bed_rayleigh_time(study)
-    dt = bed_timestep(study, "filling_timestep_fraction")
+    liquids.check_submerged(case, bed_space.expected_bed(study))
+    dt = beds.bed_timestep(study, "filling_timestep_fraction")
     check_steps = max(1, math.ceil(_CHECK_INTERVAL_S / dt))
-    top, start = box_top(study), _start(study)
+    top, start = bed_space.box_top(study), bed_space._start(study)
     longest = study.filling.max_time_s
     types, meshed = _filling_types(study), bool(study.bowl.container.rim)
-    deck = FillingDeck(
+    deck = scenes.deck_of_study(
+        FillingDeck,
+        case,
+        types,
         title=f"Filling: {study.title}",
-        study=case.study_name,
         scene="filling",
         run=FILLING.run_id(case),
         source="particles.data",
-        materials=material_table(study, types, fidelity.youngs_modulus_scale, case),
-        limit_force=study.contact.limit_force,
-        gravity_m_s2=acting_gravity(study),
-        liquid=liquid(study),
-        skin_m=skin(study),
+        gravity_m_s2=liquids.acting_gravity(study),
+        liquid=liquids.liquid(study),
+        skin_m=beds.skin(study),
         timestep_s=dt,
-        rayleigh_time_s=rayleigh,
+        rayleigh_time_s=beds.bed_rayleigh_time(study),
         outputs=(outputs.thermo(check_steps, None), outputs.settled_particles(study.media.clumped)),
         thermo_steps=check_steps,
         checkpoint_steps=5 * check_steps,
-        processors=rank_split(case, skin(study)).line,
+        processors=bed_space.rank_split(case, beds.skin(study)).line,
         bowl_type=types.index(study.bowl.material) + 1,
         bowl=study.bowl.container,
         energy_ratio=study.filling.energy_ratio,
@@ -145,41 +93,41 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
         check_steps=check_steps,
         most_checks=math.ceil(longest / (check_steps * dt)),
         max_time_s=longest,
-        neighbours=max(ENGINE_NEIGHBOURS, bowl_neighbours(study, skin(study)) if meshed else 0),
+        neighbours=max(
+            ENGINE_NEIGHBOURS, bed_space.bowl_neighbours(study, beds.skin(study)) if meshed else 0
+        ),
         clumped=study.media.clumped,
-        insertions=body_sizes(study),
+        insertions=beds.body_sizes(study),
         seeds=primes(study.seed, 3 * MOST_SIZES * len(study.media.parts)),
         space_top_m=start.top_m,
     )
     return Scene(
         deck=deck,
-        case=case_of_study(
+        case=scenes.case_of_study(
             FillingCase,
             case,
-            FILLING.run_id(case),
-            dt,
-            rayleigh,
+            deck,
             inputs=_content(case),
-            media=media_of_run(study, buoyancy_density(study)),
+            media=scenes.media_of_run(study, beds.buoyancy_density(study)),
             settled=SettlingCriterion(
                 energy_ratio=study.filling.energy_ratio, highest_m=study.bowl.height_m
             ),
-            limits=bed_limits(study, top, start.fastest_m_s),
+            limits=bed_space.bed_limits(study, top, start.fastest_m_s),
         ),
         steps=round(expected_time(study) / dt),
         files={
             "particles.data": lambda: _particles_data(study, top, len(types)),
-            **(bowl_files(study, top) if meshed else {}),
+            **(bed_space.bowl_files(study, top) if meshed else {}),
         },
         models={
             **_models(study),
             "settling by a criterion": f"kinetic energy below {study.filling.energy_ratio:g} m "
             f"g d per particle",
             "a separate time step": "falling particles collide faster than a packing at rest",
-            **liquid_models(study),
+            **liquids.liquid_models(study),
         },
         leaves_out={
-            **liquid_leaves_out(study),
+            **liquids.liquid_leaves_out(study),
             "the workpiece": LeftOut("added later; cases with other workpieces share this filling"),
             "contact output": LeftOut(
                 "contacts before the drag are not analysed", "filling_contacts"
@@ -211,35 +159,6 @@ def _models(study: Study) -> dict[str, str]:
     }
 
 
-class _Start(NamedTuple):
-    """Highest point of the particles before they fall, m, and their largest speed, m/s."""
-
-    top_m: float
-    fastest_m_s: float
-
-
-def _start(study: Study) -> _Start:
-    """How particles start: spheres thrown from their places, clumps at rest where they fit."""
-    if not study.media.clumped:
-        particles = first_particles(study)
-        return _Start(particles.top_m, particles.fastest_m_s)
-    reaches = [class_.radii_m * class_.clump.reach for class_ in bed_classes(study)]
-    return _Start(room_to_insert(np.concatenate(reaches), study.bowl.container), 0.0)
-
-
-def first_particles(study: Study) -> Particles:
-    """The particles of a study before they fall."""
-    counts = tuple(study.class_counts.values())
-    return _first_particles(study.media, counts, study.bowl.container, study.seed)
-
-
-@lru_cache(maxsize=1)
-def _first_particles(
-    media: Media, counts: tuple[int, ...], bowl: Container, seed: int
-) -> Particles:
-    return pour([class_.radii_m for class_ in media_classes(media, counts)], bowl, seed)
-
-
 def _check_capacity(case: Case) -> None:
     """Refuse more particles than the bowl is sure to hold.
 
@@ -248,7 +167,7 @@ def _check_capacity(case: Case) -> None:
     InputError
         The highest particle may lie above the rim.
     """
-    study, bed = case.study, expected_bed(case.study)
+    study, bed = case.study, bed_space.expected_bed(case.study)
     rim, over = study.bowl.height_m, bed.top_m - bed.surface_m
     if bed.top_m + bed.margin_m > rim:
         most = max(0, math.floor(study.particle_count * (rim - over) / bed.highest_m))
@@ -274,11 +193,11 @@ def _check_cells(case: Case) -> None:
     """
     study = case.study
     largest = max(
-        float(class_.radii_m[-1] * class_.clump.radii.max()) for class_ in bed_classes(study)
+        float(class_.radii_m[-1] * class_.clump.radii.max()) for class_ in beds.bed_classes(study)
     )
-    floor = 4 * math.prod(box_half_widths(study))
-    box = floor * (box_top(study) + study.media.typical_radius_m)
-    cells = box / (largest + skin(study) / 2) ** 3
+    floor = 4 * math.prod(beds.box_half_widths(study))
+    box = floor * (bed_space.box_top(study) + study.media.typical_radius_m)
+    cells = box / (largest + beds.skin(study) / 2) ** 3
     if cells * _CELL_BYTES > _MOST_CELL_BYTES:
         raise InputError(
             "the bowl is too large for its particles: LIGGGHTS would divide it into "
@@ -290,232 +209,34 @@ def _check_cells(case: Case) -> None:
         )
 
 
-def expected_bed(study: Study) -> Bed:
-    """The settled bed before it exists: an estimate with a margin of two standard deviations."""
-    surface = expected_surface(study)
-    top = surface + 2 * study.media.typical_radius_m
-    return Bed(surface, top, 2 * SOLID_FRACTION_STD * surface)
-
-
-def box_top(study: Study) -> float:
-    """Top of the simulation box, m.
-
-    Room for the falling particles, and for a workpiece above the bed.
-
-    It must not depend on the workpiece: cases with other workpieces share this fill, and
-    their runs inherit the box from its restart file.
-    """
-    diameter = 2 * study.media.typical_radius_m
-    above_bed = 2 * expected_surface(study) + 8 * diameter
-    falling = _start(study).top_m
-    return math.ceil(100 * max(falling, above_bed, 2 * study.bowl.height_m) + 5) / 100
-
-
-def rank_split(case: Case, skin_m: float) -> Split:
-    """How the box of a case is split among its ranks, with that neighbour skin."""
-    study = case.study
-    filled = FilledBowl(
-        particles=study.sphere_count,
-        bowl=study.bowl.container,
-        height_m=expected_surface(study),
-        half_widths_m=box_half_widths(study),
-        bottom_m=-study.media.typical_radius_m,
-        top_m=box_top(study),
-        reach_m=(4 if study.media.clumped else 2) * farthest_point(study) + skin_m,
-    )
-    return split(case.ranks, filled)
-
-
-def floor_overlap(study: Study) -> float:
-    """Overlap of two particles at the floor under the bed's weight, over the diameter.
-
-    An estimate.
-    """
-    particle, scale = particle_material(study), study.chosen_fidelity().youngs_modulus_scale
-    return bed_overlap(effective_modulus(particle, particle, scale), floor_pressure(study))
-
-
-def filling_cautions(case: Case) -> Iterator[Caution]:
-    """What a user should know of a filling before it runs."""
-    study = case.study
-    yield from rank_warnings(rank_split(case, skin(study)))
-    yield from _overlap_caution(study)
-    yield from _cohesion_caution(study)
-    yield from _class_cautions(study)
-    yield from _size_cautions(study)
-
-
-def _overlap_caution(study: Study) -> Iterator[Caution]:
-    """A warning where particles are too soft for the bed above them."""
-    overlap, scale = floor_overlap(study), study.chosen_fidelity().youngs_modulus_scale
-    if overlap <= MOST_OVERLAP * JUST_BEYOND:
-        return
-    stiffer = min(1.0, rounded(scale * (overlap / MOST_OVERLAP) ** 1.5, up=True))
-    remedy = f"use a fidelity.youngs_modulus_scale of at least {stiffer:g}"
-    yield Caution(
-        "overlap",
-        f"the weight of the packing makes particles at the floor overlap by {100 * overlap:.2g} % "
-        f"of a diameter, more than {100 * MOST_OVERLAP:g} %: "
-        + (f"the packing is too dense; {remedy}" if scale < 1 else "too much for Hertz's theory"),
-        {"youngs_modulus_scale": stiffer} if scale < 1 else {},
-    )
-
-
-def _cohesion_caution(study: Study) -> Iterator[Caution]:
-    """A warning where the largest tension of some pair exceeds a particle's weight."""
-    bonds = {pair: bond for pair, bond in bond_numbers(study).items() if bond > 1}
-    if bonds:
-        pairs = ", ".join(f"{bond:.3g} ({pair})" for pair, bond in bonds.items())
-        yield Caution(
-            "cohesion",
-            f"the largest tension by cohesion is {pairs} times the weight of a mean particle "
-            "(Bond number); above 1 a bed fills loosely or bridges, and may not come to rest, and "
-            "particles stick to walls and workpiece",
-        )
-
-
-def bond_numbers(study: Study) -> dict[str, float]:
-    """Largest tension of each pair over the weight minus buoyancy of its lighter mean particle."""
-    parts = study.media.parts.items()
-    particles = [
-        (name or "particle", str(part.material), part.mean_radius_m) for name, part in parts
-    ]
-    walls = [
-        ("bowl", study.bowl.material, math.inf),
-        ("workpiece", study.workpiece.material, math.inf),
-    ]
-    pairs = [*combinations_with_replacement(particles, 2), *product(particles, walls)]
-    displaced, numbers = buoyancy_density(study), {}
-    for (body, material, radius), (other, against, far) in pairs:
-        kinds = [study.materials[name] for name in (material, against)]
-        reduced = 1 / (1 / radius + 1 / far)
-        limit = FrictionLimit(0.0, study.pair(material, against).attractive(), math.isinf(far))
-        slope = float(limit.attraction_n(np.full(1, reduced), np.ones(1))[0])
-        mass = min(
-            sphere_mass(size, kind.density_kg_m3 - displaced)
-            for size, kind in zip((radius, far), kinds, strict=True)
-        )
-        largest = pull_off_force(slope, effective_modulus(kinds[0], kinds[1]), reduced)
-        numbers[f"{body}-{other}"] = largest / (mass * study.gravity_m_s2)
-    return numbers
-
-
-_DEAR = 10.0
-"""Ratio of the cost with a class to that without it, from which a warning is given."""
-
-
-def _class_cautions(study: Study) -> Iterator[Caution]:
-    """A warning for each class whose small particles make a run many times dearer."""
-    classes = bed_classes(study) if study.media.classes else ()
-    times = [
-        rayleigh_time(
-            study.materials[class_.material], class_.radii_m[0] * class_.clump.timestep_radius
-        )
-        for class_ in classes
-    ]
-    spheres = [len(class_.radii_m) * len(class_.clump.radii) for class_ in classes]
-    total = sum(spheres)
-    for at, class_ in enumerate(classes):
-        others = [time for number, time in enumerate(times) if number != at]
-        if not others or total == spheres[at]:
-            continue
-        dearer = total / (total - spheres[at]) * min(others) / min(times)
-        if dearer >= _DEAR:
-            share = (class_.radii_m**3).sum() / (bed_radii(study) ** 3).sum()
-            yield Caution(
-                "class",
-                f"class {class_.name} ({100 * share:.2g} % of the volume) makes the runs about "
-                f"{dearer:.2g} times as long, by its number and its Rayleigh time: without it they "
-                f"would take {100 / dearer:.2g} % of that",
-            )
-
-
-_NEVER_HELD, _WIDEST = 1.5, 20.0
-"""Size ratio at which no small particle stayed in a groove, whatever its friction; largest one
-that was measured (docs/data/liggghts/groove.csv)."""
-
-
-def _size_cautions(study: Study) -> Iterator[Caution]:
-    """A warning where small particles can be held between large ones, or one and a wall."""
-    classes = bed_classes(study) if not study.media.clumped else ()
-    walls = {"the bowl": study.bowl.material, "the workpiece": study.workpiece.material}
-    size_pairs = []
-    for small, large in product(classes, classes):
-        ratio = float(large.radii_m[-1] / small.radii_m[0])
-        friction = study.pair(small.material, large.material).friction
-        size_pairs.append((wedge_ratio(friction, wall=False) / ratio, ratio, "another large one"))
-        for wall, material in walls.items():
-            least = min(friction, study.pair(small.material, material).friction)
-            size_pairs.append((wedge_ratio(least, wall=True) / ratio, ratio, wall))
-    held = [pair for pair in size_pairs if pair[0] < 1 and pair[1] > _NEVER_HELD]
-    if held:
-        part, ratio, partner = min(held)
-        yield Caution(
-            "size_ratio",
-            f"diameters differ by a factor of {ratio:.3g}; above {part * ratio:.3g}, friction can "
-            f"hold a small particle between a large one and {partner}, where the integration of "
-            "LIGGGHTS squeezes it in as it rolls (docs/development/liggghts.md): leave out the "
-            "fines, or compare with a run at a quarter of the fidelity.timestep_fraction",
-        )
-    elif size_pairs and (widest := max(ratio for _, ratio, _ in size_pairs)) > _WIDEST:
-        yield Caution(
-            "size_ratio",
-            f"diameters differ by a factor of {widest:.3g}: above {_WIDEST:g}, nothing was "
-            "measured (docs/development/liggghts.md); leave out the fines, or compare with a run "
-            "at a quarter of the fidelity.timestep_fraction",
-        )
-
-
-def bowl_neighbours(study: Study, skin_m: float) -> int:
-    """More facets of the bowl, at least 0.4 size^2 each, than a particle in a corner reaches."""
-    size = study.bowl_facet_size_m
-    if size is None:
-        return 0
-    reach_m = farthest_point(study) + skin_m + 2 * size
-    return math.ceil(3 * math.pi * reach_m**2 / (0.4 * size**2))
-
-
-def bowl_files(study: Study, top_m: float) -> dict[str, Callable[[], str]]:
-    """The bowl as a mesh, if the study asks for facets or its width varies with height."""
-    size = study.bowl_facet_size_m
-    if size is None:
-        return {}
-    highest = MESHED_PART * top_m
-    height = highest if study.bowl.container.rim else min(study.bowl.height_m, highest)
-    mesh = study.bowl.mesh(height, size)
-    return {"bowl.stl": lambda: stl_text(mesh)}
-
-
-def bed_limits(study: Study, top_m: float, speed_m_s: float) -> RunLimits:
-    """Limits of a run with the whole bed in a box of that height."""
-    mass = particle_mass(particle_material(study), study.media.typical_radius_m)
-    if study.media.clumped:
-        mass = bed_density(study) * bed_volume(study) / study.sphere_count
-    return run_limits(study.sphere_count, mass, study.gravity_m_s2, top_m, speed_m_s)
-
-
 def _energy_unit(study: Study) -> float:
     """Number of particles times m g d of the mean particle, J."""
     radius, count = study.media.typical_radius_m, study.particle_count
-    return fall_energy(count, weight_density(study), radius, study.gravity_m_s2)
+    return mechanics.fall_energy(count, beds.weight_density(study), radius, study.gravity_m_s2)
 
 
 def expected_time(study: Study) -> float:
     """Time in which the particles of a study come to rest, s. An estimate."""
-    return _arrival_speed(study, _start(study).top_m) / study.gravity_m_s2 + _SETTLING_ESTIMATE_S
+    return (
+        _arrival_speed(study, bed_space._start(study).top_m) / study.gravity_m_s2
+        + _SETTLING_ESTIMATE_S
+    )
 
 
 def _arrival_speed(study: Study, top_m: float) -> float:
     """Speed of the highest particle on the bed if it falls from rest, m/s."""
-    return fall_speed(max(top_m - expected_surface(study), 0.0), study.gravity_m_s2)
+    return mechanics.fall_speed(max(top_m - beds.expected_surface(study), 0.0), study.gravity_m_s2)
 
 
 def _particles_data(study: Study, top_m: float, types: int) -> str:
-    x, y = box_half_widths(study)
+    x, y = beds.box_half_widths(study)
     box = ((-x, x), (-y, y), (-study.media.typical_radius_m, top_m))
     if study.media.clumped:
         return data_file("the empty box", types, box, [])
-    particles, names = first_particles(study), [class_.material for class_ in bed_classes(study)]
+    particles, names = (
+        bed_space.first_particles(study),
+        [class_.material for class_ in beds.bed_classes(study)],
+    )
     kinds = [1 + study.type_names().index(name) for name in names]
     densities = [study.materials[name].density_kg_m3 for name in names]
     columns = (
@@ -548,8 +269,8 @@ def _content(case: Case) -> Json:
 
 def _impact_speed(case: Case) -> float:
     """Speed of the highest particle that is thrown down and falls to the floor, m/s."""
-    start = _start(case.study)
-    fall = fall_speed(start.top_m, case.study.gravity_m_s2)
+    start = bed_space._start(case.study)
+    fall = mechanics.fall_speed(start.top_m, case.study.gravity_m_s2)
     return math.hypot(start.fastest_m_s, fall)
 
 
@@ -557,12 +278,12 @@ def partners_in_bed(case: Case) -> list[tuple[str, str, float]]:
     """What a particle of a bed meets."""
     study = case.study
     return [
-        ("particle", study.media.main_material, smallest_radius(study)),
+        ("particle", study.media.main_material, beds.smallest_radius(study)),
         ("bowl", study.bowl.material, study.bowl.container.clear_m),
     ]
 
 
-FILLING = SceneType(
+FILLING = scenes.SceneType(
     name="filling",
     slug=lambda case: f"{case.study.particle_count}-particles",
     content=_content,

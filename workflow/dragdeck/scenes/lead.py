@@ -13,9 +13,11 @@ from dragdeck.cases.bed import bed_timestep, weight_acceleration
 from dragdeck.cases.case import Case, Stretch, of_each_workpiece
 from dragdeck.decks.deck import Materials
 from dragdeck.errors import InputError
-from dragdeck.scenes.motion import Stop, driven, output_periods
+from dragdeck.scenes.motion import driven, output_periods
+from dragdeck.scenes.process_deck import Stop
 from dragdeck.study.drive import Drive
-from dragdeck.study.model import SoftStart, Study
+from dragdeck.study.fidelity import SoftStart
+from dragdeck.study.model import Study
 
 LEAD = "lead"
 """Part of a case that only leads to another one's process."""

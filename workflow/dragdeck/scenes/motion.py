@@ -8,24 +8,22 @@ and preview are made from it.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
+from dragdeck.arrays import Floats
 from dragdeck.cases.bed import bed_timestep
-from dragdeck.cases.case import Case
-from dragdeck.decks.deck import Deck, Properties
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import round_to
-from dragdeck.physics.walls import Container
-from dragdeck.study.drive import Drive, EngineMotion, Floats, Orientations, rotation_vector
+from dragdeck.study.drive import Drive, EngineMotion
 from dragdeck.study.driven import DrivenMotion
-from dragdeck.study.model import Motion, Study
-from dragdeck.study.paths.path import Point, Vector
+from dragdeck.study.model import Study
+from dragdeck.study.motion import Motion
+from dragdeck.study.paths.path import Vector
+from dragdeck.study.rotations import Orientations
 from dragdeck.study.workpiece import MeshShape
-
-# --- legs, and the places that a motion reaches --------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -68,96 +66,6 @@ class Leg:
 
 
 @dataclass(frozen=True)
-class Stop:
-    """A step of the drag up to which the engine runs, and what is done before and after.
-
-    Attributes
-    ----------
-    step : int
-    properties : Properties or None
-        Of the materials from here on; None if they stay.
-    first : bool
-        Whether the run of a lead begins here.
-    writes : bool
-        Whether the outputs of the drag begin here.
-    mark : str
-        File into which the state is written then; empty for none.
-    """
-
-    step: int
-    properties: Properties | None = None
-    first: bool = False
-    writes: bool = False
-    mark: str = ""
-
-
-def plunge_point(motion: Motion) -> Point:
-    """Where the workpiece goes in, m."""
-    return motion.path.plunge_point if motion.plunge_at_m is None else motion.plunge_at_m
-
-
-def farthest_reach(motion: Motion) -> float:
-    """Largest distance of the workpiece's axis from the bowl's, m."""
-    places = [plunge_point(motion), *motion.path.corners[:, :2].tolist()]
-    return max(math.hypot(x, y) for x, y in places)
-
-
-def surface_speed(motion: Motion, radius_m: float) -> float:
-    """Highest speed of the workpiece's surface in the drag, m/s: of its axis, and what is added.
-
-    The turn of a workpiece that follows a circle is not counted.
-
-    Parameters
-    ----------
-    motion : Motion
-    radius_m : float
-        Of the workpiece.
-    """
-    axis = motion.nominal_speed_m_s * motion.path.peak_speed_ratio
-    return max(axis, motion.speed_in_bowl_m_s) + added_speed(motion, radius_m, 1.0)
-
-
-def added_speed(motion: Motion, radius_m: float, factor: float) -> float:
-    """What turning and superposed motions add to the speed of the axis at most, m/s.
-
-    Parameters
-    ----------
-    motion : Motion
-    radius_m : float
-        Of the workpiece.
-    factor : float
-        On the study's own speeds.
-    """
-    turning = motion.path.turning_rad_s if motion.inclined else 0.0
-    arm = math.hypot(radius_m, deepest(motion))
-    moving = motion.superposed(factor).values()
-    return turning * factor * arm + sum(
-        superposed_motion.surface_speed_m_s(radius_m) for superposed_motion in moving
-    )
-
-
-def path_heights(motion: Motion) -> tuple[float, float]:
-    """Lowest and highest height of the path above the immersion depth, m; 0 is within."""
-    heights = [0.0, *motion.path.corners[:, 2].tolist()]
-    return min(heights), max(heights)
-
-
-def vertical_range(motion: Motion) -> tuple[float, float]:
-    """Lowest and highest height of the tip above the immersion depth, m; 0 is within."""
-    reach = sum(superposed.vertical_reach_m for superposed in motion.superposed().values())
-    low, high = path_heights(motion)
-    return low - reach, high + reach
-
-
-def deepest(motion: Motion) -> float:
-    """Largest depth of the tip below the surface in the drag, m."""
-    return motion.immersion_depth_m - vertical_range(motion)[0]
-
-
-# --- steps between frames of the outputs ---------------------------------------------------------
-
-
-@dataclass(frozen=True)
 class Periods:
     """Steps between frames of each output, each a multiple of the one before."""
 
@@ -174,9 +82,6 @@ def output_periods(study: Study, timestep_s: float) -> Periods:
     contacts = force * max(1, math.floor(1 / (rates.workpiece_contacts_hz * per_second * force)))
     network = contacts * max(1, math.floor(1 / (rates.network_hz * per_second * contacts)))
     return Periods(force, contacts, network)
-
-
-# --- the whole motion ----------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -225,7 +130,7 @@ def driven(study: Study, start: int = 0) -> DrivenMotion:
 def driven_surface_speed(study: Study, radius_m: float) -> float:
     """The highest speed of the workpiece's surface as it is driven, m/s; see `surface_speed`."""
     way = driven(study)
-    return way.fastest_m_s + added_speed(study.motion, radius_m, way.factor)
+    return way.fastest_m_s + study.motion.added_speed_m_s(radius_m, way.factor)
 
 
 def course(
@@ -263,7 +168,7 @@ def course(
             motion=path.on_engine(drive),
         )
     )
-    start = (*plunge_point(motion), clear + reference_m)
+    start = (*motion.plunge_point, clear + reference_m)
     has_front = isinstance(study.workpiece.shape, MeshShape) or motion.inclined
     turn = path.direction_rad if has_front else 0.0  # a mesh looks along +x in its own file
     return Course(start_m=start, turn_rad=turn, legs=legs, driven=way)
@@ -275,7 +180,7 @@ def _entry(
     """Duration and velocity of plunge and approach; the tip goes down by `dive_m`."""
     speed = motion.plunge_speed_m_s * speed_factor
     yield "plunge", dive_m / speed, (0.0, 0.0, -speed)
-    begin, end = plunge_point(motion), motion.path.start_point
+    begin, end = motion.plunge_point, motion.path.start_point
     dx, dy = end[0] - begin[0], end[1] - begin[1]
     distance = math.hypot(dx, dy)
     if distance:
@@ -298,113 +203,4 @@ def _in_periods(
         duration_s=round_to(steps * timestep_s, 12),
         velocity_m_s=(x, y, z),
         motion=EngineMotion({"": f"linear {x!r} {y!r} {z!r}"}),
-    )
-
-
-# --- what the input script needs: place, legs, superposed motions --------------------------------
-
-
-@dataclass(frozen=True)
-class MovedWorkpiece:
-    """A workpiece as the template moves it.
-
-    Attributes
-    ----------
-    ending : str
-        Of the names in the input script that are its own: empty for the first, ``_2`` and so on.
-    mesh : str
-        File of its mesh.
-    start_m : tuple of 3 floats
-        Its reference point as it starts.
-    turn_deg : float
-        About +z, as it starts.
-    own_turn : sequence of float
-        Before that, in its own frame: axis, and angle in degrees; empty for none.
-    legs : sequence of Leg
-        Those that the run moves it along.
-    driven : DrivenMotion
-        The motion in the drag.
-    superposed : mapping
-        What is superposed on the drag, by name.
-    """
-
-    ending: str
-    mesh: str
-    start_m: tuple[float, float, float]
-    turn_deg: float
-    own_turn: Sequence[float]
-    legs: Sequence[Leg]
-    driven: DrivenMotion
-    superposed: Mapping[str, EngineMotion]
-
-    @property
-    def name(self) -> str:
-        """Name of its mesh."""
-        return f"workpiece{self.ending}"
-
-    @property
-    def about_reference(self) -> bool:
-        """Whether a motion turns it about its live reference point, or might."""
-        return bool(self.superposed) or self.legs[-1].motion.about_reference
-
-
-@dataclass(frozen=True, kw_only=True)
-class ProcessDeck(Deck):
-    """What the process template sees."""
-
-    bowl_type: int
-    bowl: Container
-    bowl_facets: bool
-    bowl_rad_s: float
-    bowl_motion: EngineMotion
-    workpiece_type: int
-    workpieces: Sequence[MovedWorkpiece]
-    stops: Sequence[Stop]
-    entry_step: int = 0
-
-    @property
-    def legs(self) -> Sequence[Leg]:
-        """Those of the first workpiece; the others' take as many steps."""
-        return self.workpieces[0].legs
-
-
-def _axis_and_angle(matrix: Floats) -> Sequence[float]:
-    vector = rotation_vector(matrix)
-    angle = float(np.linalg.norm(vector))
-    return [*(vector / angle).tolist(), math.degrees(angle)] if angle else ()
-
-
-def moved_workpiece(case: Case, motion: Course, mesh: str, entry_step: int) -> MovedWorkpiece:
-    """A workpiece of a case on its course.
-
-    Parameters
-    ----------
-    case : Case
-        Of the workpiece alone.
-    motion : Course
-    mesh : str
-        File of its mesh.
-    entry_step : int
-        Step of the drag at which it starts; 0: it starts with the plunge.
-    """
-    ending = f"_{case.number}" if case.number > 1 else ""
-    place, turn, tilt = motion.start_m, motion.turn_rad, None
-    legs = motion.legs[-1:] if entry_step else motion.legs
-    if entry_step:
-        places, rotation = motion.poses(legs[-1], np.array([entry_step - motion.drag.start]))
-        x, y, z = places[0].tolist()
-        place, turn = (x, y, z), float(rotation.turn_rad[0])
-        tilt = rotation.own
-    moving = motion.driven.superposed_on_engine()
-    return MovedWorkpiece(
-        ending=ending,
-        mesh=mesh,
-        start_m=place,
-        turn_deg=math.degrees(turn),
-        own_turn=() if tilt is None else _axis_and_angle(tilt[0]),
-        legs=[replace(leg, motion=leg.motion.ending(ending)) for leg in legs],
-        driven=motion.driven,
-        superposed={
-            name: superposed_motion.ending(ending) for name, superposed_motion in moving.items()
-        },
     )

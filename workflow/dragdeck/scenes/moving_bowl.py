@@ -7,13 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dragdeck.arrays import Floats
 from dragdeck.cases.bed import MESHED_PART
 from dragdeck.cases.case import Case
 from dragdeck.errors import Caution, InputError, together
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import round_to
 from dragdeck.physics.turning_bed import surface_rise, surface_tilt
-from dragdeck.study.drive import Floats
 from dragdeck.study.model import Study
 from dragdeck.study.paths.path import as_rows
 

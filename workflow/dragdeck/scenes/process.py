@@ -8,7 +8,7 @@ from functools import partial
 from dragdeck.cases.bed import bed_rayleigh_time, bed_timestep, buoyancy_density
 from dragdeck.cases.case import Case, Stretch, mesh_file, of_each_workpiece
 from dragdeck.decks import PACKING_FILE, WORKPIECE_MESH, outputs
-from dragdeck.decks.deck import NOT_OF_LIQUID, LeftOut, Scene
+from dragdeck.decks.deck import NOT_OF_LIQUID, Scene
 from dragdeck.decks.outputs import Output
 from dragdeck.errors import Caution
 from dragdeck.files import file_checksum
@@ -20,71 +20,24 @@ from dragdeck.physics.run_limits import ENGINE_NEIGHBOURS, RunLimits, thrown_spe
 from dragdeck.records.bed import BowlOfRun
 from dragdeck.records.case import AssumptionOfRun, ProcessCase, StatisticsOfRun, WorkpieceOfRun
 from dragdeck.records.run import Phase, SteadyCriterion
+from dragdeck.scenes import bed_space, moving_bowl
+from dragdeck.scenes import filling as fillings
+from dragdeck.scenes import fit as fits
+from dragdeck.scenes import liquid as liquids
+from dragdeck.scenes import motion as motions
+from dragdeck.scenes import scene as scenes
+from dragdeck.scenes import workpiece as workpieces
 from dragdeck.scenes.drop_test import DROP_TEST
-from dragdeck.scenes.filling import (
-    FILLING,
-    bed_limits,
-    bowl_files,
-    bowl_neighbours,
-    box_top,
-    expected_bed,
-    partners_in_bed,
-    rank_split,
-)
 from dragdeck.scenes.lead import Covered, covered, mark_file, stops, with_lead
-from dragdeck.scenes.motion import (
-    Course,
-    Periods,
-    ProcessDeck,
-    course,
-    moved_workpiece,
-    output_periods,
-)
-from dragdeck.scenes.moving_bowl import (
-    bed_in_motion,
-    bowl_cautions,
-    check_bowl_motion,
-    driven_gravity,
-)
-from dragdeck.scenes.scene import (
-    SceneType,
-    acting_gravity,
-    assumed,
-    case_of_study,
-    check_submerged,
-    liquid,
-    liquid_leaves_out,
-    liquid_models,
-    material_table,
-    media_of_run,
-    said_study,
-)
-from dragdeck.scenes.workpiece import (
-    PARTICLE_STEPS_PER_S,
-    check_apart,
-    check_fit,
-    check_headroom,
-    check_lid,
-    describe,
-    fastest_motion,
-    may_jam,
-    process_cautions,
-    process_skin,
-    reference_height,
-    remeshing,
-    simulated_mesh,
-    workpiece_buoyancy,
-    workpiece_facets,
-    workpiece_length,
-    workpiece_radius,
-    workpiece_reach,
-)
+from dragdeck.scenes.numbers import describe, workpiece_buoyancy
+from dragdeck.scenes.process_cautions import process_cautions
+from dragdeck.scenes.process_deck import ProcessDeck, moved_workpiece
+from dragdeck.scenes.process_texts import process_leaves_out, process_models
 from dragdeck.study.base import Json, without_fields
 from dragdeck.study.bowls.bowl import LID
-from dragdeck.study.contact_law import coefficient_words
 from dragdeck.study.drive import Drive, EngineMotion
-from dragdeck.study.model import Motion, Study
-from dragdeck.study.workpiece import CylinderShape, MeshShape, Shape
+from dragdeck.study.model import Study
+from dragdeck.study.workpiece import MeshShape, Shape
 
 _ENERGY_DRIFT = 0.1
 """Largest change of the mean kinetic energy while it is counted: 5 % in the bed's speed."""
@@ -108,52 +61,53 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
     """
     whole = with_lead(case.all_workpieces)
     each = of_each_workpiece(whole)
-    study, counts = whole.study, [workpiece_facets(workpiece) for workpiece in each]
-    fidelity, facets = study.chosen_fidelity(), study.bowl_facet_size_m is not None
-    settled = bed or expected_bed(study)
-    dt, top = bed_timestep(study, "timestep_fraction"), box_top(study)
-    check_bowl_motion(whole, settled, top)
-    bed = bed_in_motion(study, settled)
-    periods, meshes = output_periods(study, dt), _mesh_files(each)
-    check_apart(each, bed)
-    check_lid(whole, bed)
-    check_submerged(whole, bed)
+    study, counts = whole.study, [workpieces.workpiece_facets(workpiece) for workpiece in each]
+    facets = study.bowl_facet_size_m is not None
+    settled = bed or bed_space.expected_bed(study)
+    dt, top = bed_timestep(study, "timestep_fraction"), bed_space.box_top(study)
+    moving_bowl.check_bowl_motion(whole, settled, top)
+    bed = moving_bowl.bed_in_motion(study, settled)
+    periods, meshes = motions.output_periods(study, dt), _mesh_files(each)
+    fits.check_apart(each, bed)
+    fits.check_lid(whole, bed)
+    liquids.check_submerged(whole, bed)
     deepest = max(workpiece.study.motion.immersion_depth_m for workpiece in each)
     courses = [
-        course(workpiece.study, bed, reference_height(workpiece), deepest) for workpiece in each
+        motions.course(workpiece.study, bed, workpieces.reference_height(workpiece), deepest)
+        for workpiece in each
     ]
     moved = []
     drag, bowl_motion = courses[0].drag, courses[0].driven.bowl
     steps = covered(whole, drag)
     for workpiece, way in zip(each, courses, strict=True):
-        check_fit(workpiece, bed.lowest_m, dt)
+        fits.check_fit(workpiece, bed.lowest_m, dt)
         moved.append(
             moved_workpiece(workpiece, way, meshes[workpiece.study.workpiece.shape], steps.entry)
         )
-        check_headroom(workpiece, way.start_m[2] + bed.margin_m - reference_height(workpiece), top)
-    skin = max(map(process_skin, each))
-    gravity, down = driven_gravity(study, acting_gravity(study))
-    types, parts = study.type_names(), rank_split(whole, skin)
-    materials = material_table(study, types, fidelity.youngs_modulus_scale, whole)
+        fits.check_headroom(
+            workpiece, way.start_m[2] + bed.margin_m - workpieces.reference_height(workpiece), top
+        )
+    skin = max(map(fits.process_skin, each))
+    gravity, down = moving_bowl.driven_gravity(study, liquids.acting_gravity(study))
+    types, parts = study.type_names(), bed_space.rank_split(whole, skin)
     bowl = study.bowl.closed
     primitive = tuple(wall for wall in bowl.walls if not facets or wall.name == LID)
     touches = study.outputs.first_touch_fraction if steps.end == drag.end else 0.0
-    deck = ProcessDeck(
-        title=study.title,
-        study=whole.study_name,
+    deck = scenes.deck_of_study(
+        ProcessDeck,
+        whole,
+        types,
         case=whole.name,
         scene="process",
         run=PROCESS.run_id(whole),
         source=_source(whole),
-        materials=materials,
-        limit_force=study.contact.limit_force,
         gravity_m_s2=gravity,
         gravity_direction=down,
-        liquid=liquid(study),
+        liquid=liquids.liquid(study),
         skin_m=skin,
         timestep_s=dt,
         rayleigh_time_s=bed_rayleigh_time(study),
-        neighbours=max(ENGINE_NEIGHBOURS, bowl_neighbours(study, skin), *counts),
+        neighbours=max(ENGINE_NEIGHBOURS, bed_space.bowl_neighbours(study, skin), *counts),
         outputs=_outputs(
             periods,
             drag,
@@ -175,14 +129,14 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         clumped=study.media.clumped,
         workpiece_type=types.index(study.workpiece.material) + 1,
         workpieces=moved,
-        stops=list(stops(whole, drag, steps, materials)),
         entry_step=steps.entry,
     )
+    deck = replace(deck, stops=list(stops(whole, drag, steps, deck.materials)))
     number = max(case.number, 1) - 1
     files = {WORKPIECE_MESH: partial(_stl, each[number])}
     fastest = max(map(_fastest, each, courses))
-    limits = bed_limits(study, top, fastest)
-    jam = any(may_jam(body, bed.surface_m) for body in each)
+    limits = bed_space.bed_limits(study, top, fastest)
+    jam = any(fits.may_jam(body, bed.surface_m) for body in each)
     models = {
         body.mesh: partial(_stl, body_case) for body_case, body in zip(each, moved, strict=True)
     }
@@ -193,16 +147,16 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
             number,
             bed.surface_m,
             courses[number],
+            deck,
             limits,
             steps,
-            skin,
             None if jam else thrown_speed(study.gravity_m_s2, top, fastest),
         ),
         steps=steps.end - steps.entry,
         facets=sum(counts),
-        files=files if number else {**models, **bowl_files(study, top)},
-        models=_models(study),
-        leaves_out=_leaves_out(study),
+        files=files if number else {**models, **bed_space.bowl_files(study, top)},
+        models=process_models(study),
+        leaves_out=process_leaves_out(study),
         warnings=[*_cautions(each), *rank_warnings(parts)],
     )
 
@@ -211,7 +165,7 @@ def _cautions(each: Sequence[Case]) -> Iterator[Caution]:
     """What a user should know of each workpiece; it is named where not all of them are meant."""
     by_text: dict[str, tuple[Caution, list[str]]] = {}
     for number, workpiece in enumerate(each, 1):
-        for caution in (*process_cautions(workpiece), *bowl_cautions(workpiece)):
+        for caution in (*process_cautions(workpiece), *moving_bowl.bowl_cautions(workpiece)):
             by_text.setdefault(str(caution), (caution, []))[1].append(str(number))
     for caution, numbers in by_text.values():
         owners = f"workpiece {', '.join(numbers)}: " if len(numbers) < len(each) else ""
@@ -228,28 +182,28 @@ def _mesh_files(each: Sequence[Case]) -> Mapping[Shape, str]:
 
 
 def _stl(case: Case) -> str:
-    return stl_text(simulated_mesh(case))
+    return stl_text(workpieces.simulated_mesh(case))
 
 
 def _source(case: Case) -> str:
     """The packing, or the state of the lead, from which a process starts."""
     if case.lead is None:
-        return f"../../filling/{FILLING.run_id(case)}/{PACKING_FILE}"
+        return f"../../filling/{fillings.FILLING.run_id(case)}/{PACKING_FILE}"
     number = 1 + case.lead.stretch.marks.index(case.stretch.begin)
     return f"../../{PROCESS.name}/{PROCESS.run_id(case.lead)}/{mark_file(number)}"
 
 
 def _outputs(
-    periods: Periods,
+    periods: motions.Periods,
     drag: Drive,
     steps: Covered,
-    workpieces: Sequence[str],
+    names: Sequence[str],
     facets: bool,
     walls: Sequence[str],
     touches: float,
     clumped: bool,
 ) -> tuple[Output, ...]:
-    several = facets or len(workpieces) > 1
+    several = facets or len(names) > 1
     begin = max(drag.start, steps.ramp_end)
     last_part = max(steps.counted, steps.end - math.ceil(touches * drag.steps))
     first_touching, first = (
@@ -261,7 +215,7 @@ def _outputs(
     )
     return (
         outputs.thermo(periods.network, network, steps.entry),
-        *(outputs.workpiece_force(periods.force, force, name, steps.entry) for name in workpieces),
+        *(outputs.workpiece_force(periods.force, force, name, steps.entry) for name in names),
         outputs.workpiece_particles(periods.contacts, first_touching, touching),
         outputs.workpiece_contacts(periods.contacts, first_touching, touching, several),
         outputs.particles(periods.network, first, network, walls, clumped),
@@ -279,10 +233,10 @@ def _process_case(
     each: Sequence[Case],
     number: int,
     surface_m: float,
-    way: Course,
+    way: motions.Course,
+    deck: ProcessDeck,
     limits: RunLimits,
     steps: Covered,
-    skin_m: float,
     thrown_m_s: float | None,
 ) -> ProcessCase:
     case, drag = each[number], way.drag
@@ -290,28 +244,24 @@ def _process_case(
     transient_s = drag.time_to(motion.uncounted_m)
     if steps.entry:
         transient_s = (steps.counted - drag.start) * drag.timestep_s
-    return case_of_study(
+    return scenes.case_of_study(
         ProcessCase,
         case,
-        PROCESS.run_id(case),
-        drag.timestep_s,
-        bed_rayleigh_time(study),
-        settings={
-            **study.chosen_fidelity().model_dump(include={"timestep_fraction", "speed_factor"}),
-            "skin_m": skin_m,
-        },
-        media=media_of_run(study, buoyancy_density(study)),
+        deck,
+        settings=study.chosen_fidelity().model_dump(include={"timestep_fraction", "speed_factor"}),
+        run=PROCESS.run_id(case),
+        media=scenes.media_of_run(study, buoyancy_density(study)),
         bowl=BowlOfRun(
             **dict(study.bowl.closed),
             meshed=study.bowl_facet_size_m is not None,
             motion=way.driven.bowl,
         ),
-        assumptions=[*assumed(study), *_of_liquid(case, surface_m)],
+        assumptions=[*scenes.assumed(study), *_of_liquid(case, surface_m)],
         asked=case.advised,
-        study=said_study(study),
+        study=scenes.said_study(study),
         unsafe_timestep=study.accepted.unsafe_timestep,
         case=case.name,
-        upstream={scene.name: scene.run_id(case) for scene in (FILLING, DROP_TEST)},
+        upstream={scene.name: scene.run_id(case) for scene in (fillings.FILLING, DROP_TEST)},
         lead=case.lead and PROCESS.run_id(case.lead),
         entry_step=steps.entry,
         marks=[mark_file(number) for number, _ in enumerate(case.stretch.marks, 1)],
@@ -319,14 +269,14 @@ def _process_case(
         surface_m=surface_m,
         workpiece=WorkpieceOfRun(
             kind="mesh" if motion.inclined else study.workpiece.shape.kind,
-            radius_m=workpiece_reach(case),
-            length_m=workpiece_length(case),
+            radius_m=workpieces.workpiece_reach(case),
+            length_m=workpieces.workpiece_length(case),
             mesh=WORKPIECE_MESH,
             immersion_depth_m=motion.immersion_depth_m,
             number=case.number,
             count=len(each),
             wake_from_m=_wake_from(each, number),
-            remeshed=remeshing(case),
+            remeshed=workpieces.remeshing(case),
         ),
         output_of=PROCESS.run_id(case.all_workpieces) if case.number > 1 else None,
         motion=way.driven.path_entry(),
@@ -365,7 +315,7 @@ def _wake_from(each: Sequence[Case], number: int) -> float | None:
     if around is None or ahead is None:
         return None
     others = (workpiece.study.motion.path.ahead_deg or 0.0 for workpiece in each)
-    against = _against_bed(each[number].study.motion)
+    against = each[number].study.motion.against_bed
     if not against:
         return None
     sense = math.copysign(1.0, against)
@@ -374,83 +324,18 @@ def _wake_from(each: Sequence[Case], number: int) -> float | None:
     return round_to(distance, 9) if distance < path.path_length_m * (1 - 1e-6) else None
 
 
-def _against_bed(motion: Motion) -> float:
-    """Angular speed of a workpiece on a circle against a bed that turns, over that of its path."""
-    path = motion.path
-    if motion.bowl is None:
-        return 1.0
-    rate = motion.nominal_speed_m_s / math.hypot(*path.start_point)
-    sense = math.sin(path.direction_rad - math.atan2(*reversed(path.start_point)))
-    return 1.0 - motion.bowl.rad_s / math.copysign(rate, sense)
-
-
-def _fastest(case: Case, way: Course) -> float:
+def _fastest(case: Case, way: motions.Course) -> float:
     """Speed of the fastest leg, or of a surface or the bowl if one can be faster, m/s."""
     speeds, motion = [leg.speed_m_s for leg in way.legs], case.study.motion
     moved = motion.bowl or motion.bowl_rad_s
     if motion.superposed() or moved or motion.path.peak_speed_ratio > 1:
-        speeds.append(fastest_motion(case))
+        speeds.append(fits.fastest_motion(case))
     return max(speeds)
 
 
-def _models(study: Study) -> dict[str, str]:
-    optional, superposed = coefficient_words(study.pairs.values())[0], study.motion.superposed()
-    exact, why = study.bowl_facet_size_m is None, "facets, as requested"
-    if study.motion.bowl:
-        why = "facets, because it moves"
-    if study.motion.bowl_rad_s:
-        why = "facets, whose surface moves with the rotation"
-    if study.bowl.container.rim:
-        why = "facets, because its width varies with height"
-    bowl = "exact planes and cylinders" if exact else why
-    return {
-        "particle-particle, particle-workpiece, particle-bowl": "force chains run through all",
-        f"bowl: {bowl}": "force chains end there; the force on each particle gives its contacts",
-        **{words: "as given in the study" for words in optional},
-        **liquid_models(study),
-        "workpiece as facets": "LIGGGHTS moves meshes only",
-        **{f"{name} of the workpiece": "as given in the study" for name in superposed},
-        f"total force, {study.outputs.workpiece_force_hz:g} Hz": "drag, its spread and its peaks",
-        f"workpiece contacts, "
-        f"{study.outputs.workpiece_contacts_hz:g} Hz": "few contacts, so a high rate is cheap",
-        f"network and particles, {study.outputs.network_hz:g} Hz": "force chains and positions",
-    }
-
-
-def _leaves_out(study: Study) -> dict[str, LeftOut]:
-    _, absent = coefficient_words(study.pairs.values())
-    workpiece, network = study.outputs.workpiece_contacts_hz, study.outputs.network_hz
-    reasons = {
-        **liquid_leaves_out(study),
-        "positions, torques, areas of contacts": LeftOut(
-            "the particles of the same step have the positions; no report uses the rest",
-            "contact_columns",
-        ),
-        "network during plunge and approach": LeftOut(
-            "no statistic counts them", "network_before_drag"
-        ),
-        "wear, stress and heat of the mesh": LeftOut("no report uses them"),
-        **{words: LeftOut("not given in the study") for words in absent},
-    }
-    if network < workpiece:
-        reasons[f"network at {workpiece:g} Hz"] = LeftOut(
-            "force chains do not require this rate", "network_rate"
-        )
-    if study.bowl_facet_size_m is None:
-        reasons["facets of the bowl"] = LeftOut(
-            "slower; no report uses contacts per facet of the bowl", "bowl_facets"
-        )
-    shape = study.workpiece.shape
-    if isinstance(shape, CylinderShape) and shape.facet_length_m > shape.facet_size_m:
-        reasons["short facets along the workpiece"] = LeftOut(
-            "a straight side needs none", "workpiece_short_facets"
-        )
-    return reasons
-
-
 def _partners(case: Case) -> list[tuple[str, str, float]]:
-    workpiece = ("workpiece", case.study.workpiece.material, workpiece_radius(case))
-    return [*partners_in_bed(case), workpiece]
+    workpiece = ("workpiece", case.study.workpiece.material, workpieces.workpiece_radius(case))
+    return [*fillings.partners_in_bed(case), workpiece]
 
 
 def _stretches(case: Case) -> Json:
@@ -474,10 +359,10 @@ def _content(case: Case) -> Json:
     files = [mesh_file(case, shape) for shape in shapes if isinstance(shape, MeshShape)]
     checksums = [file_checksum(file) for file in dict.fromkeys(files)]
     mesh = {"mesh": " ".join(checksums)} if checksums else {}
-    return {**content, "filling": FILLING.run_id(case), **mesh, **_stretches(case)}
+    return {**content, "filling": fillings.FILLING.run_id(case), **mesh, **_stretches(case)}
 
 
-PROCESS = SceneType(
+PROCESS = scenes.SceneType(
     name="process",
     slug=lambda case: case.name,
     content=_content,
@@ -494,12 +379,14 @@ PROCESS = SceneType(
     network=("network.parquet", "chains.parquet", "clusters.parquet"),
     loading=("facets.parquet", "contact_events.parquet", "loading.json", "workpiece.vtp"),
     regime="drag",
-    impact_speed=fastest_motion,
+    impact_speed=fits.fastest_motion,
     partners=_partners,
-    particle_steps_per_s=PARTICLE_STEPS_PER_S,
+    particle_steps_per_s=workpieces.PARTICLE_STEPS_PER_S,
     needs_bed=True,
 )
 
 
-SCENES: dict[str, SceneType] = {scene.name: scene for scene in (DROP_TEST, FILLING, PROCESS)}
+SCENES: dict[str, scenes.SceneType] = {
+    scene.name: scene for scene in (DROP_TEST, fillings.FILLING, PROCESS)
+}
 """The scenes of a study's case, by name: a new one is its module and an entry here."""

@@ -1,6 +1,5 @@
 """What a scene is to the rest of the project, and what all scenes share."""
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,11 +9,11 @@ import numpy as np
 from pydantic import ValidationError
 
 from dragdeck import __version__
-from dragdeck.cases.bed import bed_classes, bed_density, body_sizes, particle_material, skin
+from dragdeck.cases.bed import bed_classes, bed_density, body_sizes
 from dragdeck.cases.case import Case, digest, slug
-from dragdeck.decks.deck import NOT_OF_LIQUID, LeftOut, Liquid, Materials, Scene, contact_law
+from dragdeck.decks.deck import Deck, Materials, Scene, contact_law
 from dragdeck.errors import InputError
-from dragdeck.physics.contact_mechanics import ContactConstants, effective_modulus, effective_shear
+from dragdeck.physics import contact_mechanics as mechanics
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import round_to
 from dragdeck.physics.run_limits import ENGINE_SOFTEST_PA
@@ -23,15 +22,20 @@ from dragdeck.records.case import AssumptionOfRun, CaseOfRun, FidelityOfRun
 from dragdeck.records.packing import Packing
 from dragdeck.study.base import Json, flat, without_fields
 from dragdeck.study.contact_law import Pair
-from dragdeck.study.model import LARGEST_TIMESTEP_FRACTION, Study
+from dragdeck.study.fidelity import LARGEST_TIMESTEP_FRACTION
+from dragdeck.study.model import Study
 
 C = TypeVar("C", bound=CaseOfRun)
+D = TypeVar("D", bound=Deck)
+
 
 StudyScene = Scene[CaseOfRun]
 """A run of a study's case."""
 
+
 _LONGEST_SLUG = 160
 """Characters of a run id's readable part: a folder's name has 255 bytes at most."""
+
 
 Regime = Literal["impact", "settle", "column", "drag"]
 """What the stability map tells apart: each has its own limit of the time step."""
@@ -50,28 +54,13 @@ def read_bed(file: Path) -> Bed:
 
 
 _NOT_SAID = ("calibration", "fidelities", "licence", "scaling", "search", "sweep")
+
+
 _OF_PROCESS = (
     *("accepted", "assumptions", "compound", "drop_test", "fidelity", "filling", "motion"),
     *("outputs", "reduction", "reference", "removal", "seed", "workpiece.shape", "workpieces"),
 )
 """Fields that no file of a run says, and those that only files of a process do."""
-
-
-_CACHED, _PER_COUNT = 10_000, 0.218
-"""Particles up to which the cost of each is the same, and the power of their number with which it
-grows above: 1.65 times in a decade (docs/development/benchmarks.md)."""
-
-
-def particles_step_s(count: int, particle_steps_per_s: float) -> float:
-    """CPU time of a step for so many particles, s: large beds do not fit the caches.
-
-    Parameters
-    ----------
-    count : int
-    particle_steps_per_s : float
-        Particles times steps per second in a small bed.
-    """
-    return count / particle_steps_per_s * math.pow(max(1.0, count / _CACHED), _PER_COUNT)
 
 
 @dataclass(frozen=True)
@@ -151,13 +140,36 @@ class SceneType:
         return digest(said)
 
 
+def deck_of_study(kind: type[D], of: Case, types: Sequence[str], **parts: Any) -> D:
+    """The content of an input script of a run of a study's case.
+
+    Parameters
+    ----------
+    kind : type
+        Of the scene's decks.
+    of : Case
+    types : sequence of str
+        The material of each type of LIGGGHTS, the particles first.
+    **parts
+        What this scene's deck has beyond the others', or has otherwise.
+    """
+    study = of.study
+    entries = {
+        "title": study.title,
+        "study": of.study_name,
+        "materials": material_table(study, types, study.chosen_fidelity().youngs_modulus_scale, of),
+        "limit_force": study.contact.limit_force,
+        "gravity_m_s2": study.gravity_m_s2,
+    }
+    return kind(**{**entries, **parts})
+
+
 def case_of_study(
     kind: type[C],
     of: Case,
-    run: str,
-    timestep_s: float,
-    rayleigh_time_s: float,
+    deck: Deck,
     *,
+    rayleigh_time_s: float | None = None,
     settings: Json | None = None,
     **parts: Any,
 ) -> C:
@@ -168,21 +180,23 @@ def case_of_study(
     kind : type
         The model of the scene's case file.
     of : Case
-    run : str
-        The run id.
-    timestep_s, rayleigh_time_s : float
+    deck : Deck
+        Of the run.
+    rayleigh_time_s : float, optional
+        If not that of the deck.
     settings : mapping, optional
-        What is not the case's modulus, skin and ranks, the given step, and no faster workpiece.
-    **own
+        What is not the deck's, the case's number of ranks, and no faster workpiece.
+    **parts
         What this scene's case file has beyond the others', or has otherwise.
     """
     study = of.study
+    rayleigh_time_s = rayleigh_time_s or deck.rayleigh_time_s
     usual = {
         "name": of.fidelity_name,
-        "youngs_modulus_scale": study.chosen_fidelity().youngs_modulus_scale,
-        "timestep_fraction": round_to(timestep_s / rayleigh_time_s, 3),
+        "youngs_modulus_scale": deck.materials.youngs_modulus_scale,
+        "timestep_fraction": round_to(deck.timestep_s / rayleigh_time_s, 3),
         "speed_factor": 1.0,
-        "skin_m": skin(study),
+        "skin_m": deck.skin_m,
         "ranks": of.ranks,
     }
     fidelity = FidelityOfRun(**{**usual, **(settings or {})})
@@ -190,8 +204,8 @@ def case_of_study(
     entries = {
         "study_name": of.study_name,
         "title": study.title,
-        "run": run,
-        "timestep_s": timestep_s,
+        "run": deck.run,
+        "timestep_s": deck.timestep_s,
         "rayleigh_time_s": rayleigh_time_s,
         "gravity_m_s2": study.gravity_m_s2,
         "fidelity": fidelity,
@@ -239,68 +253,6 @@ def bowl_of_run(study: Study) -> BowlOfRun:
     return BowlOfRun(**dict(study.bowl.container))
 
 
-def liquid(study: Study) -> Liquid | None:
-    """The compound as an input script has it."""
-    compound = study.compound
-    return Liquid(study.liquid_level_m, compound.density_kg_m3) if compound else None
-
-
-def acting_gravity(study: Study) -> float:
-    """Gravity of a run with a bed, m/s2.
-
-    LIGGGHTS would lift every sphere of a clump by its whole volume: submerged clumps have their
-    weight minus buoyancy by a smaller gravity.
-    """
-    if study.compound is None or not study.media.clumped:
-        return study.gravity_m_s2
-    lifted = study.compound.density_kg_m3 / particle_material(study).density_kg_m3
-    return round_to(study.gravity_m_s2 * (1 - lifted), 12)
-
-
-def check_submerged(case: Case, bed: Bed) -> None:
-    """Refuse clumps that are not wholly below the surface of a liquid.
-
-    Raises
-    ------
-    InputError
-        The liquid is too low.
-    """
-    study, highest = case.study, bed.top_m + bed.margin_m
-    if study.compound and study.media.clumped and study.liquid_level_m < highest:
-        raise InputError(
-            "shaped media are not wholly submerged",
-            file=case.file,
-            field="compound.level_m",
-            value=study.liquid_level_m,
-            limit=f"at least {highest:.4g} m, the highest point of a particle",
-            remedy="use a higher level, fewer particles, or spheres",
-        )
-
-
-def liquid_models(study: Study) -> dict[str, str]:
-    """What a run with particles in a compound models of it."""
-    compound, level = study.compound, study.liquid_level_m
-    if compound is None:
-        return {}
-    lifted = f"liquid of {compound.density_kg_m3:g} kg/m3 up to {level:g} m"
-    if study.media.clumped:
-        lifted += "; by a smaller gravity, which acts on all particles as on submerged ones"
-    return {
-        "buoyancy of particles": lifted,
-        "friction and restitution in liquid": "the values of pairs, those of wet contacts",
-    }
-
-
-def liquid_leaves_out(study: Study) -> dict[str, LeftOut]:
-    """What it leaves out."""
-    left = {
-        f"{NOT_OF_LIQUID[0]}, {NOT_OF_LIQUID[1]} and {NOT_OF_LIQUID[2]}": "the liquid has no flow",
-        NOT_OF_LIQUID[3]: "LIGGGHTS has none for meshes; the report states the force",
-        NOT_OF_LIQUID[4]: "not offered: docs/explanation/limitations.md has the reasons",
-    }
-    return {name: LeftOut(why) for name, why in left.items()} if study.compound else {}
-
-
 def _classes(study: Study, scale: float) -> tuple[ClassOfRun, ...]:
     """The classes of the media; none where there is one only."""
     classes, first = [], 1
@@ -341,13 +293,15 @@ def _attractive(study: Study, material: str, scale: float) -> dict[str, dict[str
     return {body: values for body, values in forces.items() if values}
 
 
-def _contact_moduli(study: Study, material: str, scale: float) -> dict[str, ContactConstants]:
+def _contact_moduli(
+    study: Study, material: str, scale: float
+) -> dict[str, mechanics.ContactConstants]:
     """Contact constants of particles of a material by what they touch."""
     particle = study.materials[material]
     return {
-        name: ContactConstants(
-            modulus_pa=effective_modulus(particle, study.materials[other], scale),
-            shear_pa=effective_shear(particle, study.materials[other], scale),
+        name: mechanics.ContactConstants(
+            modulus_pa=mechanics.effective_modulus(particle, study.materials[other], scale),
+            shear_pa=mechanics.effective_shear(particle, study.materials[other], scale),
             restitution=study.pair(material, other).restitution,
             friction=study.pair(material, other).friction,
         )

@@ -8,6 +8,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from dragdeck.errors import InputError
+from dragdeck.parts import omitted
 from dragdeck.physics.estimates import SOLID_FRACTION_ESTIMATE
 from dragdeck.study.base import Line, Model, Number, Positive, Whole
 
@@ -28,10 +29,14 @@ Measured = Annotated[Number, Field(gt=0, lt=90)]
 class Repose(Model):
     """A cylinder of the bowl's material, lifted slowly off a plate with a glued layer of media."""
 
-    angle_deg: Measured = Field(description="angle of the heap to the horizontal, degrees")
-    angle_std_deg: Positive = Field(description="its standard uncertainty, degrees")
-    cylinder_radius_m: Positive = Field(description="inner radius of the cylinder, m")
-    count: Annotated[Whole, Field(ge=300, le=MOST_FREE)] = Field(description="number of particles")
+    angle_deg: Measured
+    """angle of the heap to the horizontal, degrees"""
+    angle_std_deg: Positive
+    """its standard uncertainty, degrees"""
+    cylinder_radius_m: Positive
+    """inner radius of the cylinder, m"""
+    count: Annotated[Whole, Field(ge=300, le=MOST_FREE)]
+    """number of particles"""
 
 
 class Drum(Model):
@@ -40,16 +45,18 @@ class Drum(Model):
     It turns about its horizontal axis.
     """
 
-    angle_deg: Measured = Field(
-        description="angle of the moving surface to the horizontal, degrees"
-    )
-    angle_std_deg: Positive = Field(description="its standard uncertainty, degrees")
-    radius_m: Positive = Field(description="inner radius of the drum, under the glued layer, m")
-    width_m: Positive = Field(description="distance between its end plates, m")
-    fill_fraction: Annotated[Number, Field(ge=0.1, le=0.4)] = Field(
-        description="volume of the bed / volume of the drum inside the glued layer"
-    )
-    rpm: Positive = Field(description="rotational speed of the drum, 1/min")
+    angle_deg: Measured
+    """angle of the moving surface to the horizontal, degrees"""
+    angle_std_deg: Positive
+    """its standard uncertainty, degrees"""
+    radius_m: Positive
+    """inner radius of the drum, under the glued layer, m"""
+    width_m: Positive
+    """distance between its end plates, m"""
+    fill_fraction: Annotated[Number, Field(ge=0.1, le=0.4)]
+    """volume of the bed / volume of the drum inside the glued layer"""
+    rpm: Positive
+    """rotational speed of the drum, 1/min"""
 
     def count(self, radius_m: float, volume_m3: float) -> int:
         """Number of particles of a mean radius, of the glued layer too, and of a mean volume."""
@@ -66,13 +73,10 @@ class Drum(Model):
 class Angles(Model):
     """Measured angles, from which friction and rolling friction of the media are found."""
 
-    friction: tuple[Positive, Positive] = Field(
-        default=(0.05, 1.0), description="range of the friction coefficient, with equal probability"
-    )
-    rolling_friction: tuple[Positive, Positive] = Field(
-        default=(0.005, 0.4),
-        description="range of the coefficient of rolling friction, with equal probability",
-    )
+    friction: tuple[Positive, Positive] = (0.05, 1.0)
+    """range of the friction coefficient, with equal probability"""
+    rolling_friction: tuple[Positive, Positive] = (0.005, 0.4)
+    """range of the coefficient of rolling friction, with equal probability"""
     repose: Repose | None = None
     drum: Drum | None = None
 
@@ -125,20 +129,13 @@ class Angles(Model):
 class Calibration(Model):
     """Measurements that `./run calibrate` fits coefficients to: a drop test, angles, or both."""
 
-    record: Line | None = Field(
-        default=None,
-        pattern=r"^[^{}]*$",
-        description="CSV file of force against time in a drop test; relative to the study",
-    )
-    height_std_m: Positive = Field(
-        default=1e-4, description="standard uncertainty of `drop_test.height_m`, m"
-    )
-    peaks: Literal["auto", "yes", "no"] = Field(
-        default="auto",
-        description="whether ratios of peak forces are fitted, too; auto: if the sensor is fast "
-        "enough",
-    )
-    angles: Angles | None = Field(default=None, exclude_if=lambda value: value is None)
+    record: Line | None = Field(default=None, pattern=r"^[^{}]*$")
+    """CSV file of force against time in a drop test; relative to the study"""
+    height_std_m: Positive = 1e-4
+    """standard uncertainty of `drop_test.height_m`, m"""
+    peaks: Literal["auto", "yes", "no"] = "auto"
+    """whether ratios of peak forces are fitted, too; auto: if the sensor is fast enough"""
+    angles: Angles | None = omitted(None)
 
     @model_validator(mode="after")
     def _something(self) -> Self:

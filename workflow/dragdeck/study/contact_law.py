@@ -17,6 +17,7 @@ import numpy as np
 from pydantic import Field
 
 from dragdeck.arrays import Floats, Ints, class_numbers
+from dragdeck.parts import omitted
 from dragdeck.study.base import Model, Number
 
 _PUSHING = ("hertz", "hertz/stiffness", "hooke", "hooke/stiffness")
@@ -48,14 +49,14 @@ class Coefficient:
     model : str
         What the contact model needs for it, one of `KEYWORDS` first; nothing where it always
         counts. Fields of `Contact` may stand in it.
+    attraction : callable or None
+        The attractive force that its model subtracts from the normal force, as cohesion does.
+        LIGGGHTS limits friction by the force without it.
     settings : str
         Options of the contact model that go with it.
     compared : {"each", "lowest"}
         Which value of a scene must lie within the measured range: that of each of the pairs
         particle-particle and particle-workpiece, or the lowest of all pairs.
-    attraction : callable or None
-        The attractive force that its model subtracts from the normal force, as cohesion does.
-        LIGGGHTS limits friction by the force without it.
     modulus_power : float
         With moduli times s, it is simulated times s to this power.
     """
@@ -63,9 +64,9 @@ class Coefficient:
     engine: str
     words: str
     model: str = ""
+    attraction: Attraction | None = None
     settings: str = ""
     compared: Literal["each", "lowest"] = "each"
-    attraction: Attraction | None = None
     modulus_power: float = 0.0
 
 
@@ -93,34 +94,41 @@ class Pair(Model):
 
     restitution: Annotated[
         Number,
-        Field(gt=0.05, le=1, description="coefficient of normal restitution"),
+        Field(gt=0.05, le=1),
         Coefficient("coefficientRestitution", "restitution", compared="lowest"),
-    ]  # fmt: skip
-    friction: Annotated[
-        Number,
-        Field(ge=0, le=10, description="Coulomb friction coefficient"),
-        Coefficient("coefficientFriction", "friction"),
     ]
+    """coefficient of normal restitution"""
+
+    friction: Annotated[Number, Field(ge=0, le=10), Coefficient("coefficientFriction", "friction")]
+    """Coulomb friction coefficient"""
     rolling_friction: Annotated[
         Number,
-        Field(ge=0, le=10, description="coefficient of rolling friction: largest rolling torque / "
-              "(normal force x effective radius)"),
-        Coefficient("coefficientRollingFriction", "rolling friction",
-                    "rolling_friction {rolling_model}", "torsionTorque on"),
-    ] = 0.0  # fmt: skip
+        Field(ge=0, le=10),
+        Coefficient(
+            "coefficientRollingFriction",
+            "rolling friction",
+            "rolling_friction {rolling_model}",
+            settings="torsionTorque on",
+        ),
+    ] = 0.0
+    """coefficient of rolling friction: largest rolling torque / (normal force x effective
+    radius)"""
+
     rolling_damping: Annotated[
         Number,
-        Field(ge=0, le=10, description="damping ratio of the rolling spring; for `epsd` only",
-              exclude_if=lambda value: value == 0),
+        Field(ge=0, le=10),
         Coefficient("coefficientRollingViscousDamping", "damping of rolling"),
-    ] = 0.0  # fmt: skip
+    ] = omitted(0.0)
+    """damping ratio of the rolling spring; for `epsd` only"""
+
     cohesion_j_m3: Annotated[
         Number,
-        Field(ge=0, description="cohesion energy density: attractive force / contact area",
-              exclude_if=lambda value: value == 0),
-        Coefficient("cohesionEnergyDensity", "cohesion", "cohesion sjkr2", attraction=_sjkr2,
-                    modulus_power=2 / 3),
-    ] = 0.0  # fmt: skip
+        Field(ge=0),
+        Coefficient(
+            "cohesionEnergyDensity", "cohesion", "cohesion sjkr2", _sjkr2, modulus_power=2 / 3
+        ),
+    ] = omitted(0.0)
+    """cohesion energy density: attractive force / contact area"""
 
     def softened(self, scale: float) -> "Pair":
         """The pair as it is simulated with moduli times `scale`."""
@@ -149,15 +157,10 @@ class Pair(Model):
 class Contact(Model):
     """Options of the contact law."""
 
-    limit_force: bool = Field(
-        default=True,
-        description="suppress tensile normal forces (LIGGGHTS: limitForce); for dry particles",
-    )
-    rolling_model: RollingModel = Field(
-        default="epsd2",
-        description="model of rolling friction (LIGGGHTS: rolling_friction)",
-        exclude_if=lambda value: value == "epsd2",
-    )
+    limit_force: bool = True
+    """suppress tensile normal forces (LIGGGHTS: limitForce); for dry particles"""
+    rolling_model: RollingModel = omitted("epsd2")
+    """model of rolling friction (LIGGGHTS: rolling_friction)"""
 
 
 @cache

@@ -1,31 +1,27 @@
 """How a run drives the drag: its steps, and what LIGGGHTS needs to know of a motion.
 
-Paths and superposed motions build on this: rotations of the workpiece, quantities that change in
-stages, and the entries of a motion in ``case.json``.
+Paths and superposed motions build on this, and on `rotations` and `stages`.
 """
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partialmethod
-from itertools import takewhile
 from typing import Any, Literal
 
 import numpy as np
 from markupsafe import Markup
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field
 
+from dragdeck.arrays import Floats
+
 Orientation = Literal["follow_path", "fixed"]
-Floats = NDArray[np.float64]
-StepCounts = NDArray[np.float64] | NDArray[np.int64]
+
 
 LIVE_REFERENCE = Markup("${reference_x} ${reference_y} ${reference_z}")
 """The reference point where the engine has it when the drag begins or is resumed."""
-
-
-# --- steps, formulas and movers ------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -245,182 +241,6 @@ def rates_about_axes(matrix: Floats, drive: Drive) -> tuple[float, float, float]
     x = math.atan2(-matrix[1, 2], matrix[2, 2])
     y, z = math.asin(matrix[0, 2]), math.atan2(-matrix[0, 1], matrix[0, 0])
     return x / drive.timestep_s, y / drive.timestep_s, z / drive.timestep_s
-
-
-# --- rotations, and angles about the vertical ----------------------------------------------------
-
-
-def wrap_angle(angle_rad: ArrayLike) -> Floats:
-    """Wrap angles into (-pi, pi]."""
-    turned = np.pi - np.asarray(angle_rad, dtype=np.float64)
-    return np.asarray(np.pi - np.mod(turned, 2.0 * np.pi))
-
-
-def rotated(vectors: Floats, angle_rad: Floats | float) -> Floats:
-    """Rotate (..., 3) vectors about the vertical."""
-    cos, sin = np.cos(angle_rad), np.sin(angle_rad)
-    x, y, z = np.moveaxis(vectors, -1, 0)
-    return np.stack([cos * x - sin * y, sin * x + cos * y, z], axis=-1)
-
-
-def about_vertical(rate_rad_s: Floats | float, arm_m: Floats) -> Floats:
-    """Velocity of a rotation about +z, ``w x r``, (N, 3) in m/s, at arms from its axis, (N, 3)."""
-    x, y, _ = arm_m.T
-    return np.column_stack([-rate_rad_s * y, rate_rad_s * x, np.zeros(len(arm_m))])
-
-
-def by_vector(vector_rad: Floats) -> Floats:
-    """Matrices, (..., 3, 3), of rotation vectors, (..., 3): axis times angle."""
-    from scipy.spatial.transform import Rotation
-
-    return np.asarray(Rotation.from_rotvec(vector_rad).as_matrix())
-
-
-def rotation_vector(matrix: Floats) -> Floats:
-    """Rotation vector, (3,), of a matrix, (3, 3), by less than half a turn."""
-    from scipy.spatial.transform import Rotation
-
-    return np.asarray(Rotation.from_matrix(matrix).as_rotvec())
-
-
-@dataclass(frozen=True)
-class Orientations:
-    """N orientations of a workpiece: from its own frame, +x its front and z up, to the bowl's.
-
-    Attributes
-    ----------
-    turn_rad : (N,) ndarray
-        About the vertical.
-    own : (N, 3, 3) ndarray or None
-        Rotations in its own frame, before that; None if it stands as it starts.
-    """
-
-    turn_rad: Floats
-    own: Floats | None = None
-
-    @property
-    def matrices(self) -> Floats:
-        """The rotations as matrices, (N, 3, 3)."""
-        matrix = np.eye(3) if self.own is None else self.own
-        columns = np.moveaxis(np.broadcast_to(matrix, (len(self.turn_rad), 3, 3)), -1, 0)
-        return np.stack([rotated(column, self.turn_rad) for column in columns], axis=-1)
-
-    @property
-    def front_rad(self) -> Floats:
-        """Direction of the front from +x, (N,)."""
-        if self.own is None:
-            return self.turn_rad
-        return np.asarray(self.turn_rad + np.arctan2(self.own[:, 1, 0], self.own[:, 0, 0]))
-
-    def out_of(self, vectors: Floats) -> Floats:
-        """Vectors of the workpiece's own frame, (N, 3), in the bowl's."""
-        if self.own is not None:
-            vectors = np.einsum("nij,nj->ni", self.own, vectors)
-        return rotated(vectors, self.turn_rad)
-
-    def into(self, vectors: Floats) -> Floats:
-        """Vectors of the bowl's frame, (N, 3), in the workpiece's own."""
-        turned = rotated(vectors, -self.turn_rad)
-        return turned if self.own is None else np.einsum("nji,nj->ni", self.own, turned)
-
-
-# --- a quantity in stages: one value after another, the last of which stays ----------------------
-
-
-def chain(
-    name: str, start: int, stages: Iterable[tuple[int, float]], per_formula: int = 1
-) -> dict[str, str]:
-    """Formulas of equal-style variables by name; the last one has the value of each stage.
-
-    Parameters
-    ----------
-    name : str
-        Of the variables, which are numbered from 1.
-    start : int
-        The step at which the first stage begins.
-    stages : iterable
-        Number of steps of each stage, and its value.
-    per_formula : int
-        Stages that one formula adds: many would be too long a line, and few are slower.
-    """
-    formulas: dict[str, str] = {}
-    end = start
-    for number, (steps, value) in enumerate(stages):
-        variable = f"{name}_{number // per_formula + 1}"
-        before = formulas.get(variable, f"v_{name}_{number // per_formula}")
-        later = f"{before}*(step<={end})+({value!r})*(step>{end})"
-        formulas[variable] = later if number else f"{value!r}"
-        end += steps
-    return formulas
-
-
-def in_steps(
-    ends_s: Iterable[float], steps: int, timestep_s: float
-) -> Iterator[tuple[int, float, float]]:
-    """Stages in whole steps, which together take a given number of them.
-
-    A quantity that adds up to what it should between the two times of each stage has no error of
-    rounding at the end of any of them. A stage has a step at least, unless there are too few.
-
-    Parameters
-    ----------
-    ends_s : iterable of float
-        End of each stage; those that begin after the last step are left out, and the last one
-        ends with it.
-    steps : int
-        Of all stages together.
-    timestep_s : float
-
-    Yields
-    ------
-    steps : int
-        Of the stage.
-    begin_s, end_s : float
-        Between which it is, before rounding.
-    """
-    whole_s = steps * timestep_s
-    ends = [*takewhile(lambda end: end < whole_s, ends_s), whole_s]
-    begun, begin_s = 0, 0.0
-    for left, end_s in zip(reversed(range(len(ends))), ends, strict=True):
-        end = min(max(begun + 1, round(end_s / timestep_s)), steps - left)
-        if end > begun:
-            yield end - begun, begin_s, end_s
-            begun, begin_s = end, end_s
-
-
-def integral(stages: Sequence[tuple[float, Any]], time_s: float) -> Any:
-    """What a rate adds up to from the beginning of the first stage to a time.
-
-    Parameters
-    ----------
-    stages : sequence
-        End of each stage, s, and its rate: a number or an array.
-    time_s : float
-    """
-    *others, (_, last) = stages
-    total, begun = 0.0, 0.0
-    for end, rate in [*others, (math.inf, last)]:
-        total += rate * max(0.0, min(time_s, end) - begun)
-        begun = end
-    return total
-
-
-def stage_at(steps: StepCounts, lengths: Sequence[int]) -> NDArray[np.int64]:
-    """Index of the stage of each step, (N,); a stage owns its last step.
-
-    Parameters
-    ----------
-    steps : (N,) ndarray of int
-        Counted from the start of the drag. Those before it belong to the first stage, those
-        after it to the last one.
-    lengths : sequence of int
-        Number of steps of each stage.
-    """
-    stage = np.searchsorted(np.cumsum(lengths), steps, side="left")
-    return np.minimum(stage, len(lengths) - 1)
-
-
-# --- entries in case.json ------------------------------------------------------------------------
 
 
 class PathEntry(BaseModel):

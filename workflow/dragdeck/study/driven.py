@@ -6,18 +6,12 @@ from functools import cached_property
 
 import numpy as np
 
+from dragdeck.arrays import Floats
 from dragdeck.study.bowl_motions.bowl_motion import BowlMotion
-from dragdeck.study.drive import (
-    Drive,
-    EngineMotion,
-    Floats,
-    Orientations,
-    PathEntry,
-    SmoothStart,
-    StepCounts,
-    SuperposedEntry,
-)
-from dragdeck.study.model import Motion
+from dragdeck.study.drive import Drive, EngineMotion, PathEntry, SmoothStart, SuperposedEntry
+from dragdeck.study.motion import Motion
+from dragdeck.study.rotations import Orientations
+from dragdeck.study.stages import StepCounts
 from dragdeck.study.superposed.motion import SuperposedMotion
 
 
@@ -101,7 +95,7 @@ class DrivenMotion:
         """Orientations after (N,) steps of a workpiece whose front begins in a direction."""
         path = self.motion.path
         turn = start_rad + path.turn(self.drive, since)
-        return self._rotated(since, Orientations(turn, path.own(self.drive, since)))
+        return self._rotated(since, Orientations(turn, path.in_frame(self.drive, since)))
 
     def rotation_along(self, since: StepCounts, direction_rad: Floats) -> Orientations:
         """Orientations after (N,) steps, at (N,) directions of motion."""
@@ -111,7 +105,7 @@ class DrivenMotion:
         path = self.motion.path
         first = np.full_like(direction_rad, path.direction_rad)
         turn = direction_rad if path.turns(self.drive.orientation) else first
-        return Orientations(turn, path.own(self.drive, since))
+        return Orientations(turn, path.in_frame(self.drive, since))
 
     def _rotated(self, since: StepCounts, rotation: Orientations) -> Orientations:
         for superposed in self.superposed.values():

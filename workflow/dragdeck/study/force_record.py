@@ -16,7 +16,7 @@ from dragdeck.arrays import Floats, Ints
 from dragdeck.errors import InputError, RecordError
 from dragdeck.study.reference import Signal, Span
 from dragdeck.study.rows import MOST_MISSING, Table
-from dragdeck.study.table import column_name, read_table
+from dragdeck.study.table import column_name, user_table
 
 TIME_COLUMNS = {"time_s": 1.0, "time_ms": 1e-3, "time_us": 1e-6}
 FORCE_COLUMNS = {"force_n": 1.0, "force_mn": 1e-3, "force_kn": 1e3}
@@ -64,7 +64,7 @@ def read_record(file: Path) -> Record:
     Parameters
     ----------
     file : Path
-        As for `read_table`: one column of `TIME_COLUMNS` and one of `FORCE_COLUMNS`; others are
+        As for `user_table`: one column of `TIME_COLUMNS` and one of `FORCE_COLUMNS`; others are
         left alone.
 
     Raises
@@ -84,7 +84,7 @@ def read_samples(
 
     `column` names the force where it is not one of `FORCE_COLUMNS`; `rate_hz` stands in for times.
     """
-    table = read_table(file)
+    table = user_table(file)
     name = _column(table, FORCE_COLUMNS) if column is None else column
     lines, time, forces = _series(table, [name], rate_hz)
     return time, forces[0], lines
@@ -119,7 +119,7 @@ def _series(
 
 def in_words(file: Path, signal: Signal | None = None) -> str:
     """How a record is read: columns, rate, first and last row, and what is missing of it."""
-    table, gaps = read_table(file), signal is not None
+    table, gaps = user_table(file), signal is not None
     angle, rate_hz = (signal.angle_column, signal.rate_hz) if signal else (None, None)
     columns = signal.columns if signal else [_column(table, FORCE_COLUMNS)]
     lines, time, values = _series(table, columns, rate_hz, angle, gaps=gaps)
@@ -388,7 +388,7 @@ def measured_signal(
         ``angle``, ``axes``, ``columns``, ``missing``, ``time``, ``uneven``, ``short``, ``start``,
         ``clipped`` or ``slow``.
     """
-    table, angle = read_table(file), signal.angle_column
+    table, angle = user_table(file), signal.angle_column
     lines, time, values = _series(table, signal.columns, signal.rate_hz, angle, gaps=True)
     time, values, missing, interval = _gathered(time, values, lines, bool(angle))
     raws = values[: len(signal.columns)]

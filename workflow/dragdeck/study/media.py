@@ -12,15 +12,13 @@ from itertools import pairwise
 from typing import Annotated, Literal, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from dragdeck.arrays import Floats
+from dragdeck.parts import omitted
 from dragdeck.physics.walls import Container
 from dragdeck.study.base import MaterialName, Model, Name, NonNegative, Number, Positive, Whole
 from dragdeck.study.shapes import FEWEST_SPHERES, AnyShape, solid_fraction
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 CUTOFF_STD = 2.5
 """Radii lie within this many standard deviations of the untruncated normal distribution."""
@@ -49,10 +47,6 @@ INSTEAD_OF: Mapping[str, Sequence[str]] = {
 """Fields that others of a study that is extended give way to."""
 
 
-def _none(value: object) -> bool:
-    return value is None
-
-
 class Sieve(NamedTuple):
     """A row of a sieve analysis: diameter, m, and the fraction of the mass that is finer."""
 
@@ -63,31 +57,21 @@ class Sieve(NamedTuple):
 class Grains(Model):
     """Particles of one material and one distribution of sizes."""
 
-    material: MaterialName | None = Field(
-        default=None, description="material of the particles: a name under `materials`"
+    material: MaterialName | None = None
+    """material of the particles: a name under `materials`"""
+    radius_mean_m: Positive | None = None
+    """mean particle radius, m"""
+    radius_std_m: NonNegative = 0.0
+    """standard deviation of the particle radii, m"""
+    distribution: Literal["normal", "log_normal", "uniform"] = omitted("normal")
+    """distribution of the radii"""
+    sieve: Annotated[list[Sieve], Field(min_length=2, max_length=MOST_SIEVES)] | None = omitted(
+        None
     )
-    radius_mean_m: Positive | None = Field(default=None, description="mean particle radius, m")
-    radius_std_m: NonNegative = Field(
-        default=0.0, description="standard deviation of the particle radii, m"
-    )
-    distribution: Literal["normal", "log_normal", "uniform"] = Field(
-        default="normal",
-        description="distribution of the radii",
-        exclude_if=lambda value: value == "normal",
-    )
-    sieve: Annotated[list[Sieve], Field(min_length=2, max_length=MOST_SIEVES)] | None = Field(
-        default=None,
-        description="sieve analysis instead of radius_mean_m: rows [diameter in m, finer fraction "
-        "of the mass], linear in between; or a CSV file with the columns diameter_m and "
-        "mass_passing",
-        exclude_if=_none,
-    )
-    shape: AnyShape | None = Field(
-        default=None,
-        description="shape of the particles, none: spheres; radii are those of spheres of equal "
-        "volume",
-        exclude_if=_none,
-    )
+    """sieve analysis instead of radius_mean_m: rows [diameter in m, finer fraction of the mass],
+    linear in between; or a CSV file with the columns diameter_m and mass_passing"""
+    shape: AnyShape | None = omitted(None)
+    """shape of the particles, none: spheres; radii are those of spheres of equal volume"""
 
     @model_validator(mode="after")
     def _sizes(self) -> Self:
@@ -103,7 +87,7 @@ class Grains(Model):
             )
         return self
 
-    def radii(self, count: int) -> Array:
+    def radii(self, count: int) -> Floats:
         """Radii in ascending order, (count,), m.
 
         Quantiles of the distribution; those of a mean and a standard deviation are then shifted and
@@ -153,35 +137,35 @@ def _check_sieve(rows: Sequence[Sieve]) -> None:
         )
 
 
-def quantiles(distribution: str, mean_m: float, std_m: float, count: int) -> Array:
+def quantiles(distribution: str, mean_m: float, std_m: float, count: int) -> Floats:
     """Radii of a distribution whose sample mean and spread are exact, (count,), ascending, m."""
     if count == 1 or std_m == 0:
         return np.full(count, mean_m)
     return _SPREAD[distribution](mean_m, std_m, count)
 
 
-def _normal_scores(count: int) -> Array:
+def _normal_scores(count: int) -> Floats:
     from scipy.special import ndtr, ndtri
 
     tail = float(ndtr(-CUTOFF_STD))
     return np.asarray(ndtri(tail + (1 - 2 * tail) * (np.arange(count) + 0.5) / count))
 
 
-def _scaled(scores: Array, mean_m: float, std_m: float) -> Array:
+def _scaled(scores: Floats, mean_m: float, std_m: float) -> Floats:
     scores = (scores - scores.mean()) / scores.std()
     return np.asarray(mean_m + std_m * scores, dtype=np.float64)
 
 
-def _normal(mean_m: float, std_m: float, count: int) -> Array:
+def _normal(mean_m: float, std_m: float, count: int) -> Floats:
     """A normal distribution cut at `CUTOFF_STD`."""
     return _scaled(_normal_scores(count), mean_m, std_m)
 
 
-def _uniform(mean_m: float, std_m: float, count: int) -> Array:
+def _uniform(mean_m: float, std_m: float, count: int) -> Floats:
     return _scaled((np.arange(count) + 0.5) / count, mean_m, std_m)
 
 
-def _log_normal(mean_m: float, std_m: float, count: int) -> Array:
+def _log_normal(mean_m: float, std_m: float, count: int) -> Floats:
     """A log-normal distribution cut at `CUTOFF_STD` of the logarithm."""
     from scipy.optimize import brentq
 
@@ -198,14 +182,14 @@ def _log_normal(mean_m: float, std_m: float, count: int) -> Array:
 _SPREAD = {"normal": _normal, "uniform": _uniform, "log_normal": _log_normal}
 
 
-def _numbers(rows: Sequence[Sieve]) -> tuple[Array, Array]:
+def _numbers(rows: Sequence[Sieve]) -> tuple[Floats, Floats]:
     """``1 / d^2`` of sieves, and what is proportional to the numbers between each and the next."""
     diameter, passing = np.array(rows, dtype=np.float64).T
     inverse = diameter**-2
     return inverse, np.diff(passing) / np.diff(diameter) * (inverse[:-1] - inverse[1:])
 
 
-def _sieved(rows: Sequence[Sieve], count: int) -> Array:
+def _sieved(rows: Sequence[Sieve], count: int) -> Floats:
     """Radii whose mass follows a sieve analysis.
 
     Between two sieves a and b the mass is uniform in the diameter d, so that the number density
@@ -222,38 +206,24 @@ def _sieved(rows: Sequence[Sieve], count: int) -> Array:
 class MediaClass(Grains):
     """One of several classes of particles."""
 
-    fraction: Annotated[Number, Field(gt=0, le=1)] = Field(
-        description="fraction of the class; all fractions sum to 1"
-    )
+    fraction: Annotated[Number, Field(gt=0, le=1)]
+    """fraction of the class; all fractions sum to 1"""
 
 
 class Media(Grains):
     """The media: spherical particles of one class, or of several."""
 
-    count: Annotated[Whole, Field(ge=1)] | None = Field(
-        default=None, description="number of particles"
-    )
-    mass_kg: Positive | None = Field(
-        default=None, description="total mass, kg, instead of count", exclude_if=_none
-    )
-    fill_height_m: Positive | None = Field(
-        default=None,
-        description="expected height of the bed, m, instead of count; the report states the height "
-        "obtained",
-        exclude_if=_none,
-    )
-    classes: dict[Name, MediaClass] = Field(
-        default_factory=dict,
-        max_length=MOST_CLASSES,
-        description="several classes by name, each with material, sizes and fraction, instead of "
-        "material and sizes here",
-        exclude_if=lambda value: not value,
-    )
-    fractions_of: Literal["number", "mass", "volume"] = Field(
-        default="mass",
-        description="quantity to which the fractions of the classes refer",
-        exclude_if=lambda value: value == "mass",
-    )
+    count: Annotated[Whole, Field(ge=1)] | None = None
+    """number of particles"""
+    mass_kg: Positive | None = omitted(None)
+    """total mass, kg, instead of count"""
+    fill_height_m: Positive | None = omitted(None)
+    """expected height of the bed, m, instead of count; the report states the height obtained"""
+    classes: Annotated[dict[Name, MediaClass], Field(max_length=MOST_CLASSES)] = omitted({})
+    """several classes by name, each with material, sizes and fraction, instead of material and
+    sizes here"""
+    fractions_of: Literal["number", "mass", "volume"] = omitted("mass")
+    """quantity to which the fractions of the classes refer"""
 
     @model_validator(mode="after")
     def _whole(self) -> Self:
@@ -309,7 +279,7 @@ class Media(Grains):
         """Whether some particles are no spheres; then all are clumps."""
         return any(part.shape is not None for part in self.parts.values())
 
-    def solid_fraction(self, radii_m: Array, numbers: Array) -> float:
+    def solid_fraction(self, radii_m: Floats, numbers: Floats) -> float:
         """That of a poured bed, an estimate.
 
         Parameters
@@ -372,7 +342,7 @@ def class_counts(
     return _whole_numbers({name: scale * number for name, number in by_number.items()})
 
 
-def few_sizes(radii_m: Array) -> Array:
+def few_sizes(radii_m: Floats) -> Floats:
     """Ascending radii in at most `MOST_SIZES` sizes, each the mean by volume of some of them."""
     parts = np.array_split(radii_m, min(MOST_SIZES, len(np.unique(radii_m))))
     return np.concatenate([np.full(len(part), np.cbrt((part**3).mean())) for part in parts])

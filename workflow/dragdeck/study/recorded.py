@@ -1,7 +1,7 @@
 """Tables in CSV files: their rows take their place in the study; errors name file and line."""
 
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,11 +18,12 @@ from dragdeck.study.base import Json
 from dragdeck.study.media import MOST_SIEVES, Sieve
 from dragdeck.study.paths.waypoints import MOST_POINTS, Waypoint
 from dragdeck.study.roughness import MOST_HEIGHTS, Height
-from dragdeck.study.table import read_table
+from dragdeck.study.table import user_table
 from dragdeck.study.workpiece import MeshShape
 from dragdeck.study.yaml import located, mesh_beside, study_folders
 
 _Place = tuple[Path | str, int | None, str | None]
+_Content = Callable[[Any, str, Path, dict[str | None, _Place]], Any]
 Places = Mapping[str | None, _Place]
 """File, line and column of fields that do not stand in the study's own file."""
 
@@ -38,44 +39,27 @@ def with_recording(data: Json, study: Path) -> tuple[Json, Places, Mapping[str, 
     unread : mapping
         Fields that still name a file, because that cannot be used, and why.
     """
-    motion, media = data.get("motion"), data.get("media")
     places: dict[str | None, _Place] = {}
     unread: dict[str, InputError] = {}
 
-    def filled(value: Any, field: str, content: Callable[..., Any]) -> Any:
-        try:
-            return content(value, field, study, places)
-        except InputError as error:
-            unread[field] = error
+    def filled(value: Any, names: Sequence[str], content: _Content, field: str = "") -> Any:
+        """The value of a block, with the content at these names below it, if it has them."""
+        if not names:
+            try:
+                return content(value, field, study, places)
+            except InputError as error:
+                unread[field] = error
+                return value
+        name, *below = names
+        keys = value if name == "*" and isinstance(value, dict) else [name]
+        if not isinstance(value, dict) or name not in (*value, "*"):
             return value
-
-    def grains(value: Any, field: str) -> Any:
-        if not isinstance(value, dict):
-            return value
-        contents = {"sieve": _sieved, "shape": _shaped}
-        known = {key: content for key, content in contents.items() if key in value}
         return value | {
-            k: filled(value[k], f"{field}.{k}", recorded) for k, recorded in known.items()
+            key: filled(value[key], below, content, f"{field}.{key}".lstrip(".")) for key in keys
         }
 
-    bowl = data.get("bowl")
-    if isinstance(bowl, dict) and bowl.get("kind") == "mesh":
-        data = {**data, "bowl": filled(bowl, "bowl", _meshed_bowl)}
-    roughness = data.get("roughness")
-    if isinstance(roughness, dict) and "profile" in roughness:
-        profile = filled(roughness["profile"], "roughness.profile", _profiled)
-        data = {**data, "roughness": {**roughness, "profile": profile}}
-    if isinstance(motion, dict) and "path" in motion:
-        path = filled(motion["path"], "motion.path", _waypoints)
-        data = {**data, "motion": {**motion, "path": path}}
-    if isinstance(media, dict):
-        classes = media.get("classes")
-        if isinstance(classes, dict):
-            recorded_classes = {
-                name: grains(class_, f"media.classes.{name}") for name, class_ in classes.items()
-            }
-            media = {**media, "classes": recorded_classes}
-        data = {**data, "media": grains(media, "media")}
+    for field, content in _CONTENTS.items():
+        data = filled(data, field.split("."), content)
     return data, places, unread
 
 
@@ -93,7 +77,9 @@ def _waypoints(path: Any, field: str, study: Path, places: dict[str | None, _Pla
 
 def _meshed_bowl(bowl: Any, field: str, study: Path, _: dict[str | None, _Place]) -> Any:
     """A bowl with its facets, if it names a mesh."""
-    if bowl.get("facets_m") or not isinstance(bowl.get("file"), str):
+    if not isinstance(bowl, dict) or bowl.get("kind") != "mesh" or bowl.get("facets_m"):
+        return bowl
+    if not isinstance(bowl.get("file"), str):
         return bowl
     file = recorded_file(bowl["file"], study, f"{field}.file")
     corners = bowl_facets(file, bowl.get("unit")).reshape(-1, 9)
@@ -108,18 +94,15 @@ def _shaped(shape: Any, field: str, study: Path, _: dict[str | None, _Place]) ->
     return {**shape, "points": convex_corners(file).tolist()}
 
 
-def _sieved(sieve: Any, field: str, study: Path, places: dict[str | None, _Place]) -> Any:
-    """A sieve analysis, if it is the name of a file of one."""
-    if not isinstance(sieve, str):
-        return sieve
-    return _read(recorded_file(sieve, study, field), Sieve, MOST_SIEVES, field, places)
+def _rows_of(row: type[NamedTuple], most: int) -> _Content:
+    """What gives the rows of a table for the name of its file."""
 
+    def rows(value: Any, field: str, study: Path, places: dict[str | None, _Place]) -> Any:
+        if not isinstance(value, str):
+            return value
+        return _read(recorded_file(value, study, field), row, most, field, places)
 
-def _profiled(profile: Any, field: str, study: Path, places: dict[str | None, _Place]) -> Any:
-    """A roughness profile, if it is the name of a file of one."""
-    if not isinstance(profile, str):
-        return profile
-    return _read(recorded_file(profile, study, field), Height, MOST_HEIGHTS, field, places)
+    return rows
 
 
 def mesh_errors(data: Json, study: Path) -> Iterator[InputError]:
@@ -167,7 +150,7 @@ def _read(
 
     Of too long a file, no more is read than shows that it is.
     """
-    columns, optional, table = row._fields, tuple(row._field_defaults), read_table(file, most)
+    columns, optional, table = row._fields, tuple(row._field_defaults), user_table(file, most)
     header, needed = table.names, columns[: len(columns) - len(optional)]
     if not set(needed) <= set(header) <= set(columns) or len(set(header)) < len(header):
         limit = ",".join(needed) + (f", optionally {', '.join(optional)}" if optional else "")
@@ -185,3 +168,15 @@ def _read(
             places[f"{field}.{number}.{at}"] = file, line, name
     rows: list[JsonValue] = points
     return rows
+
+
+_CONTENTS: Mapping[str, _Content] = {
+    "bowl": _meshed_bowl,
+    "roughness.profile": _rows_of(Height, MOST_HEIGHTS),
+    "motion.path": _waypoints,
+    "media.sieve": (_sieves := _rows_of(Sieve, MOST_SIEVES)),
+    "media.shape": _shaped,
+    "media.classes.*.sieve": _sieves,
+    "media.classes.*.shape": _shaped,
+}
+"""What takes the place of the name of a file, by its field."""

@@ -14,21 +14,15 @@ RADIAL = {row["name"] for row in QUANTITIES if row["radial"]}
 class Reduction(Model):
     """A smaller scene in place of the machine: the rest of the study describes the machine."""
 
-    cut_out: bool = Field(
-        default=False,
-        description="whether a straight trough around a part of the path stands for the machine",
-    )
-    counted_m: Positive | None = Field(
-        default=None,
-        description="length of the line that the statistics include, m; none: that of the study, "
-        "at most 40 particle diameters",
-    )
+    cut_out: bool = False
+    """whether a straight trough around a part of the path stands for the machine"""
+    counted_m: Positive | None = None
+    """length of the line that the statistics include, m; none: that of the study, at most 40
+    particle diameters"""
 
-    coarser: Annotated[Number, Field(ge=1, le=4)] | None = Field(
-        default=None,
-        description="factor on the diameters of the particles, in the same space; the report "
-        "extrapolates from two or more in `sweep` to 1",
-    )
+    coarser: Annotated[Number, Field(ge=1, le=4)] | None = None
+    """factor on the diameters of the particles, in the same space; the report extrapolates from two
+    or more in `sweep` to 1"""
 
     @model_validator(mode="after")
     def _of_cut_out(self) -> Self:

@@ -10,13 +10,11 @@ from dataclasses import dataclass
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
+from dragdeck.arrays import Floats
 from dragdeck.errors import choices
 from dragdeck.study.base import Model, Positive
-
-_Floats = NDArray[np.float64]
 
 _TELLS = 0.5
 """With a larger relative uncertainty, the interval of a coefficient reaches zero."""
@@ -25,36 +23,31 @@ _TELLS = 0.5
 class WeighedTrial(Model):
     """A trial after which the workpiece was weighed."""
 
-    mass_loss_kg: Positive = Field(description="mass that one workpiece lost in the trial, kg")
-    time_s: Positive = Field(description="duration of the trial, s")
-    sd_kg: Positive = Field(description="standard uncertainty of `mass_loss_kg`, kg")
+    mass_loss_kg: Positive
+    """mass that one workpiece lost in the trial, kg"""
+    time_s: Positive
+    """duration of the trial, s"""
+    sd_kg: Positive
+    """standard uncertainty of `mass_loss_kg`, kg"""
 
 
 class Removal(Model):
     """How load becomes removal, for the report; no run depends on it."""
 
-    law: str = Field(
-        default="archard",
-        description="law of removal: `archard`, `finnie`, `oka`, or a sum such as `archard+oka`",
-    )
-    coefficient_m2_n: Positive | None = Field(
-        default=None, description="removed volume per action, m2/N; none: from `calibrate`"
-    )
-    sd_m2_n: Positive | None = Field(
-        default=None, description="standard uncertainty of `coefficient_m2_n`, m2/N"
-    )
-    calibrate: Annotated[list[WeighedTrial], Field(min_length=1, max_length=100)] | None = Field(
-        default=None, description="weighed trial of this process, or a list of those"
-    )
-    impact_ratio: Positive | None = Field(
-        default=None, description="of a sum: coefficient of the impact law / that of sliding"
-    )
-    hardness_pa: Positive | None = Field(
-        default=None, description="Vickers hardness of the workpiece, Pa; for `oka` only"
-    )
-    target_depth_m: Positive | None = Field(
-        default=None, description="removal depth for which the time is reported, m"
-    )
+    law: str = "archard"
+    """law of removal: `archard`, `finnie`, `oka`, or a sum such as `archard+oka`"""
+    coefficient_m2_n: Positive | None = None
+    """removed volume per action, m2/N; none: from `calibrate`"""
+    sd_m2_n: Positive | None = None
+    """standard uncertainty of `coefficient_m2_n`, m2/N"""
+    calibrate: Annotated[list[WeighedTrial], Field(min_length=1, max_length=100)] | None = None
+    """weighed trial of this process, or a list of those"""
+    impact_ratio: Positive | None = None
+    """of a sum: coefficient of the impact law / that of sliding"""
+    hardness_pa: Positive | None = None
+    """Vickers hardness of the workpiece, Pa; for `oka` only"""
+    target_depth_m: Positive | None = None
+    """removal depth for which the time is reported, m"""
 
     @field_validator("calibrate", mode="before")
     @classmethod
@@ -190,25 +183,25 @@ class Wearing:
         Relative velocity at the contact point at first touch, positive when closing; m/s.
     """
 
-    force_slide_n_m: _Floats
-    mass_kg: _Floats
-    radius_m: _Floats
-    normal_m_s: _Floats
-    tangential_m_s: _Floats
+    force_slide_n_m: Floats
+    mass_kg: Floats
+    radius_m: Floats
+    normal_m_s: Floats
+    tangential_m_s: Floats
 
     @property
-    def double_energy_j(self) -> _Floats:
+    def double_energy_j(self) -> Floats:
         """Mass times the square of the speed, (N,), zero where the surfaces do not close."""
         square = self.normal_m_s**2 + self.tangential_m_s**2
         return np.where(self.normal_m_s > 0.0, self.mass_kg * square, 0.0)
 
     @property
-    def angle_rad(self) -> _Floats:
+    def angle_rad(self) -> Floats:
         """Angle of impact, (N,)."""
         return impact_angle(self.normal_m_s, self.tangential_m_s)
 
 
-def impact_angle(normal_m_s: _Floats, tangential_m_s: _Floats) -> _Floats:
+def impact_angle(normal_m_s: Floats, tangential_m_s: Floats) -> Floats:
     """Angle from the surface at which N surfaces close at these velocities, (N,), 0 to pi/2."""
     return np.arctan2(np.maximum(normal_m_s, 0.0), tangential_m_s)
 
@@ -231,11 +224,11 @@ class Law:
 
     title: str
     impact: bool
-    action: Callable[[Wearing, Removal], _Floats]
+    action: Callable[[Wearing, Removal], Floats]
     parameters: tuple[str, ...] = ()
 
 
-def _finnie(wearing: Wearing, _: Removal) -> _Floats:
+def _finnie(wearing: Wearing, _: Removal) -> Floats:
     """Finnie (1960), with a ratio of normal to tangential force of 2."""
     angle = wearing.angle_rad
     flat = np.sin(2 * angle) - 3 * np.sin(angle) ** 2
@@ -245,7 +238,7 @@ def _finnie(wearing: Wearing, _: Removal) -> _Floats:
 _OKA_SPEED_M_S, _OKA_DIAMETER_M = 104.0, 326e-6
 
 
-def _oka(wearing: Wearing, of: Removal) -> _Floats:
+def _oka(wearing: Wearing, of: Removal) -> Floats:
     """Oka et al. (2005), with their constants for sand; hardness in GPa.
 
     ``m v^2 (v/v')^(k2 - 2) (D/D')^k3 sin(a)^n1 (1 + Hv (1 - sin(a)))^n2``.
@@ -259,7 +252,7 @@ def _oka(wearing: Wearing, of: Removal) -> _Floats:
     )
 
 
-def _archard(wearing: Wearing, _: Removal) -> _Floats:
+def _archard(wearing: Wearing, _: Removal) -> Floats:
     """Archard (1953), and Preston (1927) for polishing."""
     return wearing.force_slide_n_m
 

@@ -27,8 +27,10 @@ class Height(NamedTuple):
 class Turned(Model):
     """Grooves of a turning tool: arcs of its nose, a feed apart."""
 
-    feed_m: Positive = Field(description="feed per revolution, m")
-    nose_radius_m: Positive = Field(description="radius of the tool's nose, m")
+    feed_m: Positive
+    """feed per revolution, m"""
+    nose_radius_m: Positive
+    """radius of the tool's nose, m"""
 
     @model_validator(mode="after")
     def _arcs_meet(self) -> "Turned":
@@ -40,38 +42,36 @@ class Turned(Model):
 class Form(Model):
     """A periodic profile of a stated form."""
 
-    shape: Literal["sine", "triangle"] = Field(description="form of a period")
-    ra_m: Positive = Field(description="arithmetic mean deviation Ra, m")
+    shape: Literal["sine", "triangle"]
+    """form of a period"""
+    ra_m: Positive
+    """arithmetic mean deviation Ra, m"""
 
 
 class MeasuredRa(Model):
     """A roughness that was measured during the process."""
 
-    time_s: Positive = Field(description="process time, s")
-    ra_m: Positive = Field(description="arithmetic mean deviation Ra, m")
+    time_s: Positive
+    """process time, s"""
+    ra_m: Positive
+    """arithmetic mean deviation Ra, m"""
 
 
 class Roughness(Model):
     """What the roughness is before the process; no run depends on it."""
 
-    profile: Annotated[list[Height], Field(min_length=100, max_length=MOST_HEIGHTS)] | None = Field(
-        default=None,
-        description="measured profile without form and waviness: a CSV file with columns x_m and "
-        "z_m, evenly spaced along x",
-    )
+    profile: Annotated[list[Height], Field(min_length=100, max_length=MOST_HEIGHTS)] | None = None
+    """measured profile without form and waviness: a CSV file with columns x_m and z_m, evenly
+    spaced along x"""
     turned: Turned | None = None
     form: Form | None = None
-    steady_ra_m: Positive | None = Field(
-        default=None, description="Ra that the process does not go below, m; none: not known"
-    )
-    target_ra_m: Positive | None = Field(
-        default=None, description="Ra for which the time is reported, m"
-    )
-    measured: Annotated[list[MeasuredRa], Field(max_length=100)] = Field(
-        default_factory=list,
-        description="Ra measured at other times: they fit the depth per time, and the steady Ra "
-        "unless it is given",
-    )
+    steady_ra_m: Positive | None = None
+    """Ra that the process does not go below, m; none: not known"""
+    target_ra_m: Positive | None = None
+    """Ra for which the time is reported, m"""
+    measured: Annotated[list[MeasuredRa], Field(max_length=100)] = Field(default_factory=list)
+    """Ra measured at other times: they fit the depth per time, and the steady Ra unless it is
+    given"""
 
     @model_validator(mode="after")
     def _whole(self) -> "Roughness":

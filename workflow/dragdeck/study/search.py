@@ -43,17 +43,14 @@ else:
 class SearchedMeasure(Model):
     """A quantity of a process, of the whole workpiece or of a part of its surface."""
 
-    quantity: SearchedQuantity = Field(
-        description="`removal_depth` (mean over the immersed surface, um/h), `removal_variation` "
-        "(its coefficient of variation), `minutes` (to `removal.target_depth_m` on average), "
-        "`minutes_slowest` (on 95 % of the surface), `peak_pressure` (95th percentile over first "
-        "touches, Pa), or a quantity of the report, in its unit"
-    )
-    heights_m: tuple[Number, Number] | None = Field(
-        default=None,
-        description="for `removal_*`: two heights above the tip between which the surface counts, "
-        "m; none: all of it",
-    )
+    quantity: SearchedQuantity
+    """`removal_depth` (mean over the immersed surface, um/h), `removal_variation` (its coefficient
+    of variation), `minutes` (to `removal.target_depth_m` on average), `minutes_slowest` (on 95 % of
+    the surface), `peak_pressure` (95th percentile over first touches, Pa), or a quantity of the
+    report, in its unit"""
+    heights_m: tuple[Number, Number] | None = None
+    """for `removal_*`: two heights above the tip between which the surface counts, m; none: all of
+    it"""
 
     @model_validator(mode="after")
     def _part(self) -> "SearchedMeasure":
@@ -83,11 +80,10 @@ class SearchedMeasure(Model):
 class Objective(SearchedMeasure):
     """What is to be as small or large as possible, or near a value."""
 
-    goal: Literal["minimise", "maximise", "target"] = Field(
-        default="minimise",
-        description="whether the quantity is minimised, maximised, or brought to `value`",
-    )
-    value: Number | None = Field(default=None, description="target value")
+    goal: Literal["minimise", "maximise", "target"] = "minimise"
+    """whether the quantity is minimised, maximised, or brought to `value`"""
+    value: Number | None = None
+    """target value"""
 
     @model_validator(mode="after")
     def _wanted(self) -> "Objective":
@@ -101,8 +97,10 @@ class Objective(SearchedMeasure):
 class SearchLimit(SearchedMeasure):
     """A limit on a quantity."""
 
-    at_least: Number | None = Field(default=None, description="smallest accepted value")
-    at_most: Number | None = Field(default=None, description="largest accepted value")
+    at_least: Number | None = None
+    """smallest accepted value"""
+    at_most: Number | None = None
+    """largest accepted value"""
 
     @model_validator(mode="after")
     def _any(self) -> "SearchLimit":
@@ -125,28 +123,21 @@ class SearchLimit(SearchedMeasure):
 class Search(Model):
     """Which setting of the machine is best: Bayesian optimisation over some fields."""
 
-    vary: dict[str, tuple[Number, Number]] = Field(
-        min_length=1,
-        max_length=8,
-        description="dotted field name: its lowest and highest value, in the unit of the field",
-    )
+    vary: dict[str, tuple[Number, Number]] = Field(min_length=1, max_length=8)
+    """dotted field name: its lowest and highest value, in the unit of the field"""
     objective: Objective
-    limits: list[SearchLimit] = Field(default_factory=list, description="limits on quantities")
-    runs: Annotated[Whole, Field(ge=4, le=200)] = Field(
-        default=20, description="number of settings tried before the confirmation"
-    )
-    start: Annotated[Whole, Field(ge=3, le=100)] = Field(
-        default=6, description="settings of the first round, spread evenly"
-    )
-    at_once: Annotated[Whole, Field(ge=1, le=16)] = Field(
-        default=1, description="settings per further round"
-    )
-    confirm: Name = Field(
-        default="full", description="fidelity of the confirmation of the best setting"
-    )
-    seed: Annotated[Whole, Field(ge=0, lt=2**31)] = Field(
-        default=1, description="random seed of the search"
-    )
+    limits: list[SearchLimit] = Field(default_factory=list)
+    """limits on quantities"""
+    runs: Annotated[Whole, Field(ge=4, le=200)] = 20
+    """number of settings tried before the confirmation"""
+    start: Annotated[Whole, Field(ge=3, le=100)] = 6
+    """settings of the first round, spread evenly"""
+    at_once: Annotated[Whole, Field(ge=1, le=16)] = 1
+    """settings per further round"""
+    confirm: Name = "full"
+    """fidelity of the confirmation of the best setting"""
+    seed: Annotated[Whole, Field(ge=0, lt=2**31)] = 1
+    """random seed of the search"""
 
     @model_validator(mode="after")
     def _order(self) -> "Search":

@@ -9,13 +9,12 @@ import math
 from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from dragdeck.arrays import Floats
+from dragdeck.parts import omitted
 from dragdeck.physics.estimates import SOLID_FRACTION_ESTIMATE
 from dragdeck.study.base import Model, Number, Positive, Whole
-
-Corners = NDArray[np.float64]
 
 SOLID_FRACTION_STD = 0.03
 """Standard deviation of measured solid fractions over those of `solid_fraction`, less 1
@@ -27,7 +26,7 @@ size; the widest that was measured; parts by which the solid fraction grows with
 above the former, and with its square."""
 
 
-def solid_fraction(radii_m: Corners, numbers: Corners, denser: float) -> float:
+def solid_fraction(radii_m: Floats, numbers: Floats, denser: float) -> float:
     """Solid fraction of a poured bed before it exists, from docs/data/scenes/solid_fraction.csv.
 
     Parameters
@@ -48,7 +47,7 @@ FEWEST_SPHERES, MOST_SPHERES = 2, 40
 """Spheres of a clump: LIGGGHTS accepts no single one, and more cost more than a shape is worth."""
 
 _SIDES = 96
-"""Corners of the polygon that stands for a circle: its area is 0.07 % too small."""
+"""Floats of the polygon that stands for a circle: its area is 0.07 % too small."""
 
 MOST_CORNERS = 1000
 """A body with more corners is described more finely than its spheres can be."""
@@ -72,16 +71,15 @@ class ParticleShape(Model):
 
     denser: ClassVar[float] = 1.04
 
-    spheres: Annotated[Whole, Field(ge=FEWEST_SPHERES, le=MOST_SPHERES)] = Field(
-        description="number of spheres; `./run dragdeck shapes` lists the errors"
-    )
+    spheres: Annotated[Whole, Field(ge=FEWEST_SPHERES, le=MOST_SPHERES)]
+    """number of spheres; `./run dragdeck shapes` lists the errors"""
 
-    def corners(self) -> Corners:
+    def corners(self) -> Floats:
         """Points whose convex hull is the body, (N, 3); their scale is of no importance."""
         raise NotImplementedError
 
 
-def _ring(height: float, cut: float = 0.0) -> Corners:
+def _ring(height: float, cut: float = 0.0) -> Floats:
     """A circle of diameter 1 about z, in a plane that is inclined about y by a slope."""
     angle = math.tau * np.arange(_SIDES) / _SIDES
     x, y = 0.5 * np.cos(angle), 0.5 * np.sin(angle)
@@ -93,16 +91,14 @@ class CylinderParticle(ParticleShape):
 
     denser: ClassVar[float] = 1.06
 
-    kind: Literal["cylinder"] = Field(description="cylinder with straight ends, or cut at an angle")
-    aspect: _Aspect = Field(description="length / diameter")
-    cut_deg: Annotated[Number, Field(ge=0, le=60)] = Field(
-        default=0.0,
-        description="angle of the two parallel end faces from those of a straight cylinder, "
-        "degrees",
-        exclude_if=lambda value: not value,
-    )
+    kind: Literal["cylinder"]
+    """cylinder with straight ends, or cut at an angle"""
+    aspect: _Aspect
+    """length / diameter"""
+    cut_deg: Annotated[Number, Field(ge=0, le=60)] = omitted(0.0)
+    """angle of the two parallel end faces from those of a straight cylinder, degrees"""
 
-    def corners(self) -> Corners:
+    def corners(self) -> Floats:
         """The rims of both ends."""
         cut = math.tan(math.radians(self.cut_deg))
         return np.vstack([_ring(-self.aspect / 2, cut), _ring(self.aspect / 2, cut)])
@@ -113,10 +109,12 @@ class ConeParticle(ParticleShape):
 
     denser: ClassVar[float] = 1.07
 
-    kind: Literal["cone"] = Field(description="circular cone")
-    aspect: _Aspect = Field(description="height / diameter of the base")
+    kind: Literal["cone"]
+    """circular cone"""
+    aspect: _Aspect
+    """height / diameter of the base"""
 
-    def corners(self) -> Corners:
+    def corners(self) -> Floats:
         """The rim of the base and the tip."""
         return np.vstack([_ring(0.0), [[0.0, 0.0, self.aspect]]])
 
@@ -126,9 +124,10 @@ class TetrahedronParticle(ParticleShape):
 
     denser: ClassVar[float] = 1.01
 
-    kind: Literal["tetrahedron"] = Field(description="regular tetrahedron")
+    kind: Literal["tetrahedron"]
+    """regular tetrahedron"""
 
-    def corners(self) -> Corners:
+    def corners(self) -> Floats:
         """Four corners of a cube."""
         return np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], dtype=np.float64)
 
@@ -138,12 +137,12 @@ class PrismParticle(ParticleShape):
 
     denser: ClassVar[float] = 1.01
 
-    kind: Literal["triangular_prism"] = Field(
-        description="straight prism on an equilateral triangle"
-    )
-    aspect: _Aspect = Field(description="length / side of the triangle")
+    kind: Literal["triangular_prism"]
+    """straight prism on an equilateral triangle"""
+    aspect: _Aspect
+    """length / side of the triangle"""
 
-    def corners(self) -> Corners:
+    def corners(self) -> Floats:
         """Three corners of each end."""
         x, y = [-0.5, 0.5, 0.0], [0.0, 0.0, math.sqrt(0.75)]
         ends = [np.column_stack([x, y, np.full(3, end)]) for end in (0.0, self.aspect)]
@@ -155,10 +154,10 @@ class EllipsoidParticle(ParticleShape):
 
     denser: ClassVar[float] = 1.06
 
-    kind: Literal["ellipsoid"] = Field(description="ellipsoid")
-    axes: tuple[Positive, Positive, Positive] = Field(
-        description="proportions of the half-axes, such as [2, 1, 1]; ratio at most 5"
-    )
+    kind: Literal["ellipsoid"]
+    """ellipsoid"""
+    axes: tuple[Positive, Positive, Positive]
+    """proportions of the half-axes, such as [2, 1, 1]; ratio at most 5"""
 
     @model_validator(mode="after")
     def _proportion(self) -> Self:
@@ -169,7 +168,7 @@ class EllipsoidParticle(ParticleShape):
             )
         return self
 
-    def corners(self) -> Corners:
+    def corners(self) -> Floats:
         """Points spread evenly over the unit sphere by the golden angle, stretched."""
         count = MOST_CORNERS
         z = 1 - (2 * np.arange(count) + 1) / count
@@ -181,15 +180,14 @@ class EllipsoidParticle(ParticleShape):
 class MeshParticle(ParticleShape):
     """A body of the user's; its size in the file is of no importance."""
 
-    kind: Literal["mesh"] = Field(description="convex body from a mesh file")
+    kind: Literal["mesh"]
+    """convex body from a mesh file"""
     points: Annotated[
         tuple[tuple[Number, Number, Number], ...], Field(min_length=4, max_length=MOST_CORNERS)
-    ] = Field(
-        description="file beside the study with a closed, convex surface, for example STL; or a "
-        "list of corners"
-    )
+    ]
+    """file beside the study with a closed, convex surface, for example STL; or a list of corners"""
 
-    def corners(self) -> Corners:
+    def corners(self) -> Floats:
         """As given."""
         return np.array(self.points, dtype=np.float64)
 

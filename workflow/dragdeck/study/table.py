@@ -52,7 +52,7 @@ _LABVIEW_UNITS = "Y_Unit_Label"
 """First word of the line of its head with the units of all columns but that of the times."""
 
 
-def read_table(file: Path, most: int | None = None) -> Table:
+def user_table(file: Path, most: int | None = None) -> Table:
     """Read a CSV file: a header line, then one row per line.
 
     Lines that begin with ``#`` are comments; they and blank lines are passed over. Blanks may align

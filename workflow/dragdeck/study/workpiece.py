@@ -5,52 +5,42 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
+from dragdeck.parts import omitted
 from dragdeck.study.base import Line, Model, Number, Positive, Whole
 
 
 class CylinderShape(Model):
     """A generated round workpiece with flat ends."""
 
-    kind: Literal["cylinder"] = Field(description="cylinder, meshed by dragdeck")
-    radius_m: Positive = Field(description="radius of the cylinder, m")
-    facet_size_m: Positive = Field(
-        default=0.0015, description="mesh size of the cylinder around its axis, m"
-    )
-    facet_length_m: Positive = Field(
-        default=0.01, description="mesh size of the cylinder along its axis, m"
-    )
+    kind: Literal["cylinder"]
+    """cylinder, meshed by dragdeck"""
+    radius_m: Positive
+    """radius of the cylinder, m"""
+    facet_size_m: Positive = 0.0015
+    """mesh size of the cylinder around its axis, m"""
+    facet_length_m: Positive = 0.01
+    """mesh size of the cylinder along its axis, m"""
 
 
 class MeshShape(Model):
     """A workpiece from a mesh or CAD file, turned upright, its lowest point the tip."""
 
-    kind: Literal["mesh"] = Field(description="part from a file")
-    file: Line = Field(
-        description="file in STL, OBJ, PLY, VTK, VTU or STEP format, relative to the study or to "
-        "meshes/"
-    )
-    unit: Literal["m", "cm", "mm", "um", "in"] | None = Field(
-        default=None, description="unit of length in the file; none: that which a STEP file states"
-    )
-    facet_size_m: Positive | None = Field(
-        default=None,
-        description="target edge length of the facets, m; required for STEP; none: the facets of "
-        "the file, otherwise a closed surface is meshed anew",
-    )
-    edge_facet_size_m: Positive | None = Field(
-        default=None, description="the same at sharp edges of a STEP part, m; none: `facet_size_m`"
-    )
-    axis: Literal["+x", "-x", "+y", "-y", "+z", "-z"] = Field(
-        default="+z",
-        exclude_if=lambda value: value == "+z",
-        description="direction in the file from tip to clamp; the part is turned until it points "
-        "up, about y for x, about x for the others",
-    )
-    offset_m: tuple[Number, Number] | None = Field(
-        default=None,
-        description="x and y of the clamping axis after this turn, m; none: centre of the bounding "
-        "box",
-    )
+    kind: Literal["mesh"]
+    """part from a file"""
+    file: Line
+    """file in STL, OBJ, PLY, VTK, VTU or STEP format, relative to the study or to meshes/"""
+    unit: Literal["m", "cm", "mm", "um", "in"] | None = None
+    """unit of length in the file; none: that which a STEP file states"""
+    facet_size_m: Positive | None = None
+    """target edge length of the facets, m; required for STEP; none: the facets of the file,
+    otherwise a closed surface is meshed anew"""
+    edge_facet_size_m: Positive | None = None
+    """the same at sharp edges of a STEP part, m; none: `facet_size_m`"""
+    axis: Literal["+x", "-x", "+y", "-y", "+z", "-z"] = omitted("+z")
+    """direction in the file from tip to clamp; the part is turned until it points up, about y for
+    x, about x for the others"""
+    offset_m: tuple[Number, Number] | None = None
+    """x and y of the clamping axis after this turn, m; none: centre of the bounding box"""
 
 
 Shape = Annotated[CylinderShape | MeshShape, Field(discriminator="kind")]
@@ -59,31 +49,27 @@ Shape = Annotated[CylinderShape | MeshShape, Field(discriminator="kind")]
 class Workpiece(Model):
     """The workpiece that is dragged."""
 
-    material: str = Field(description="material of the workpiece: a name under `materials`")
+    material: str
+    """material of the workpiece: a name under `materials`"""
     shape: Shape
 
 
 class Station(Model):
     """A workpiece of a carousel."""
 
-    angle_deg: Number = Field(
-        description="angle of its path and motion about the bowl's axis, degrees; positive: "
-        "counter-clockwise seen from above"
-    )
+    angle_deg: Number
+    """angle of its path and motion about the bowl's axis, degrees; positive: counter-clockwise seen
+    from above"""
     shape: Shape | None = None
-    immersion_depth_m: Positive | None = Field(
-        default=None, description="immersion depth of its tip, m; none: that of the motion"
-    )
+    immersion_depth_m: Positive | None = None
+    """immersion depth of its tip, m; none: that of the motion"""
 
 
 class Carousel(Model):
     """Several workpieces that move alike, each turned about the bowl's axis."""
 
-    count: Annotated[Whole, Field(ge=1, le=12)] | None = Field(
-        default=None,
-        description="number of workpieces with `workpiece.shape` at equal angles; either this or a "
-        "list",
-    )
+    count: Annotated[Whole, Field(ge=1, le=12)] | None = None
+    """number of workpieces with `workpiece.shape` at equal angles; either this or a list"""
     each: list[Station] | None = Field(default=None, min_length=1, max_length=12)
 
     @model_validator(mode="before")
@@ -110,6 +96,9 @@ class Carousel(Model):
 class Material(Model):
     """An elastic material."""
 
-    youngs_modulus_pa: Positive = Field(description="physical Young's modulus, Pa")
-    poissons_ratio: Annotated[Number, Field(gt=-1, lt=0.5)] = Field(description="Poisson's ratio")
-    density_kg_m3: Positive = Field(description="density of the solid material, kg/m3")
+    youngs_modulus_pa: Positive
+    """physical Young's modulus, Pa"""
+    poissons_ratio: Annotated[Number, Field(gt=-1, lt=0.5)]
+    """Poisson's ratio"""
+    density_kg_m3: Positive
+    """density of the solid material, kg/m3"""

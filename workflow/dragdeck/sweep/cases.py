@@ -1,162 +1,40 @@
-"""Designs of runs, and the cases of a study file: one per combination of its sweep.
-
-Every campaign has one shape (`dragchain.report.campaign` has the rest of it): a design of runs,
-a row of measures of each run, a judgement of the rows, and a report. This is the grammar of all
-designs; a campaign whose runs need more, as seeds or a path, adds fields to `Variation` or
-`Design`::
-
-    base: {friction: 0.3, restitution: 0.8}         # at all points that do not set it
-    reference: {vary: {timestep_fraction: [0.05]}}  # what the others are compared with
-    points:
-      - vary: {timestep_fraction: [0.2, 0.4]}       # every combination
-        one_by_one: {friction: [0, 1]}              # at each of them, one at a time
-        with: {restitution: 1}                      # at all of them
-
-Fields are those of the study by their dotted names, or the settings of a scene that no study has.
-"""
+"""The cases of a study file: one per combination of its sweep."""
 
 import copy
 import itertools
-import math
 import shutil
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Generic, NamedTuple, Self, TypeVar
+from typing import Any
 
-from pydantic import Field, JsonValue, ValidationError
+from pydantic import JsonValue
 
+from dragdeck.cases.bed import typical_reach
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError, choices, together
 from dragdeck.mesh.files import FORMATS
-from dragdeck.study.base import NAME, NAME_LIMIT, STUDY_FILE, Json, Model
-from dragdeck.study.check import contradictions, explained, validate
-from dragdeck.study.model import Fidelity, Tolerance
+from dragdeck.scenes.bed_space import expected_bed
+from dragdeck.scenes.fit import clearances
+from dragdeck.scenes.moving_bowl import bed_in_motion
+from dragdeck.study.base import NAME, NAME_LIMIT, STUDY_FILE, Json
+from dragdeck.study.check import validate
+from dragdeck.study.contradictions import contradictions
+from dragdeck.study.fidelity import Fidelity, Tolerance
+from dragdeck.study.media import Grains, Media, Sieve
+from dragdeck.study.model import Assumption, Study
 from dragdeck.study.search import Search, SearchRecord
-from dragdeck.study.yaml import read_study, read_yaml, studies_called
-from dragdeck.sweep.coarse import with_larger_particles
+from dragdeck.study.yaml import read_study, studies_called
 from dragdeck.sweep.cut_out import with_cut_out
+from dragdeck.sweep.design import Settings, combinations
 from dragdeck.sweep.own_part import study_of_part
 
-Settings = Mapping[str, Any]
-"""Dotted name of a field to its value."""
+_NEW_STUDY = Path(__file__).with_name("new_study.yaml")
+"""Text of a study that extends another."""
+
 
 _MIDDLE = 0.382
 """A part of a range at which a field of whole numbers, or a switch, is no fraction by chance."""
-
-MOST_POINTS = 10_000
-"""Points of a design, over all its scenes and packings: more than anyone has run."""
-
-
-# --- designs -------------------------------------------------------------------------------------
-
-
-def combinations(vary: Mapping[str, Sequence[Any]]) -> Iterator[Settings]:
-    """Every combination of the values that fields take."""
-    for values in itertools.product(*vary.values()):
-        yield dict(zip(vary, values, strict=True))
-
-
-class DesignPoint(NamedTuple):
-    """A point of a design: what it sets, and the field that is varied alone there (or none)."""
-
-    axis: str
-    values: Settings
-
-
-class Variation(Model):
-    """Points that belong together: every combination of the values that vary."""
-
-    vary: dict[str, list[Any]] = Field(
-        default_factory=dict,
-        description="dotted field name: list of values; every combination is a design point",
-    )
-    one_by_one: dict[str, list[Any]] = Field(
-        default_factory=dict,
-        description="dotted field name: list of values that are varied one at a time, at every "
-        "combination of `vary`",
-    )
-    others: dict[str, Any] = Field(
-        default_factory=dict,
-        alias="with",
-        description="dotted field name: value at all these points",
-    )
-
-    @property
-    def count(self) -> int:
-        """Number of its points, without listing them."""
-        alone = sum(map(len, self.one_by_one.values())) or 1
-        return math.prod(map(len, self.vary.values())) * alone
-
-    def points(self) -> Iterator[DesignPoint]:
-        """The points, the last field of `vary` changing before the first."""
-        alone = [
-            (field, {field: value}) for field, values in self.one_by_one.items() for value in values
-        ]
-        for values in combinations(self.vary):
-            for axis, fields in alone or [("", {})]:
-                yield DesignPoint(axis, {**self.others, **values, **fields})
-
-
-Block = TypeVar("Block", bound=Variation)
-
-
-class Design(Model, Generic[Block]):
-    """Points with what all of them share and what they are compared with."""
-
-    base: dict[str, Any] = Field(
-        description="dotted field name: value at all points that do not set it"
-    )
-    reference: Block = Field(
-        description="reference settings, to which errors are relative; a single point"
-    )
-    points: list[Block] = Field(default_factory=list)
-
-    @classmethod
-    def read(cls, file: Path, name: str | None = None) -> Self:
-        """Read a design, or the one of this name among several in a file.
-
-        Raises
-        ------
-        InputError
-            The file cannot be used; the message names field, value and limit.
-        """
-        data = read_yaml(file)
-        if name is not None and name not in data:
-            problem = "the file has no such design"
-            raise InputError(problem, file=file, value=name, limit=choices(name, data))
-        try:
-            plan = cls.model_validate(data if name is None else data[name])
-        except ValidationError as error:
-            raise explained(error, file) from None
-        check_number(sum(block.count for block in plan.points), file)
-        if plan.reference.count != 1:
-            raise InputError(
-                "the reference must be a single point", file=file, field="reference.vary"
-            )
-        return plan
-
-    def settings(self) -> Iterator[tuple[Block, dict[str, Any]]]:
-        """What is set at each point, the reference first, with the block that it is of."""
-        for block in (self.reference, *self.points):
-            for _, values in block.points():
-                yield block, {**self.base, **values}
-
-
-def check_number(points: int, file: Path) -> None:
-    """Refuse a design of more points than can be listed.
-
-    Raises
-    ------
-    InputError
-        It has more than `MOST_POINTS`.
-    """
-    if points > MOST_POINTS:
-        problem, limit = f"the design has {points:,} points", f"at most {MOST_POINTS:,}"
-        raise InputError(problem, file=file, field="points", limit=limit, remedy="vary less")
-
-
-# --- cases ---------------------------------------------------------------------------------------
 
 
 Resolve = Callable[[Case, Tolerance], Case]
@@ -348,18 +226,6 @@ def study_file(studies: Path, name: str) -> Path:
     return files[0]
 
 
-_NEW_STUDY = """\
-# Only the fields that differ from {base}; docs/reference/study.md lists all fields.
-title: {name}
-extends: {base}
-reference: null  # measured or published values to compare with, if any
-
-# fidelity: {{tolerance: 0.1}}
-# motion: {{speed_m_s: 0.02}}
-# sweep: {{motion.speed_m_s: [0.01, 0.02]}}
-"""
-
-
 def new_study(studies: Path, name: str, base: str) -> Path:
     """Write the file of a study that extends another or is of a part, and return it.
 
@@ -386,7 +252,7 @@ def new_study(studies: Path, name: str, base: str) -> Path:
             limit=f"a name has {NAME_LIMIT}",
             remedy="choose another",
         )
-    text = study_of_part(part) if of_part else _NEW_STUDY.format(name=name, base=base)
+    text = study_of_part(part) if of_part else _NEW_STUDY.read_text().format(name=name, base=base)
     folder.mkdir()
     if of_part:
         shutil.copy(part, folder / part.name)
@@ -409,3 +275,66 @@ def _set(data: dict[str, JsonValue], field: str, value: JsonValue, file: Path) -
             )
         place = below
     place[last] = value
+
+
+LEAST_GAP = 2.7
+"""Smallest gap between workpiece and wall, in diameters of the larger particles, from which the
+drag was linear in their diameter (docs/evidence/simplifications.md)."""
+
+
+def with_larger_particles(case: Case) -> Case:
+    """The case with the larger particles that its study asks for; itself if it asks for none.
+
+    Raises
+    ------
+    InputError
+        The gap between workpiece and wall is too narrow for them.
+    """
+    if case.study.reduction is None or case.study.reduction.coarser is None:
+        return case
+    factor = case.study.reduction.coarser
+    study = coarsened(case.study, factor)
+    wide = replace(case, study=study)
+    gap = clearances(wide, bed_in_motion(study, expected_bed(study)).surface_m).wall_m
+    diameter = 2 * typical_reach(study)
+    if factor > 1 and gap < LEAST_GAP * diameter * (1 - 1e-6):
+        raise InputError(
+            "the gap between workpiece and wall is too narrow for larger particles: the drag would "
+            "not be linear in their diameter",
+            field="reduction.coarser",
+            value=factor,
+            limit=f"at most {gap / LEAST_GAP / diameter * factor:.3g}: the gap of {gap:.4g} m is "
+            f"at least {LEAST_GAP:g} diameters",
+            remedy="use a smaller factor or a wider bowl",
+        )
+    return wide
+
+
+def coarsened(study: Study, factor: float) -> Study:
+    """The study with particles larger by a factor, and fewer of them in the same space."""
+    media = study.media
+    if factor == 1:
+        return study
+    larger: dict[str, Any] = _larger(media, factor)
+    larger["classes"] = {
+        name: part.model_copy(update=_larger(part, factor)) for name, part in media.classes.items()
+    }
+    if media.count is not None:
+        larger["count"] = max(1, round(media.count / factor**3))
+    coarse = study.model_copy(update={"media": Media.model_validate({**dict(media), **larger})})
+    why = (
+        f"particles {factor:g} times as large: {coarse.particle_count:,} in place of "
+        f"{study.particle_count:,}; values of this run are those of larger particles"
+    )
+    said = Assumption(field="reduction.coarser", why=why)
+    return coarse.model_copy(update={"assumptions": [*study.assumptions, said]})
+
+
+def _larger(grains: Grains, factor: float) -> dict[str, Any]:
+    """Sizes of particles of one distribution."""
+    sizes: dict[str, Any] = {"radius_std_m": factor * grains.radius_std_m}
+    if grains.radius_mean_m is not None:
+        sizes["radius_mean_m"] = factor * grains.radius_mean_m
+    if grains.sieve is not None:
+        sizes["sieve"] = [Sieve(factor * size, passing) for size, passing in grains.sieve]
+    return sizes

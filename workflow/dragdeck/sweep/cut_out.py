@@ -20,14 +20,14 @@ from dragdeck.errors import InputError, together
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.turning_bed import surface_tilt
 from dragdeck.physics.walls import Container
-from dragdeck.scenes.filling import expected_bed
-from dragdeck.scenes.motion import vertical_range
+from dragdeck.scenes.bed_space import expected_bed
 from dragdeck.scenes.moving_bowl import bed_in_motion
 from dragdeck.scenes.workpiece import dip, workpiece_reach
 from dragdeck.study.bowl_motions.acceleration import Acceleration
 from dragdeck.study.bowl_motions.bowl_motion import BowlMotion
 from dragdeck.study.bowls.trough import TroughBowl
-from dragdeck.study.model import Assumption, Motion, Study
+from dragdeck.study.model import Assumption, Study
+from dragdeck.study.motion import Motion
 from dragdeck.study.paths.line import LinePath
 from dragdeck.study.paths.path import AroundBowl
 
@@ -99,7 +99,7 @@ def with_cut_out(case: Case) -> Case:
     problems = list(_refused(study))
     if problems:
         raise together(problems)
-    low = dip(case) - vertical_range(study.motion)[0]
+    low = dip(case) - study.motion.vertical_range_m[0]
     cut = cut_out(study, workpiece_reach(case), low)
     if cut.particle_count >= study.particle_count:
         raise InputError(

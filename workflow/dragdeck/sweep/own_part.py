@@ -47,34 +47,8 @@ _SOLID, _MOST_PARTICLES = 0.6, 3500
 _FACETS_PER_DIAMETER, _MOST_FACETS = 5, 5000
 _TRIES = 4
 
-_STUDY = """\
-# {source}: {size} in the file, {unit_why}.
-# Check the lines with a comment; docs/reference/study.md lists all fields.
-title: {title}
-extends: uhlmann2015      # its media, materials and coefficients
-reference: null
-assumptions: []
-
-media: {{fill_height_m: {fill:g}, radius_mean_m: {radius:g}, radius_std_m: {std:g}}}  # {media_why}
-bowl: {{radius_m: {bowl:g}, height_m: {height:g}}}  # gap to the wall: {beside:g} particle diameters
-
-workpiece:
-  material: steel         # or another one: add it to materials and pairs
-  shape:
-    kind: mesh
-    file: {file}
-    {unit}
-    axis: {axis}              # {axis_why}
-    {facets}
-
-motion:
-  path: {{kind: circle, radius_m: {path:g}, revolutions: {revolutions:g}}}  # {length:.3g} mm
-  speed_m_s: 0.01
-  immersion_depth_m: {depth:g}  # of a length of {long:.4g} mm
-  transient_m: {transient:g}
-
-fidelity: draft           # quick; later for example {{tolerance: 0.1}}
-"""
+_STUDY = Path(__file__).with_name("study_of_part.yaml")
+"""Text of a study of a part, which extends uhlmann2015."""
 
 
 @dataclass(frozen=True)
@@ -127,7 +101,7 @@ def study_of_part(part: Path) -> str:
     scene = _scene(body, scale, rounded(min(_IMMERSED * long, _DEEPEST_M), up=False))
     size, facets = _facets(part, unit, axis, scene)
     lengths = " x ".join(f"{length:.4g}" for length in given.extents / (1e-3 if step else 1.0))
-    return _STUDY.format(
+    return _STUDY.read_text().format(
         source=part.name,
         size=lengths + (" mm" if step else ""),
         unit_why="as the file states"

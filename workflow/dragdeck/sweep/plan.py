@@ -19,15 +19,8 @@ from dragdeck.errors import InputError
 from dragdeck.scenes.scene import SceneType
 from dragdeck.study.base import Positive, Whole
 from dragdeck.study.model import Study
-from dragdeck.sweep.cases import (
-    Design,
-    Resolve,
-    Settings,
-    Variation,
-    beside_each_other,
-    check_number,
-    settle_case,
-)
+from dragdeck.sweep.cases import Resolve, beside_each_other, settle_case
+from dragdeck.sweep.design import Design, Settings, Variation, check_number
 
 _LEAST_COUNTED = 0.5
 """Smallest fraction of a point's path that the statistics use."""
@@ -36,37 +29,27 @@ _LEAST_COUNTED = 0.5
 class PlannedPoints(Variation):
     """Points that belong together, their packings and their path."""
 
-    seeds: Annotated[Whole, Field(ge=1)] | None = Field(
-        default=None,
-        description="number of seeds per point, starting with that of the study or scene; "
-        "none: that of the plan",
-    )
-    arc: Positive | None = Field(
-        default=None,
-        description="fraction of the study's path that is dragged; none: that of the plan",
-    )
+    seeds: Annotated[Whole, Field(ge=1)] | None = None
+    """number of seeds per point, starting with that of the study or scene; none: that of the
+    plan"""
+    arc: Positive | None = None
+    """fraction of the study's path that is dragged; none: that of the plan"""
 
 
 class Plan(Design[PlannedPoints]):
     """The design points of a trade-off."""
 
-    arc: Positive = Field(default=1.0, description="fraction of the study's path that is dragged")
-    seeds: Annotated[Whole, Field(ge=1)] = Field(
-        default=2, description="number of seeds (packings) per point"
-    )
-    scenes: dict[str, dict[str, Any]] = Field(
-        default={"as it is": {}},
-        description="name of a scene: dotted field names and values that change the "
-        "study, among them "
-        "the first seed; every point is run in every scene",
-    )
-    cost_rounds: Annotated[Whole, Field(ge=0)] = Field(
-        default=3, description="rounds in which optional features are timed; 0: none"
-    )
-    drop_test: dict[str, list[Any]] = Field(
-        default_factory=dict,
-        description="dotted field name: values that are varied one at a time in the drop test",
-    )
+    arc: Positive = 1.0
+    """fraction of the study's path that is dragged"""
+    seeds: Annotated[Whole, Field(ge=1)] = 2
+    """number of seeds (packings) per point"""
+    scenes: dict[str, dict[str, Any]] = Field(default={"as it is": {}})
+    """name of a scene: dotted field names and values that change the study, among them the first
+    seed; every point is run in every scene"""
+    cost_rounds: Annotated[Whole, Field(ge=0)] = 3
+    """rounds in which optional features are timed; 0: none"""
+    drop_test: dict[str, list[Any]] = Field(default_factory=dict)
+    """dotted field name: values that are varied one at a time in the drop test"""
 
 
 @dataclass(frozen=True)

@@ -3,8 +3,6 @@
 import math
 from typing import Literal, Self
 
-from pydantic import Field
-
 from dragdeck.study.base import Number, Positive
 from dragdeck.study.bowl_motions.bowl_motion import BowlMotion
 
@@ -15,14 +13,12 @@ class Acceleration(BowlMotion):
     It turns gravity, as the centrifugal acceleration does in a small part of a rotating bowl.
     """
 
-    kind: Literal["acceleration"] = Field(
-        description="constant horizontal acceleration of the particles, as in a small part of a "
-        "rotating bowl"
-    )
-    acceleration_m_s2: Positive = Field(description="acceleration, m/s2")
-    direction_deg: Number = Field(
-        default=-90.0, description="its direction, from +x, degrees; outwards in a rotating bowl"
-    )
+    kind: Literal["acceleration"]
+    """constant horizontal acceleration of the particles, as in a small part of a rotating bowl"""
+    acceleration_m_s2: Positive
+    """acceleration, m/s2"""
+    direction_deg: Number = -90.0
+    """its direction, from +x, degrees; outwards in a rotating bowl"""
 
     @property
     def sideways_m_s2(self) -> tuple[float, float]:

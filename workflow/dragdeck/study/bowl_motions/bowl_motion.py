@@ -5,8 +5,10 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
+from dragdeck.arrays import Floats
 from dragdeck.study.base import Model
-from dragdeck.study.drive import EngineMotion, Floats, StepCounts
+from dragdeck.study.drive import EngineMotion
+from dragdeck.study.stages import StepCounts
 
 
 class BowlMotion(Model):

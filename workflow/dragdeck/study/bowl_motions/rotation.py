@@ -3,7 +3,7 @@
 import math
 from typing import Literal, Self
 
-from pydantic import Field, field_validator
+from pydantic import field_validator
 
 from dragdeck.study.base import Number
 from dragdeck.study.bowl_motions.bowl_motion import BowlMotion
@@ -12,10 +12,10 @@ from dragdeck.study.bowl_motions.bowl_motion import BowlMotion
 class Rotation(BowlMotion):
     """A bowl that rotates about its axis."""
 
-    kind: Literal["rotation"] = Field(description="rotation about the axis of the bowl")
-    rpm: Number = Field(
-        description="rotational speed, 1/min; positive: counter-clockwise seen from above"
-    )
+    kind: Literal["rotation"]
+    """rotation about the axis of the bowl"""
+    rpm: Number
+    """rotational speed, 1/min; positive: counter-clockwise seen from above"""
 
     @field_validator("rpm")
     @classmethod

@@ -6,9 +6,11 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from dragdeck.arrays import Floats
 from dragdeck.study.base import NonNegative, Number, Positive
 from dragdeck.study.bowl_motions.bowl_motion import BowlMotion
-from dragdeck.study.drive import EngineMotion, Floats, SmoothStart, StepCounts
+from dragdeck.study.drive import EngineMotion, SmoothStart
+from dragdeck.study.stages import StepCounts
 
 _AXES = "xyz"
 
@@ -20,20 +22,17 @@ class Vibration(BowlMotion):
     middle place.
     """
 
-    kind: Literal["vibration"] = Field(description="vibration without turning")
-    amplitude_m: tuple[NonNegative, NonNegative, NonNegative] = Field(
-        description="amplitudes along x, y and z, m"
-    )
-    phase_deg: tuple[Number, Number, Number] = Field(
-        default=(0.0, 0.0, 0.0),
-        description="phases along x, y and z, degrees; 0 and 90 along two axes: an ellipse",
-    )
-    frequency_hz: Positive = Field(description="frequency, Hz")
-    ramp_s: Annotated[Number, Field(gt=0)] = Field(
-        default=0.1,
-        description="time in which the amplitudes rise from zero, s, with `speed_factor` 1; it "
-        "begins before the plunge",
-    )
+    kind: Literal["vibration"]
+    """vibration without turning"""
+    amplitude_m: tuple[NonNegative, NonNegative, NonNegative]
+    """amplitudes along x, y and z, m"""
+    phase_deg: tuple[Number, Number, Number] = (0.0, 0.0, 0.0)
+    """phases along x, y and z, degrees; 0 and 90 along two axes: an ellipse"""
+    frequency_hz: Positive
+    """frequency, Hz"""
+    ramp_s: Annotated[Number, Field(gt=0)] = 0.1
+    """time in which the amplitudes rise from zero, s, with `speed_factor` 1; it begins before the
+    plunge"""
 
     @model_validator(mode="after")
     def _vibrates(self) -> Self:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from dragdeck.mesh import shapes
 from dragdeck.physics.walls import Container, Wall, round_container
@@ -18,9 +18,12 @@ if TYPE_CHECKING:
 class AnnulusBowl(Bowl):
     """A ring between a cylinder and a column, both about the z axis, with a flat floor."""
 
-    kind: Literal["annulus"] = Field(description="ring around a column, with a flat floor")
-    radius_m: Positive = Field(description="inner radius of the bowl, m")
-    core_radius_m: Positive = Field(description="radius of the column, m")
+    kind: Literal["annulus"]
+    """ring around a column, with a flat floor"""
+    radius_m: Positive
+    """inner radius of the bowl, m"""
+    core_radius_m: Positive
+    """radius of the column, m"""
 
     @model_validator(mode="after")
     def _ring(self) -> Self:

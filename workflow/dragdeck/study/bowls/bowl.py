@@ -4,8 +4,6 @@ from abc import abstractmethod
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from pydantic import Field
-
 from dragdeck.physics.walls import Container, Wall
 from dragdeck.study.base import Model, Positive
 
@@ -23,18 +21,16 @@ class Bowl(Model):
     if TYPE_CHECKING:
         kind: str
 
-    material: str = Field(description="material of the bowl: a name under `materials`")
-    height_m: Positive = Field(description="inner height of the bowl from floor to rim, m")
-    lid_m: Positive | None = Field(
-        default=None,
-        description="height of a lid above the floor, m, which holds the particles in the process; "
-        "none: the bowl is open",
-    )
-    facet_size_m: Positive | None = Field(
-        default=None,
-        description="edge length of the bowl's mesh elements, m; none: analytical walls, or a "
-        "particle diameter if the bowl moves",
-    )
+    material: str
+    """material of the bowl: a name under `materials`"""
+    height_m: Positive
+    """inner height of the bowl from floor to rim, m"""
+    lid_m: Positive | None = None
+    """height of a lid above the floor, m, which holds the particles in the process; none: the bowl
+    is open"""
+    facet_size_m: Positive | None = None
+    """edge length of the bowl's mesh elements, m; none: analytical walls, or a particle diameter if
+    the bowl moves"""
 
     @property
     @abstractmethod

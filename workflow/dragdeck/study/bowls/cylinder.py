@@ -3,9 +3,8 @@
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Literal
 
-from pydantic import Field
-
 from dragdeck.mesh import shapes
+from dragdeck.parts import omitted
 from dragdeck.physics.walls import Container, round_container
 from dragdeck.study.base import Positive
 from dragdeck.study.bowls.bowl import Bowl
@@ -17,12 +16,10 @@ if TYPE_CHECKING:
 class CylinderBowl(Bowl):
     """A flat-bottomed cylinder about the z axis."""
 
-    kind: Literal["cylinder"] = Field(
-        default="cylinder",
-        exclude_if=lambda value: value == "cylinder",
-        description="flat-bottomed cylinder about the z axis",
-    )
-    radius_m: Positive = Field(description="inner radius of the bowl, m")
+    kind: Literal["cylinder"] = omitted("cylinder")
+    """flat-bottomed cylinder about the z axis"""
+    radius_m: Positive
+    """inner radius of the bowl, m"""
 
     @property
     def container(self) -> Container:

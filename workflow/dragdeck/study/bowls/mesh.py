@@ -6,12 +6,12 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Literal, NamedTuple, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from dragdeck.arrays import Floats
 from dragdeck.mesh.surface import raised, surface, weld
 from dragdeck.physics import facets
-from dragdeck.physics.walls import Container, Wall
+from dragdeck.physics.walls import Container, Wall, four_planes
 from dragdeck.study.base import Number
 from dragdeck.study.bowls.bowl import Bowl
 
@@ -60,12 +60,7 @@ def _rim(corners_m: Floats) -> tuple[Wall, ...]:
     x, y = _widest_rectangle(outer)
     if 4 * x * y <= math.pi * radius**2:
         return (side,)
-    return (
-        Wall(name="west", shape="xplane", at_m=-x, inwards=1),
-        Wall(name="east", shape="xplane", at_m=x, inwards=-1),
-        Wall(name="south", shape="yplane", at_m=-y, inwards=1),
-        Wall(name="north", shape="yplane", at_m=y, inwards=-1),
-    )
+    return four_planes(x, y)
 
 
 def _widest_rectangle(outline_m: Floats) -> tuple[float, float]:
@@ -101,18 +96,15 @@ def _container(triangles: tuple[facets.Triangle, ...]) -> Container:
 class MeshBowl(Bowl):
     """A bowl of the user's, from a mesh of its inside."""
 
-    kind: Literal["mesh"] = Field(description="bowl from a mesh of its inside")
-    file: str | None = Field(
-        default=None,
-        description="file beside the study: the inner surface (STL, OBJ, PLY or VTK), closed up to "
-        "a level rim, around the z axis",
-    )
-    unit: Literal["m", "cm", "mm", "um", "in"] | None = Field(
-        default=None, description="length unit of the file"
-    )
-    facets_m: tuple[_Facet, ...] = Field(
-        default=(), description="in place of a file: x, y and z of the corners of facets"
-    )
+    kind: Literal["mesh"]
+    """bowl from a mesh of its inside"""
+    file: str | None = None
+    """file beside the study: the inner surface (STL, OBJ, PLY or VTK), closed up to a level rim,
+    around the z axis"""
+    unit: Literal["m", "cm", "mm", "um", "in"] | None = None
+    """length unit of the file"""
+    facets_m: tuple[_Facet, ...] = ()
+    """in place of a file: x, y and z of the corners of facets"""
 
     @model_validator(mode="after")
     def _bowl(self) -> Self:

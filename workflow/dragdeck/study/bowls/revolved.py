@@ -26,11 +26,11 @@ _LEVELS = 60
 class RevolvedBowl(Bowl):
     """A profile turned about the z axis."""
 
-    kind: Literal["revolved"] = Field(description="profile turned about the z axis")
-    profile_m: Annotated[list[tuple[NonNegative, NonNegative]], Field(min_length=2)] = Field(
-        description="radius and height of the points of the profile, from the axis, or from the "
-        "rim of a column, outwards to the rim of the bowl, m"
-    )
+    kind: Literal["revolved"]
+    """profile turned about the z axis"""
+    profile_m: Annotated[list[tuple[NonNegative, NonNegative]], Field(min_length=2)]
+    """radius and height of the points of the profile, from the axis, or from the rim of a column,
+    outwards to the rim of the bowl, m"""
 
     @model_validator(mode="after")
     def _closed(self) -> Self:

@@ -3,10 +3,8 @@
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Literal
 
-from pydantic import Field
-
 from dragdeck.mesh import shapes
-from dragdeck.physics.walls import Container, Wall
+from dragdeck.physics.walls import Container, Wall, four_planes
 from dragdeck.study.base import Positive
 from dragdeck.study.bowls.bowl import Bowl
 
@@ -17,22 +15,19 @@ if TYPE_CHECKING:
 class TroughBowl(Bowl):
     """A rectangular trough with its sides along x and y."""
 
-    kind: Literal["trough"] = Field(description="rectangular trough, the z axis in its middle")
-    length_m: Positive = Field(description="inner length of the trough along x, m")
-    width_m: Positive = Field(description="inner width of the trough along y, m")
+    kind: Literal["trough"]
+    """rectangular trough, the z axis in its middle"""
+    length_m: Positive
+    """inner length of the trough along x, m"""
+    width_m: Positive
+    """inner width of the trough along y, m"""
 
     @property
     def container(self) -> Container:
         """Between a floor and four planes."""
         x, y = self.length_m / 2, self.width_m / 2
         return Container(
-            walls=(
-                Wall(name="floor", shape="zplane", at_m=0.0, inwards=1),
-                Wall(name="west", shape="xplane", at_m=-x, inwards=1),
-                Wall(name="east", shape="xplane", at_m=x, inwards=-1),
-                Wall(name="south", shape="yplane", at_m=-y, inwards=1),
-                Wall(name="north", shape="yplane", at_m=y, inwards=-1),
-            ),
+            walls=(Wall(name="floor", shape="zplane"), *four_planes(x, y)),
             half_widths_m=(x, y),
             clear_m=min(x, y),
             levels=((0.0, self.length_m * self.width_m),),

@@ -5,33 +5,29 @@ from collections.abc import Callable
 from typing import Any, Literal
 
 import numpy as np
-from pydantic import Field
 
-from dragdeck.study.base import Json, Positive
-from dragdeck.study.drive import (
-    Drive,
-    EngineMotion,
-    Floats,
-    Orientation,
-    StepCounts,
-    about_vertical,
-    rotated,
-    wrap_angle,
-)
-from dragdeck.study.paths.path import AroundBowl, Point, StartAngle
+from dragdeck.arrays import Floats
+from dragdeck.parts import omitted
+from dragdeck.study.base import Json, Number, Positive
+from dragdeck.study.drive import Drive, EngineMotion, Orientation
+from dragdeck.study.paths.path import AroundBowl, Point
+from dragdeck.study.rotations import about_vertical, rotated, wrap_angle
+from dragdeck.study.stages import StepCounts
 
 
 class CirclePath(AroundBowl):
     """A circle about the bowl's axis."""
 
-    kind: Literal["circle"] = Field(description="circle about the bowl's axis")
-    radius_m: Positive = Field(description="radius of the path of the workpiece's axis, m")
-    start_deg: StartAngle = 0.0
-    revolutions: Positive = Field(default=1.0, description="length of the path in revolutions")
-    direction: Literal["ccw", "cw"] = Field(
-        default="ccw",
-        description="direction of motion seen from above: counter-clockwise or clockwise",
-    )
+    kind: Literal["circle"]
+    """circle about the bowl's axis"""
+    radius_m: Positive
+    """radius of the path of the workpiece's axis, m"""
+    start_deg: Number = omitted(0.0)
+    """polar angle of the start of the path about the bowl's axis, from +x, degrees"""
+    revolutions: Positive = 1.0
+    """length of the path in revolutions"""
+    direction: Literal["ccw", "cw"] = "ccw"
+    """direction of motion seen from above: counter-clockwise or clockwise"""
 
     @property
     def sign(self) -> int:

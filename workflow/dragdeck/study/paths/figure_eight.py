@@ -5,7 +5,6 @@ from collections.abc import Callable
 from typing import Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field
 
 from dragdeck.study.base import Number, Positive
 from dragdeck.study.paths.path import FromPlace
@@ -17,18 +16,16 @@ class FigureEightPath(FromPlace):
     length_field: ClassVar[str] = "loops"
     place_field: ClassVar[str] = "middle_m"
 
-    kind: Literal["figure_eight"] = Field(
-        description="two touching circles in turn, one counter-clockwise, the other clockwise"
-    )
-    radius_m: Positive = Field(description="radius of both circles, m")
-    middle_m: tuple[Number, Number] = Field(
-        default=(0.0, 0.0), description="x and y where the circles touch and the drag starts, m"
-    )
-    direction_deg: Number = Field(
-        default=0.0,
-        description="direction of motion there, from +x, degrees; the first circle is to the left",
-    )
-    loops: Positive = Field(default=1.0, description="length of the path in figures eight")
+    kind: Literal["figure_eight"]
+    """two touching circles in turn, one counter-clockwise, the other clockwise"""
+    radius_m: Positive
+    """radius of both circles, m"""
+    middle_m: tuple[Number, Number] = (0.0, 0.0)
+    """x and y where the circles touch and the drag starts, m"""
+    direction_deg: Number = 0.0
+    """direction of motion there, from +x, degrees; the first circle is to the left"""
+    loops: Positive = 1.0
+    """length of the path in figures eight"""
 
     def words(self, number: Callable[[float], str]) -> str:
         """With its radius."""

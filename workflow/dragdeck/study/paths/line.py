@@ -5,11 +5,13 @@ from collections.abc import Callable
 from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import Field
 
+from dragdeck.arrays import Floats
 from dragdeck.study.base import Json, Number, Positive
-from dragdeck.study.drive import Drive, EngineMotion, Floats, StepCounts, wrap_angle
+from dragdeck.study.drive import Drive, EngineMotion
 from dragdeck.study.paths.path import FromPlace, Point, as_rows
+from dragdeck.study.rotations import wrap_angle
+from dragdeck.study.stages import StepCounts
 
 
 class LinePath(FromPlace):
@@ -19,12 +21,14 @@ class LinePath(FromPlace):
     place_field: ClassVar[str] = "start_m"
     one_direction: ClassVar[bool] = True
 
-    kind: Literal["line"] = Field(description="straight line")
-    start_m: tuple[Number, Number] = Field(
-        description="x and y of the workpiece's axis at the start of the drag, m"
-    )
-    direction_deg: Number = Field(default=0.0, description="direction of motion, from +x, degrees")
-    length_m: Positive = Field(description="length of the drag, m")
+    kind: Literal["line"]
+    """straight line"""
+    start_m: tuple[Number, Number]
+    """x and y of the workpiece's axis at the start of the drag, m"""
+    direction_deg: Number = 0.0
+    """direction of motion, from +x, degrees"""
+    length_m: Positive
+    """length of the drag, m"""
 
     def words(self, number: Callable[[float], str]) -> str:
         """A line."""

@@ -7,32 +7,16 @@ says better.
 import math
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
-from pydantic import Field
 
-from dragdeck.study.base import Json, Model, Number
-from dragdeck.study.drive import (
-    Drive,
-    EngineMotion,
-    Floats,
-    Formula,
-    Orientation,
-    StepCounts,
-    about_vertical,
-    formula,
-    rotating,
-    wrap_angle,
-)
+from dragdeck.arrays import Floats
+from dragdeck.study.base import Json, Model
+from dragdeck.study.drive import Drive, EngineMotion, Formula, Orientation, formula, rotating
+from dragdeck.study.rotations import about_vertical, wrap_angle
+from dragdeck.study.stages import StepCounts
 
-StartAngle = Annotated[
-    Number,
-    Field(
-        description="polar angle of the start of the path about the bowl's axis, from +x, degrees",
-        exclude_if=lambda value: value == 0,
-    ),
-]
 Point = tuple[float, float]
 Vector = tuple[float, float, float]
 
@@ -225,7 +209,7 @@ class WorkpiecePath(Model):
             return np.zeros(len(since))
         return np.asarray(self._heading(drive.share(since)) - self.direction_rad)
 
-    def own(self, drive: Drive, since: StepCounts) -> Floats | None:
+    def in_frame(self, drive: Drive, since: StepCounts) -> Floats | None:
         """Rotations in the workpiece's own frame, (N, 3, 3), by the path; None if there are none.
 
         They go before the turn about the vertical.

@@ -5,11 +5,14 @@ from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import Field, field_validator
+from pydantic import field_validator
 
+from dragdeck.arrays import Floats
+from dragdeck.parts import omitted
 from dragdeck.study.base import Json, Number, Positive
-from dragdeck.study.drive import Drive, EngineMotion, Floats, Orientation, StepCounts
-from dragdeck.study.paths.path import AroundBowl, StartAngle
+from dragdeck.study.drive import Drive, EngineMotion, Orientation
+from dragdeck.study.paths.path import AroundBowl
+from dragdeck.study.stages import StepCounts
 
 
 class RestPath(AroundBowl):
@@ -20,16 +23,16 @@ class RestPath(AroundBowl):
 
     one_direction: ClassVar[bool] = True
 
-    kind: Literal["rest"] = Field(description="the workpiece stands still, the bowl rotates")
-    radius_m: Positive = Field(description="distance between the axes of workpiece and bowl, m")
-    bowl_rpm: Number = Field(
-        description="rotational speed of the bowl, 1/min; positive: counter-clockwise seen from "
-        "above"
-    )
-    start_deg: StartAngle = 0.0
-    revolutions: Positive = Field(
-        default=1.0, description="length of the drag in revolutions of the bowl"
-    )
+    kind: Literal["rest"]
+    """the workpiece stands still, the bowl rotates"""
+    radius_m: Positive
+    """distance between the axes of workpiece and bowl, m"""
+    bowl_rpm: Number
+    """rotational speed of the bowl, 1/min; positive: counter-clockwise seen from above"""
+    start_deg: Number = omitted(0.0)
+    """polar angle of the start of the path about the bowl's axis, from +x, degrees"""
+    revolutions: Positive = 1.0
+    """length of the drag in revolutions of the bowl"""
 
     @field_validator("bowl_rpm")
     @classmethod

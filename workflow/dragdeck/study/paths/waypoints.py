@@ -11,25 +11,12 @@ from numpy.typing import NDArray
 from pydantic import Field, JsonValue, ValidationError, field_validator, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
+from dragdeck.arrays import Floats
 from dragdeck.study.base import Json, Line, Number
-from dragdeck.study.drive import (
-    Drive,
-    EngineMotion,
-    Floats,
-    Orientation,
-    StepCounts,
-    by_vector,
-    chain,
-    in_steps,
-    integral,
-    rates_about_axes,
-    rotated,
-    rotating_by,
-    rotation_vector,
-    stage_at,
-    wrap_angle,
-)
+from dragdeck.study.drive import Drive, EngineMotion, Orientation, rates_about_axes, rotating_by
 from dragdeck.study.paths.path import Vector, WorkpiecePath, as_rows, turned
+from dragdeck.study.rotations import by_vector, rotated, rotation_vector, wrap_angle
+from dragdeck.study.stages import StepCounts, chain, in_steps, integral, stage_at
 
 MOST_POINTS = 100
 
@@ -71,23 +58,18 @@ class WaypointsPath(WorkpiecePath):
 
     length_field: ClassVar[str] = "fraction"
 
-    kind: Literal["waypoints"] = Field(
-        description="recorded path with its own speed and rotation; lengths along it refer to its "
-        "mean speed; `orientation` has no effect"
-    )
-    file: Line | None = Field(
-        default=None,
-        description="CSV file with the columns time_s, x_m, y_m and optionally z_m, turn_deg, "
-        "pitch_deg and roll_deg; relative to the study; either this or `points`",
-    )
+    kind: Literal["waypoints"]
+    """recorded path with its own speed and rotation; lengths along it refer to its mean speed;
+    `orientation` has no effect"""
+    file: Line | None = None
+    """CSV file with the columns time_s, x_m, y_m and optionally z_m, turn_deg, pitch_deg and
+    roll_deg; relative to the study; either this or `points`"""
     points: Annotated[list[Waypoint], Field(min_length=2, max_length=MOST_POINTS)] = Field(
-        default_factory=list,
-        description="rows of the same columns, in s, m and degrees; the last four may be left out "
-        "(0)",
+        default_factory=list
     )
-    fraction: Annotated[Number, Field(gt=0, le=1)] = Field(
-        default=1.0, description="fraction of the recorded time that is simulated, from its start"
-    )
+    """rows of the same columns, in s, m and degrees; the last four may be left out (0)"""
+    fraction: Annotated[Number, Field(gt=0, le=1)] = 1.0
+    """fraction of the recorded time that is simulated, from its start"""
 
     @field_validator("points")
     @classmethod
@@ -276,7 +258,7 @@ class WaypointsPath(WorkpiecePath):
         moved = [integral(rates, time) for time in drive.time_s(since)]
         return np.asarray(begun + np.reshape(moved, (-1, 3)))
 
-    def own(self, drive: Drive, since: StepCounts) -> Floats | None:
+    def in_frame(self, drive: Drive, since: StepCounts) -> Floats | None:
         """The rotations of its stages, one after another."""
         if not self._inclined(drive):
             return None

@@ -4,10 +4,13 @@ from abc import abstractmethod
 from typing import ClassVar, Self
 
 import numpy as np
-from pydantic import Field, JsonValue
+from pydantic import JsonValue
 
+from dragdeck.arrays import Floats
 from dragdeck.study.base import Model, NonNegative
-from dragdeck.study.drive import Drive, EngineMotion, Floats, Orientations, SmoothStart, StepCounts
+from dragdeck.study.drive import Drive, EngineMotion, SmoothStart
+from dragdeck.study.rotations import Orientations
+from dragdeck.study.stages import StepCounts
 
 
 class SuperposedMotion(Model):
@@ -26,11 +29,8 @@ class SuperposedMotion(Model):
     kind: ClassVar[str]
     turns: ClassVar[bool] = False
 
-    ramp_s: NonNegative = Field(
-        default=0.1,
-        description="duration of the start from rest, s, with `speed_factor` 1; excluded from all "
-        "statistics",
-    )
+    ramp_s: NonNegative = 0.1
+    """duration of the start from rest, s, with `speed_factor` 1; excluded from all statistics"""
 
     @abstractmethod
     def faster(self, factor: float) -> Self:

@@ -4,10 +4,13 @@ import math
 from typing import ClassVar, Self
 
 import numpy as np
-from pydantic import Field, JsonValue
+from pydantic import JsonValue
 
+from dragdeck.arrays import Floats
 from dragdeck.study.base import Positive
-from dragdeck.study.drive import Drive, EngineMotion, Floats, Orientations, StepCounts
+from dragdeck.study.drive import Drive, EngineMotion
+from dragdeck.study.rotations import Orientations
+from dragdeck.study.stages import StepCounts
 from dragdeck.study.superposed.motion import SuperposedMotion
 
 
@@ -16,8 +19,10 @@ class Oscillation(SuperposedMotion):
 
     kind: ClassVar[str] = "oscillation"
 
-    amplitude_m: Positive = Field(description="amplitude about the immersion depth, m")
-    frequency_hz: Positive = Field(description="frequency, Hz")
+    amplitude_m: Positive
+    """amplitude about the immersion depth, m"""
+    frequency_hz: Positive
+    """frequency, Hz"""
 
     def faster(self, factor: float) -> Self:
         """A higher frequency at the same amplitude."""

@@ -8,33 +8,22 @@ from typing import ClassVar, Self
 import numpy as np
 from pydantic import Field, JsonValue, model_validator
 
+from dragdeck.arrays import Floats
 from dragdeck.study.base import Model, Number, Positive
-from dragdeck.study.drive import (
-    Drive,
-    EngineMotion,
-    Floats,
-    Orientations,
-    StepCounts,
-    about_vertical,
-    by_vector,
-    chain,
-    in_steps,
-    integral,
-    rotating,
-    rotating_by,
-    stage_at,
-)
+from dragdeck.study.drive import Drive, EngineMotion, rotating, rotating_by
+from dragdeck.study.rotations import Orientations, about_vertical, by_vector
+from dragdeck.study.stages import StepCounts, chain, in_steps, integral, stage_at
 from dragdeck.study.superposed.motion import SuperposedMotion
 
 
 class SpinStage(Model):
     """A stretch of constant spin."""
 
-    until_s: Positive = Field(
-        description="end of the stage, s from the start of the drag, with `speed_factor` 1; the "
-        "last stage lasts to the end of the drag"
-    )
-    rpm: Number = Field(description="rotational speed, 1/min; positive: counter-clockwise")
+    until_s: Positive
+    """end of the stage, s from the start of the drag, with `speed_factor` 1; the last stage lasts
+    to the end of the drag"""
+    rpm: Number
+    """rotational speed, 1/min; positive: counter-clockwise"""
 
 
 class Spin(SuperposedMotion):
@@ -43,11 +32,9 @@ class Spin(SuperposedMotion):
     kind: ClassVar[str] = "spin"
     turns: ClassVar[bool] = True
 
-    rpm: Number | None = Field(
-        default=None,
-        description="rotational speed during the drag, relative to `orientation`, 1/min; positive: "
-        "counter-clockwise seen from above; either this or `schedule`",
-    )
+    rpm: Number | None = None
+    """rotational speed during the drag, relative to `orientation`, 1/min; positive:
+    counter-clockwise seen from above; either this or `schedule`"""
     schedule: list[SpinStage] | None = Field(default=None, min_length=1, max_length=100)
 
     @model_validator(mode="after")
@@ -109,7 +96,7 @@ class Spin(SuperposedMotion):
         """About the vertical, or the axis of a tilted workpiece."""
         angle = self.turn(drive, since)
         if not drive.tilt_deg:
-            return Orientations(before.turn_rad + angle, before.own)
+            return Orientations(before.turn_rad + angle, before.in_frame)
         return Orientations(before.turn_rad, by_vector(angle[:, None] * drive.own_axis))
 
     def velocity(
