@@ -92,7 +92,7 @@ run 0
 """
 
 
-def run(
+def run_script(
     folder: Path,
     script: str,
     particles: Sequence[Sequence[float]],
@@ -152,7 +152,7 @@ def groove(
         (2 * small, x, across * math.sin(tilt), across * math.cos(tilt)),
         *((2 * large, at, 0.0, 0.0) for at in fixed),
     ]
-    run(folder, script, bodies, 3 * [(-40 * large, 40 * large)])
+    run_script(folder, script, bodies, 3 * [(-40 * large, 40 * large)])
     table = np.loadtxt(folder / "out.txt", skiprows=1)
     y, z = table[:, 2], table[:, 3]
     inwards = 1 - np.hypot(y, z) / across
@@ -191,7 +191,7 @@ def bed(folder: Path, ratio: float, friction: float, fraction: float) -> dict[st
     script += _BED.format(every=max(1, round(0.01 / dt)), tilts="\n".join(tilts))
     rows = np.column_stack([2 * particles.radii_m, particles.positions_m]).tolist()
     across = (-2 * _BOWL_M, 2 * _BOWL_M)  # no more: empty cells of the neighbour grid cost time
-    run(folder, script, rows, (across, across, (-_BOWL_M, 2 * particles.top_m)))
+    run_script(folder, script, rows, (across, across, (-_BOWL_M, 2 * particles.top_m)))
     last = np.loadtxt(folder / "bed.txt", skiprows=9)
     places, radii = last[:, 1:4], last[:, 4]
     pairs = cKDTree(places).query_pairs(2 * radii.max(), output_type="ndarray")

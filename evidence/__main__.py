@@ -49,11 +49,11 @@ COMMANDS = (
         out_in("results/second_engine/comparison"),)),
     Command("predict", "run what published results are compared with, and predict these",
             "Run plates, bars, rods and heaps of published experiments, and predict their results "
-            "with intervals. The runs are in results/published.", "published.predict:predict", (
-        out_in("results/published/predicted"),)),
+            "with intervals. The runs are in results/published.",
+            "published.predict:predict_published", (out_in("results/published/predicted"),)),
     Command("compare-published", "compare predictions with published results",
             "Compare predictions.csv with published.csv.",
-            "published.predict:write_comparison", (
+            "published.predict:write_verdicts", (
         Argument("folder", type=Path, metavar="DIR", help="folder of both, and of runs.csv"),)),
     Command("validate", "compare the runs of a study with the publication it reproduces",
             "Compare the runs of a study with the publication it reproduces; write the report.",
