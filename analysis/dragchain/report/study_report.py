@@ -413,14 +413,14 @@ def _tables(signals: Sequence["SignalComparison"]) -> dict[str, pd.DataFrame]:
 
 def _overview(cases: Sequence[ReportedCase]) -> str:
     """The mean drag of all cases as a figure; no other part of the page needs matplotlib."""
-    from dragchain.figures.style import drawing, png
-    from dragchain.report.run_figures import drag_of_cases
+    from dragchain.figures.panels import interval_rows
+    from dragchain.figures.style import BLUE, drawing, png
 
-    rows = [row for case in cases for row in case.values.against]
+    against = [row.reference for case in cases for row in case.values.against]
     with drawing():
-        figure = drag_of_cases(
-            [fill(case.title, 32) for case in cases],
-            [case.values.drag.shown for case in cases],
-            list(dict.fromkeys((row.reference.label, row.reference.mean_n) for row in rows)),
+        figure = interval_rows(
+            [(fill(case.title, 32), case.values.drag.shown, BLUE) for case in cases],
+            {f"{of.label} {of.mean_n:.2f} N": of.mean_n for of in against},
+            "mean drag (N); bars: 95 % confidence interval",
         )
         return data_uri(png(figure))

@@ -8,7 +8,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 from records import chosen, record_table
 
-from dragchain.figures.panels import log_ticks, row_mark, row_names
+from dragchain.figures.panels import interval_rows, log_ticks, row_mark, row_names
 from dragchain.figures.style import (
     ABOVE_SCALE,
     BLUE,
@@ -26,7 +26,7 @@ from dragchain.figures.style import (
 from dragchain.scaling.fit import draw_scalings, read_scalings
 from dragchain.statistics.estimate import Estimate
 from evidence.stability.report import draw_regime
-from evidence.validation.report import draw_drags, effect_bar
+from evidence.validation.report import MEAN_DRAG, effect_bar
 
 
 def _panels(width: float, height: float, count: int = 1, **options: bool) -> tuple[Figure, Any]:
@@ -224,7 +224,9 @@ def _draw_validation() -> Figure:
         bars.append((f"packing {row.seed}", packing, BLUE))
     effects = chosen("validation/effects", "quantity == 'drag_mean'").fillna({"field": ""})
     bars += [effect_bar(drag.value, effect) for effect in effects.itertuples()]
-    return draw_drags(bars, record_table("validation/comparison").set_index("label")["mean_n"])
+    published = record_table("validation/comparison").itertuples()
+    lines = {f"{row.label} (published)": row.mean_n for row in published}
+    return interval_rows(bars, lines, MEAN_DRAG)
 
 
 def _draw_published() -> Figure:

@@ -15,7 +15,7 @@ from dragdeck.physics.contact_mechanics import (
 from dragdeck.physics.walls import round_container
 from dragdeck.records.bed import MediaOfRun
 from dragdeck.records.case import CaseOfRun
-from evidence.stability.measures import (
+from evidence.stability.network import (
     BOWL,
     PARTICLE,
     WORKPIECE,
