@@ -9,8 +9,6 @@ from dragchain.arrays import Floats, Ints
 from dragdeck.physics.contact_mechanics import damping_ratio, largest_eigenvalue, sphere_mass
 from dragdeck.records.case import CaseOfRun
 
-# --- the critical time step of a loaded contact network ----------------------------------------
-
 
 def critical_step(frequency_rad_s: float) -> float:
     """Largest stable step of central differences without damping, ``2 / omega``, s.

@@ -15,14 +15,9 @@ from dragdeck.engine.batch import Batch
 from dragdeck.engine.reports import say
 from dragdeck.errors import RejectedRunError
 from dragdeck.project import find_project, run_path, study_templates
-from evidence.verification.checks import (
-    JUDGED,
-    CheckVerdict,
-    ComparedRuns,
-    check_rows,
-    checks_by_test,
-)
+from evidence.verification.checks import ComparedRuns, checks_by_test
 from evidence.verification.experiment import collide_scene
+from evidence.verification.quantity_check import JUDGED, CheckVerdict, check_rows
 from evidence.verification.recording import read_recording
 from evidence.verification.suite import suite_file, suite_of
 
