@@ -12,7 +12,7 @@ import pandas as pd
 
 from dragchain.arrays import Floats
 from dragchain.calibration.angles import read_angle
-from dragchain.scaling.fit import read_scalings
+from dragchain.scaling.document import read_scalings
 from dragchain.statistics.bed_effects import EffectsFit, fit_effects
 from dragchain.statistics.estimate import Estimate
 from dragdeck.cases.case import Case

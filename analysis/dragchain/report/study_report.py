@@ -30,6 +30,7 @@ from dragchain.report.roughness import RoughnessOfCase, roughness_of
 from dragchain.report.spreadsheet import summary_workbook
 from dragchain.report.summary import summary
 from dragchain.report.tolerance import answers
+from dragchain.report.uncertain_inputs import uncertain_inputs
 from dragchain.run.case import upstream_folders
 from dragchain.run.workpiece import read_surface
 from dragchain.statistics.noisy_map import LARGEST_ERROR
@@ -235,6 +236,12 @@ def _render(
         removed=removed,
         rough=[(case, of, _ra_map(case, of)) for case in cases if (of := rough.get(case.key))],
         largest_error=LARGEST_ERROR,
+        uncertain={
+            section.study.process.case.run: list(
+                uncertain_inputs(section.assumptions, section.study.process.study)
+            )
+            for section in sections
+        },
         touched=[
             (case, rows, *touches_per_s(case)) for case in cases if (rows := touch_rows(case))
         ],

@@ -23,7 +23,8 @@ from dragchain.figures.style import (
     force_map,
     top_of_scale,
 )
-from dragchain.scaling.fit import draw_scalings, read_scalings
+from dragchain.scaling.document import read_scalings
+from dragchain.scaling.fit import draw_scalings
 from dragchain.statistics.estimate import Estimate
 from evidence.stability.report import draw_regime
 from evidence.validation.report import MEAN_DRAG, effect_bar

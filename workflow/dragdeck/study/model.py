@@ -567,6 +567,11 @@ class Assumption(Model):
 
     field: str = Field(description="dotted name of the field whose value is assumed")
     why: str = Field(description="what the source reports, and the reason for the value")
+    std: Annotated[Number, Field(gt=0)] | None = Field(
+        default=None,
+        description="standard uncertainty of the value; of depth, speed, radius of the workpiece, "
+        "or friction on it, the report says how uncertain it makes the mean drag",
+    )
 
 
 class Accepted(Model):
