@@ -128,19 +128,23 @@ def row_names(axes: Axes, names: Sequence[str]) -> None:
     axes.set_ylim(len(names) - 0.5, -0.5)
 
 
-def interval_rows(rows: Sequence[Row], lines: Mapping[str, float], xlabel: str) -> Figure:
+def interval_rows(
+    rows: Sequence[Row], lines: Mapping[str, float], xlabel: str, *, zero: bool = False
+) -> Figure:
     """Values with their intervals, one below the other, and reference values as dashed lines.
 
-    The first word of a line's label has the colour of that line.
+    The first word of a line's label has the colour of that line; `zero` has a line too.
     """
     figure, (axes,) = new_panels(1.2 + 0.3 * len(rows))
     for place, (_, estimate, colour) in enumerate(rows):
         row_mark(axes, place, estimate, colour)
     for label, value in lines.items():
         axes.axvline(value, color=COLOURS[label.split()[0]], ls="--", label=label)
+    if zero:
+        axes.axvline(0.0, color="black", lw=0.7)
     row_names(axes, [name for name, *_ in rows])
     axes.set_xlabel(xlabel)
-    return legend_below(figure)
+    return legend_below(figure) if lines else figure
 
 
 def key(axes: Axes, label: str, **style: Any) -> None:

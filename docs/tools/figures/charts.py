@@ -125,16 +125,11 @@ def _draw_scaling() -> Figure:
 
 def _draw_simplifications() -> Figure:
     """Confidence intervals of the change of the mean drag in simpler scenes."""
-    rows = record_table("scenes/simplifications")
-    places = range(len(rows), 0, -1)
-    figure, axes = _panels(7.6, 2.8)
-    low, high = (100 * rows[f"drag_mean_{end}"] for end in _CI)
-    axes.hlines(places, low, high, color=COLOURS["drag"], lw=4)
-    axes.axvline(0, color="black", lw=0.7)
-    axes.set_yticks(places, rows["change"])
-    axes.set_xlabel("change of the mean drag (%), 95 % CI")
-    axes.grid(axis="y", visible=False)
-    return figure
+    rows = []
+    for row in record_table("scenes/simplifications").to_dict("records"):
+        change = Estimate(*(100 * row[f"drag_mean_{end}"] for end in ("value", *_CI)))
+        rows.append((row["change"], change, COLOURS["drag"]))
+    return interval_rows(rows, {}, "change of the mean drag (%), 95 % CI", zero=True)
 
 
 def _draw_spin() -> Figure:
