@@ -9,6 +9,7 @@ import pandas as pd
 from markupsafe import Markup
 
 from dragchain.report.campaign import write_report
+from dragchain.tables.columns import UNITS, unit_end
 from dragdeck.cases.ranks import cores_here
 from dragdeck.decks.templates import environment
 from dragdeck.engine.batch import Batch
@@ -169,21 +170,9 @@ def _shown(rows: pd.DataFrame) -> Rows:
     return shown.to_dict("records")
 
 
-_UNITS = {
-    "_rad_s2": "rad/s²",
-    "_m_s2": "m/s²",
-    "_rad_s": "rad/s",
-    "_m_s": "m/s",
-    "_deg": "degrees",
-    "_n": "N",
-    "_m": "m",
-    "_s": "s",
-}
-
-
 def quantity_words(quantity: str) -> str:
     """A quantity's name in words, its unit in brackets."""
-    for ending, unit in _UNITS.items():
-        if quantity.endswith(ending):
-            return f"{quantity.removesuffix(ending).replace('_', ' ')} ({unit})"
-    return quantity.replace("_", " ")
+    if not (end := unit_end(quantity)):
+        return quantity.replace("_", " ")
+    unit = UNITS[end].replace("s2", "s\u00b2")
+    return f"{quantity.removesuffix(f'_{end}').replace('_', ' ')} ({unit})"

@@ -286,18 +286,14 @@ def _of_whole_runs(scenes: Sequence[Sequence[QuantityOfRun]]) -> dict[str, float
         math.log(mean_attribute(stiff, "variance") / mean_attribute(soft, "variance"))
         for stiff, soft in pairs
     ]
-    by_chance = float(np.mean([sum(map(_log_variance, map(_degrees_of, pair))) for pair in pairs]))
+    degrees = [[sum(len(run.blocks) - 1 for run in runs) for runs in pair] for pair in pairs]
+    by_chance = float(np.mean([sum(map(_log_variance, of_pair)) for of_pair in degrees]))
     return {
         "slope": 0.0,
         "slope_std": 0.0,
         "variance_ratio": math.exp(float(np.mean(logs))),
         "degrees": _degrees(float(np.var(logs, ddof=1)) - by_chance),
     }
-
-
-def _degrees_of(runs: Sequence[QuantityOfRun]) -> int:
-    """Degrees of freedom of the variance of their blocks."""
-    return sum(len(run.blocks) - 1 for run in runs)
 
 
 def _log_variance(degrees: int) -> float:

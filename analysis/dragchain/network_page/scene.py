@@ -30,7 +30,6 @@ from dragchain.run.workpiece import read_surface
 from dragchain.tables.by_step import read_table
 from dragchain.tables.columns import CENTRE, ORIENTATION, POINT, VELOCITY
 from dragchain.tables.run_folder import Run
-from dragdeck.records.bed import BodiesOfRun
 from dragdeck.records.case import CaseOfRun
 
 _LOADS = {
@@ -72,6 +71,10 @@ def page_scene(run: Run) -> PageScene:
     series = shown_frames(run, peaks["time_s"].to_numpy())
     shown = read_shown(series)
     times_s = process_time(series.times_s, case)
+    clumps = [
+        {"first": of.first_id, "spheres": (1e3 * np.array(of.spheres_m)).tolist()}
+        for of in case.bodies
+    ]
     bowl, surface = case.bowl, 1e3 * needed(case.surface_m, "surface_m")
     head = {
         "run": case.run,
@@ -95,18 +98,13 @@ def page_scene(run: Run) -> PageScene:
             "reach": 1e3 * shown.reach_m(),
             "classes": [{"name": class_.name, "first": class_.first_id} for class_ in case.classes],
         },
-        **({"clumps": [_clump(body) for body in case.bodies]} if case.bodies else {}),
+        **({"clumps": clumps} if clumps else {}),
         "workpieces": [_workpiece(columns, run, shown, series.steps)],
         "curve": _curve(columns, run),
         "peaks": _peaks(peaks, times_s, case),
         "colours": _colours(),
     }
     return PageScene(head | {"columns": columns.entries}, columns)
-
-
-def _clump(bodies: BodiesOfRun) -> dict[str, JsonValue]:
-    """First id of clumps of one size, and x, y, z and radius of their spheres, mm."""
-    return {"first": bodies.first_id, "spheres": (1e3 * np.array(bodies.spheres_m)).tolist()}
 
 
 def _colours() -> list[str]:

@@ -55,17 +55,7 @@ from dragdeck.study.drive import wrap_angle
 
 @dataclass(frozen=True)
 class RunTable:
-    """A file that is made of a run.
-
-    Attributes
-    ----------
-    name : str
-        Of the file in ``tables/``.
-    needs : tuple of str
-        The raw outputs that it is made of.
-    write : callable
-        Writes it, given the run and the file.
-    """
+    """A file in ``tables/``: its name, the raw outputs that it needs, and what writes it."""
 
     name: str
     needs: tuple[str, ...]

@@ -129,6 +129,7 @@ def tradeoff_record(
 ) -> TradeoffRecord:
     """The content of ``tradeoff.json``: when, with what and on what was measured, and what."""
     measures = [run.measures for run in tradeoff.runs]
+    at_reference = tradeoff.of(tradeoff.reference)
     return TradeoffRecord(
         measured=max(run.started for run in measures)[:10],
         commands=tuple(commands),
@@ -145,7 +146,7 @@ def tradeoff_record(
         machine=Machine.here(),
         runs=len(measures),
         engine_hours=sum(run.cost.cpu_time_s for run in measures) / 3600.0,
-        scene=_scene_numbers(tradeoff),
+        scene=next(filter(None, (run.measures.numbers for run in at_reference)), {}),
         reference=FidelityParameters(**tradeoff.reference.parameters()),
         quantities={
             name: QuantityEntry(
@@ -175,12 +176,6 @@ def tradeoff_record(
 
 def _joined(names: Iterable[object]) -> str:
     return ", ".join(sorted(set(map(str, names))))
-
-
-def _scene_numbers(tradeoff: Tradeoff) -> Mapping[str, float]:
-    """Dimensionless numbers of the scene, as the runs at the reference have them."""
-    numbers = [run.measures.numbers for run in tradeoff.of(tradeoff.reference)]
-    return next((known for known in numbers if known), {})
 
 
 def _setting_entry(tradeoff: Tradeoff, setting: Setting) -> SettingEntry:
