@@ -8,7 +8,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 from records import chosen, record_table
 
-from dragchain.figures.panels import interval_rows, log_ticks, row_mark, row_names
+from dragchain.figures.panels import interval_rows, key, log_ticks, row_mark, row_names
 from dragchain.figures.style import (
     ABOVE_SCALE,
     BLUE,
@@ -266,24 +266,17 @@ def _draw_verification(smallest: float = 1e-12) -> Figure:
 
 def _draw_windows() -> Figure:
     """Soft run and windows in the scene of the paper, relative to a run with the physical E."""
-    rows = record_table("windows/paper").dropna(subset=["stiff"])
-    places = np.arange(len(rows), 0, -1)
+    rows = record_table("windows/paper").dropna(subset=["stiff"]).reset_index()
     figure, axes = _panels(7.6, 3.0)
     widths = 100 * rows["stiff_half_width"]
-    axes.barh(places, 2 * widths, left=-widths, color=LIGHT, label="reference, 95 % CI")
-    ratios = {
-        column: 100 * (rows[column] / rows["stiff"] - 1) for column in ("soft", "value", *_CI)
-    }
-    ends = np.sort([ratios[end] for end in _CI], axis=0)
-    sides = [ratios["value"] - ends[0], ends[1] - ratios["value"]]
-    axes.plot(ratios["soft"], places, "s", color=ORANGE, label="soft run")
-    axes.errorbar(
-        ratios["value"], places, xerr=sides,
-        fmt="o", color=BLUE, capsize=3, label="windows, 95 % CI",
-    )  # fmt: skip
+    axes.barh(rows.index, 2 * widths, left=-widths, color=LIGHT, label="reference, 95 % CI")
+    ratios = rows[["soft", "value", *_CI]].div(rows["stiff"], axis=0).sub(1).mul(100)
+    axes.plot(ratios["soft"], rows.index, "s", color=ORANGE, label="soft run")
+    for place, (_, *windows) in enumerate(ratios.to_numpy()):
+        row_mark(axes, place, Estimate(*windows), BLUE)
+    key(axes, "windows, 95 % CI", color=BLUE)
     axes.axvline(0, color="black", lw=0.7)
-    labels = record_table("quantities").set_index("name")["label"]
-    axes.set_yticks(places, labels[rows["quantity"]])
+    row_names(axes, record_table("quantities").set_index("name")["label"][rows["quantity"]])
     axes.set_xlabel("difference from the reference (%)")
     figure.legend(loc="outside upper center", ncols=3)
     axes.grid(axis="y", visible=False)
