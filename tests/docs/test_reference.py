@@ -14,8 +14,7 @@ from pybtex.database import parse_file
 
 import dragchain
 from dragchain.report.page import MINUS
-from dragchain.scaling.document import ScalingFile
-from dragchain.scaling.document import read_scalings
+from dragchain.scaling.document import ScalingFile, read_scalings
 from dragchain.scaling.fit import said
 from dragdeck.errors import CautionCode
 from dragdeck.project import Project
