@@ -60,24 +60,15 @@ class CostOption(Variation):
     what: str
     unit: Literal["per_step", "per_second"] = "per_second"
 
-    def named(self) -> Mapping[str, tuple["CostOption", Settings]]:
-        """Each point by its name: itself with its words filled in, and the fields that it sets."""
-        named_values = {}
-        for _, values in self.points():
-            shown = [values[field] for field in self.vary]
-            words = {"name": self.name.format(*shown), "what": self.what.format(*shown)}
-            named_values[words["name"]] = (self.model_copy(update=words), values)
-        return named_values
-
 
 def options(design: Path = DESIGN) -> Mapping[str, tuple[CostOption, Settings]]:
-    """The options of a design by name, the reference first."""
-    known = Design[CostOption].read(design)
-    return {
-        name: (option, {**known.base, **values})
-        for block in (known.reference, *known.points)
-        for name, (option, values) in block.named().items()
-    }
+    """The options of a design by name with the fields that they set, the reference first."""
+    named = {}
+    for option, values in Design[CostOption].read(design).settings():
+        shown = [values[field] for field in option.vary]
+        words = {"name": option.name.format(*shown), "what": option.what.format(*shown)}
+        named[words["name"]] = (option.model_copy(update=words), values)
+    return named
 
 
 def option_case(case: Case, values: Settings, seconds: float) -> Case:
@@ -286,20 +277,22 @@ def time_options(
     records: dict[str, list[RunRecord]] = {name: [] for name in cases}
     for number in range(1, rounds + 1):
         batch = Batch(folder / f"round-{number}", own_templates)
-        standard = batch.result(first, scenes[first]())
+        records[first].append(batch.result(first, scenes[first]()))
         refused = batch.each({name: scenes[name] for name in others}, report)
-        records[first].append(standard)
         for name in others:
             if name not in refused:
                 records[name].append(RunRecord.read(batch.folder / name / "state.json"))
     steps_s = {name: make().deck.timestep_s for name, make in scenes.items() if records[name]}
     base = records[first]
-    timed = [
-        cost(chosen[name][0], _own(chosen, name, first), pairs, (steps_s[name], steps_s[first]),
-             chosen[first][0].what)
-        for name in others
-        if (pairs := [(a, b) for a, b in zip(records[name], base, strict=False) if a.complete])
-    ]  # fmt: skip
+    standard, of_standard = chosen[first]
+    timed = []
+    for name in others:
+        option, values = chosen[name]
+        changed = {key: value for key, value in values.items() if of_standard.get(key) != value}
+        pairs = [(a, b) for a, b in zip(records[name], base, strict=False) if a.complete]
+        if pairs:
+            steps = steps_s[name], steps_s[first]
+            timed.append(cost(option, changed, pairs, steps, standard.what))
     study = cases[first].study
     TimedCosts(
         study=case.study_name,
@@ -313,7 +306,7 @@ def time_options(
         load_average_before=load,
         base=BaseCost(
             name=first,
-            what=chosen[first][0].what,
+            what=standard.what,
             timestep_s=steps_s[first],
             steps=base[0].steps,
             cpu_us_per_step=1e6 * geometric([run.cpu_time_s / run.steps for run in base]).value,
@@ -321,12 +314,6 @@ def time_options(
         ),
         costs=tuple(timed),
     ).write(out)
-
-
-def _own(chosen: Mapping[str, tuple[CostOption, Settings]], name: str, first: str) -> Settings:
-    """The fields in which an option differs from the standard case."""
-    base = chosen[first][1]
-    return {field: value for field, value in chosen[name][1].items() if base.get(field) != value}
 
 
 def measure_costs(study: str, fidelity: str | None, out: Path, rounds: int) -> None:

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from dragchain.arrays import Floats
 from dragchain.calibration.angles import read_angle
-from dragchain.scaling.fit import read_scalings
+from dragchain.scaling.document import read_scalings
 from dragchain.statistics.bed_effects import EffectsFit, fit_effects
 from dragchain.statistics.estimate import Estimate
 from dragdeck.cases.case import Case
@@ -31,7 +32,7 @@ from evidence.beds import dragged
 
 DESIGN = Path(__file__).with_name("design.yaml")
 
-RESULTS = ("plate", "lift", "angle", "spin", "repose")
+RESULTS = ("plate", "lift", "bars", "angle", "spin", "repose")
 """Designs of the file."""
 
 LIFTED = ("bar_round", "bar_square", "bar_half_flat_down", "bar_half_flat_up")
@@ -58,7 +59,7 @@ class Repeated(Variation):
     packings: int = 2
 
 
-def predict(out_dir: Path) -> None:
+def predict_published(out_dir: Path) -> None:
     """Make the runs that are missing; write a row per run, and the predictions.
 
     Raises
@@ -75,7 +76,7 @@ def predict(out_dir: Path) -> None:
     out_dir.mkdir(parents=True, exist_ok=True)
     rows = []
     for result in RESULTS:
-        for case in cases_of(result):
+        for case in predicted_cases(result):
             measure = _heap if result == "repose" else _drag
             rows.append({"result": result, **measure(batch, case)})
             say(f"{result}: {len(rows)} runs")
@@ -85,7 +86,7 @@ def predict(out_dir: Path) -> None:
     )
 
 
-def cases_of(result: str) -> Iterator[Case]:
+def predicted_cases(result: str) -> Iterator[Case]:
     """The cases of a design, packing by packing of each point."""
     data: Any = read_yaml(DESIGN)
     design = Design[Repeated].read(DESIGN, result)
@@ -113,7 +114,8 @@ def _drag(batch: Batch, case: Case) -> dict[str, Any]:
     """What distinguishes a run (body, friction, spin, seed), and the force that it measures.
 
     This is the lift of a bar, N; the lateral force of one at an angle, N; the vertical force on a
-    rod that goes down, N, at two depths; or the stress on a plate per depth, N/m3.
+    rod that goes down, N, at two depths; the work of two bars that go down, J; or the stress on a
+    plate per depth, N/m3.
     """
     study, folder = case.study, dragged(batch, PROCESS.run_id(case), case)
     force = pd.read_parquet(folder / "tables" / "workpiece_force.parquet")
@@ -132,6 +134,8 @@ def _drag(batch: Batch, case: Case) -> dict[str, Any]:
     if row["body"] == "rod":
         at = [force.force_z_n[(depth - middle).abs() < _WINDOW_M].mean() for middle in _DEPTHS_M]
         return {**row, "value": at[0], "deeper": at[1]}
+    if row["body"].startswith("pair"):
+        return {**row, "value": np.trapezoid(force.force_z_n, depth)}
     if row["body"] == "plate_flat":
         down = force.phase.eq("plunge") & (depth > _FROM_DEPTH_M)
         slope = (force.force_z_n * depth)[down].sum() / (depth[down] ** 2).sum()
@@ -158,6 +162,7 @@ def predictions(runs: pd.DataFrame) -> pd.DataFrame:
             f"lift_{bar}_n": by_bar.estimate(row)
             for bar, row in zip(LIFTED, np.eye(4), strict=True)
         },
+        **_bars(of["bars"]),
         "angle_of_largest_force_deg": _peak(angle),
         **_spin(of["spin"]),
         "drag_std_by_friction": _by_friction(),
@@ -174,19 +179,33 @@ def _fit(design: Any, runs: pd.DataFrame) -> EffectsFit:
     return fit_effects(np.asarray(design, dtype=float), runs.value.to_numpy(), [*runs.seed])
 
 
-def _peak(runs: pd.DataFrame, draws: int = 2000) -> Estimate:
+def _bars(runs: pd.DataFrame) -> dict[str, Estimate]:
+    """Gap of the largest work of two bars, in particle diameters, and that over the widest gap."""
+    gaps = np.sort(runs.body.str.removeprefix("pair_").astype(float).unique())
+    fit = _fit(pd.get_dummies(runs.body), runs.assign(value=np.log(runs.value)))
+    at_three = np.where(gaps == 3, 1, 0) - np.where(gaps == gaps[-1], 1, 0)
+    return {
+        "work_of_two_bars": _largest(fit, gaps, np.eye(len(gaps))),
+        "work_rise_of_two_bars": fit.estimate(at_three).exp(minus=1.0),
+    }
+
+
+def _largest(fit: EffectsFit, places: Floats, rows: Floats, draws: int = 2000) -> Estimate:
+    """The place, (P,), at which effects times its row, (P, effects), are largest."""
+    random = np.random.default_rng(1).standard_t(fit.degrees, (draws, len(fit.effects)))
+    drawn = fit.effects + random @ np.linalg.cholesky(fit.covariance).T
+    low, high = np.quantile(places[(drawn @ rows.T).argmax(axis=1)], [0.025, 0.975])
+    return Estimate(places[(rows @ fit.effects).argmax()], low, high)
+
+
+def _peak(runs: pd.DataFrame) -> Estimate:
     """Angle of the largest force: of a sine series that vanishes along and across the motion."""
     angle = np.radians(runs.body.str.removeprefix("bar_").astype(float))
     fine = np.linspace(1, 89, 881)
     series, on_fine = (
         np.column_stack([np.sin(2 * at), np.sin(4 * at)]) for at in (angle, np.radians(fine))
     )
-    fit = _fit(series, runs.assign(value=runs.value.abs()))
-    random = np.random.default_rng(1).standard_t(fit.degrees, (draws, 2))
-    drawn = fit.effects + random @ np.linalg.cholesky(fit.covariance).T
-    peaks = fine[(drawn @ on_fine.T).argmax(axis=1)]
-    low, high = np.quantile(peaks, [0.025, 0.975])
-    return Estimate(fine[(on_fine @ fit.effects).argmax()], low, high)
+    return _largest(_fit(series, runs.assign(value=runs.value.abs())), fine, on_fine)
 
 
 def _spin(runs: pd.DataFrame) -> dict[str, Estimate]:
@@ -246,7 +265,7 @@ def compare(predicted: pd.DataFrame, published: pd.DataFrame) -> pd.DataFrame:
     return both
 
 
-def write_comparison(folder: Path) -> None:
+def write_verdicts(folder: Path) -> None:
     """Compare ``predictions.csv`` with ``published.csv``: a row per quantity, and one per result.
 
     Parameters

@@ -63,7 +63,7 @@ def compare_engines(out_dir: Path) -> None:
         rows += rows_of_case(batch, case)
         runs = pd.DataFrame(rows)
         runs.to_csv(out_dir / "engine_runs.csv", index=False, float_format="%.5g")
-        compared(runs).to_csv(out_dir / "engines.csv", index=False, float_format="%.5g")
+        engine_differences(runs).to_csv(out_dir / "engines.csv", index=False, float_format="%.5g")
         say(f"compared: {PROCESS.run_id(case)}")
 
 
@@ -180,7 +180,7 @@ def _quantities(
     return {name: estimate_mean(values).estimate for name, values in series.items()}
 
 
-def compared(runs: pd.DataFrame) -> pd.DataFrame:
+def engine_differences(runs: pd.DataFrame) -> pd.DataFrame:
     """The quantities of both engines, and the mean of their differences packing by packing.
 
     Parameters

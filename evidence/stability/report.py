@@ -22,16 +22,14 @@ from evidence.stability.judge import (
     LOST,
     OVERLAP,
     REFUSED,
-    RULE,
     STABLE,
     STOPPED,
-    conditions,
     judge_points,
-    summarise_map,
 )
 from evidence.stability.measures import PointRun
 from evidence.stability.points import REGIMES
 from evidence.stability.runs import run_map
+from evidence.stability.safe_steps import RULE, conditions, summarise_map
 from evidence.stability.scenes import PHASES
 
 

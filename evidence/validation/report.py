@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
-from matplotlib.figure import Figure
 
-from dragchain.figures.panels import legend_below, new_panels, row_mark, row_names
+from dragchain.figures.panels import Row, interval_rows
 from dragchain.figures.style import BLUE, COLOURS, GREY, ORANGE
 from dragchain.quantities.document import MEASURED_FILE
 from dragchain.quantities.registry import MEASURED, REPORTED
@@ -151,8 +150,10 @@ def write_validation(out_dir: Path, run_dirs: Sequence[Path], command: str) -> N
         out_dir,
         "validation/validation.html.j2",
         draw=lambda: {
-            "comparison": draw_drags(
-                list(_bars(result, packings)), {of.label: of.mean_n for of in result.comparison}
+            "comparison": interval_rows(
+                list(_bars(result, packings)),
+                {f"{of.label} (published)": of.mean_n for of in result.comparison},
+                MEAN_DRAG,
             )
         },
         tables={
@@ -271,11 +272,10 @@ def _table(rows: Sequence[Part]) -> pd.DataFrame:
     return pd.DataFrame([flattened(dict(part)) for part in rows])
 
 
-Bar = tuple[str, Estimate, str]
-"""Name, value and colour of a row of `draw_drags`."""
+MEAN_DRAG = "mean drag force (N), 95 % CI"
 
 
-def _bars(result: Validation, packings: pd.DataFrame) -> Iterator[Bar]:
+def _bars(result: Validation, packings: pd.DataFrame) -> Iterator[Row]:
     drag = next(of.mean for of in result.means if of.name == "drag_mean")
     yield "all packings", drag, COLOURS["drag"]
     for packing in packings.to_dict("records"):
@@ -286,7 +286,7 @@ def _bars(result: Validation, packings: pd.DataFrame) -> Iterator[Bar]:
             yield effect_bar(drag.value, effect)
 
 
-def effect_bar(drag_n: float, effect: Any) -> Bar:
+def effect_bar(drag_n: float, effect: Any) -> Row:
     """The mean drag with an effect, which is named by the changed input, or by the settings."""
     change = Estimate(effect.change, effect.ci95_low, effect.ci95_high)
     drag = change.mapped(lambda by: drag_n * (1 + by))
@@ -302,15 +302,3 @@ def _changed_input(field: str, value: str) -> str:
         return f"{field} {value}"
     words = field.removeprefix("motion.").removesuffix("_m").replace(".shape.", " ")
     return f"{words.replace('.', ' ').replace('_', ' ')} {1e3 * float(value):g} mm"
-
-
-def draw_drags(bars: Sequence[Bar], published: Mapping[str, float]) -> Figure:
-    """Mean drags with their intervals, one below the other, and published ones as lines."""
-    figure, (axes,) = new_panels(1.2 + 0.27 * len(bars))
-    for label, mean_n in published.items():
-        axes.axvline(mean_n, color=COLOURS[label], ls="--", label=f"published {label}")
-    for place, (_, estimate, colour) in enumerate(bars):
-        row_mark(axes, place, estimate, colour)
-    row_names(axes, [name for name, *_ in bars])
-    axes.set_xlabel("mean drag force (N), 95 % CI")
-    return legend_below(figure)

@@ -7,19 +7,26 @@ the normal rebound was narrowed afterwards, from 5 to 1 over the steps.
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 import pandas as pd
 
-from dragchain.arrays import Floats, Ints
+from dragchain.arrays import Floats
 from dragchain.errors import TableError
-from dragdeck.physics import contact_mechanics as mechanics
 from evidence.verification import law
-from evidence.verification.law import SLIDING, SPHERE, ContactPair, RelativeMotion
+from evidence.verification.law import SLIDING, ContactPair, RelativeMotion
+from evidence.verification.motion_checks import bounce, column, incline, momentum
+from evidence.verification.quantity_check import (
+    COULOMB,
+    EXACT,
+    INPUT,
+    INTEGRATED,
+    PUBLISHED,
+    QuantityCheck,
+)
 from evidence.verification.recording import RecordedContact, Recording
 
 _NORMAL = 1.0
@@ -34,112 +41,11 @@ _SECOND_ORDER = 1.0
 _SAME_NUMBERS = 1e-6
 """Two evaluations of one formula from the same state."""
 
-_CONSERVED = 1e-9
-"""Sums of thousands of steps in double precision."""
-
-_BOUNCES = 0.01
-"""Energy after 1,000 impacts: one such bounce of ceramic on steel loses half of it."""
-
-_AT_REST = 1e-3
-"""What is left of the motion of a column of particles after many of its periods."""
-
-_FITTED = 0.01
-"""Slope of a velocity that still carries the ringing of the contact."""
-
 _ORDER = 0.2
 """Scatter of a fitted order of convergence about a whole number."""
 
 READ_OFF, READ_OFF_CURVE = 0.01, 0.05
 """Points of a published figure, and values between them."""
-
-EXACT = "exact formula"
-INTEGRATED = "law integrated in small steps"
-COULOMB = "Coulomb sliding of rigid bodies"
-INPUT = "input restitution"
-PUBLISHED = "published curve"
-
-JUDGED = (EXACT, INTEGRATED)
-"""References that are the same law: a difference is a failure."""
-
-CheckVerdict = Literal["pass", "fail", "agrees", "differs"]
-"""``pass`` or ``fail`` against the same law, ``agrees`` or ``differs`` against another one."""
-
-CheckRows = Sequence[tuple[float, float, float]]
-"""Rows of x, reference and engine."""
-
-
-@dataclass(frozen=True)
-class QuantityCheck:
-    """A quantity of a run beside a reference.
-
-    Attributes
-    ----------
-    quantity, against : str
-    rows : rows of (x, reference, engine)
-        What is judged; x is what varies in the test, NaN if nothing does.
-    tolerance : float
-    scale : float, optional
-        To which errors are relative; None: the largest reference of the rows.
-    series : str
-        Name of the series, if not that of the run.
-    """
-
-    quantity: str
-    against: str
-    rows: CheckRows
-    tolerance: float
-    scale: float | None = None
-    series: str = ""
-
-
-# --- tables ---------------------------------------------------------------------------------
-
-
-def check_rows(run: Recording, check: QuantityCheck) -> pd.DataFrame:
-    """The rows of a comparison with their verdicts.
-
-    Returns
-    -------
-    DataFrame
-        One row per value. ``x_name`` and ``x`` are what varies in the test and its value (NaN if
-        nothing does), ``scale`` is the largest absolute reference of the series, or 1 for a
-        ratio, and ``error`` is that of the engine divided by it.
-    """
-    x, reference, engine = np.array(check.rows, dtype=np.float64).reshape(-1, 3).T
-    size = check.scale or float(np.abs(reference).max(initial=0.0)) or 1.0
-    error = np.abs(engine - reference) / size
-    verdicts = ("pass", "fail") if check.against in JUDGED else ("agrees", "differs")
-    return pd.DataFrame(
-        {
-            "number": run.case.number,
-            "test": run.case.test,
-            "series": check.series or series_name(run),
-            "quantity": check.quantity,
-            "x_name": run.case.vary,
-            "x": x,
-            "against": check.against,
-            "reference": reference,
-            "engine": engine,
-            "scale": size,
-            "error": error,
-            "tolerance": check.tolerance,
-            "verdict": np.where(error <= check.tolerance, *verdicts),
-        }
-    )
-
-
-_BY_SERIES_AND_LIMIT = ("restitution", "oblique_study", "spin_plane", "time_step")
-"""Tests that are run with and without the limit on attraction."""
-
-
-def series_name(run: Recording) -> str:
-    """Materials, and whether attraction is cut off where a test has both."""
-    case = run.case
-    limit = "limitForce on" if case.limit_force else "limitForce off"
-    series = case.series.replace("_", " ")
-    name = f"{series}, {limit}" if case.test in _BY_SERIES_AND_LIMIT else series
-    steps = case.test in ("time_step", "bounce")
-    return f"{name}, {case.steps_per_contact} steps a contact" if steps else name
 
 
 ComparedRuns = Sequence[tuple[Recording, QuantityCheck]]
@@ -215,10 +121,6 @@ def _rebounds(run: Recording) -> QuantityCheck:
     rows = [(impact.value, impact.constants.rebound, impact.rebound) for impact in run.contacts]
     tolerance = _NORMAL / run.case.steps_per_contact
     return QuantityCheck("rebound_over_approach", EXACT, rows, tolerance, 1.0)
-
-
-def _time_step(run: Recording) -> Iterator[QuantityCheck]:
-    yield _rebounds(run)
 
 
 def _restitution(run: Recording) -> Iterator[QuantityCheck]:
@@ -345,130 +247,15 @@ def fitted_order(rows: Sequence[tuple[int, float]]) -> float:
     return -float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
 
 
-# --- many impacts, rest, steady motion ------------------------------------------------------
-
-
-def _bounce(run: Recording) -> Iterator[QuantityCheck]:
-    impacts, energy = flight_energy(run)
-    least = float(run.case.impacts or 0)
-    yield QuantityCheck("impacts", EXACT, [(math.nan, least, min(float(impacts[-1]), least))], 0.0)
-    worst = float(np.abs(energy - 1).max())
-    yield QuantityCheck("energy_change", EXACT, [(math.nan, 0.0, worst)], _BOUNCES, 1.0)
-
-
-def flight_energy(run: Recording) -> tuple[Ints, Floats]:
-    """Impacts before each flight of a bouncing particle, and the relative energy of flight."""
-    touching = (run.force_n[:, 0] != 0.0).any(axis=1)
-    starts = np.flatnonzero(np.diff(touching.astype(np.int8)) == 1) + 1
-    free = np.flatnonzero(~touching)
-    speed = np.linalg.norm(run.velocity_m_s[free, 0], axis=1)
-    return np.searchsorted(starts, free), (speed / speed[0]) ** 2
-
-
-def _momentum(run: Recording) -> Iterator[QuantityCheck]:
-    changes = [momentum_changes(contact) for contact in run.contacts]
-    for at, quantity in enumerate(("linear_momentum_change", "angular_momentum_change")):
-        sizes = [np.linalg.norm(change[at], axis=1) for change in changes]
-        rows = [(c.value, 0.0, float(s.max())) for c, s in zip(run.contacts, sizes, strict=True)]
-        yield QuantityCheck(quantity, EXACT, rows, _CONSERVED, 1.0)
-
-
-def momentum_changes(contact: RecordedContact) -> tuple[Floats, Floats]:
-    """Change of linear and angular momentum of a closed pair since the first frame, (T, 3).
-
-    Over the sum of the sizes of its parts; angular momentum about the first common centre of mass.
-    """
-    run, partner = contact.run, contact.partner_at
-    assert partner is not None
-    at = [contact.at, partner]
-    particles = [run.particle(row + 1) for row in at]
-    mass = np.array([particle.mass_kg for particle in particles])[:, None]
-    inertia = np.array([particle.inertia_kg_m2 for particle in particles])[:, None]
-    linear = mass * run.velocity_m_s[:, at]
-    centre = (mass * run.position_m[0, at]).sum(axis=0) / mass.sum()
-    orbital = np.cross(run.position_m[:, at] - centre, linear)
-    angular = orbital + inertia * run.spin_rad_s[:, at]
-    size = np.linalg.norm(linear[0], axis=1).sum()
-    turn = (np.linalg.norm(orbital[0], axis=1) + np.linalg.norm(angular[0], axis=1)).sum()
-    total, spun = linear.sum(axis=1), angular.sum(axis=1)
-    return (total - total[0]) / size, (spun - spun[0]) / turn
-
-
-def _column(run: Recording) -> Iterator[QuantityCheck]:
-    """Each contact of the column from the floor up carries the weight above it."""
-    at_rest = slice(-len(run.time_s) // 5, None)
-    gravity, bodies = math.hypot(*run.case.gravity_m_s2), len(run.case.bodies)
-    rows, weights = [], []
-    for at, contact in enumerate(run.contacts):
-        above = range(at, bodies)
-        weights.append(sum(run.particle(number + 1).mass_kg for number in above) * gravity)
-        radius, modulus = contact.constants.radius_m, contact.constants.modulus_pa
-        hertz = mechanics.hertz_overlap(weights[-1], radius, modulus)
-        rows.append((at + 1.0, hertz, float(contact.overlap_m[at_rest].mean())))
-    floor = run.wall_force_n["plane"][:, 0, 2]
-    row = (math.nan, weights[0], float(floor[at_rest].mean()))
-    yield QuantityCheck("floor_force_n", EXACT, [row], _AT_REST)
-    yield QuantityCheck("overlap_m", EXACT, rows, _AT_REST)
-
-
-def _incline(run: Recording) -> Iterator[QuantityCheck]:
-    for at, quantity in enumerate(("acceleration_m_s2", "spin_up_rad_s2")):
-        rows = [
-            (contact.value, incline_reference(contact)[at], incline_slopes(contact)[at])
-            for contact in run.contacts
-        ]
-        yield QuantityCheck(quantity, EXACT, rows, _FITTED)
-    gravity = math.hypot(*run.case.gravity_m_s2) * math.cos(_angle(run))
-    force = run.wall_force_n["plane"][_steady(run)]
-    rows = [
-        (
-            contact.value,
-            contact.constants.particle.mass_kg * gravity,
-            float(force[:, contact.at, 2].mean()),
-        )
-        for contact in run.contacts
-    ]
-    yield QuantityCheck("normal_force_n", EXACT, rows, _FITTED)
-
-
-def _angle(run: Recording) -> float:
-    return math.radians(run.case.angle_deg or 0.0)
-
-
-def _steady(run: Recording) -> slice:
-    """Frames in which a particle on an incline rolls or slips steadily."""
-    return slice(len(run.time_s) // 2, None)
-
-
-def incline_reference(contact: RecordedContact) -> tuple[float, float]:
-    """Acceleration of a particle down the incline and of its spin, m/s2 and rad/s2.
-
-    It rolls without slip up to tan(angle) = 7/2 of the friction, and slips beyond.
-    """
-    constants, size = contact.constants, math.hypot(*contact.run.case.gravity_m_s2)
-    angle = _angle(contact.run)
-    normal, drive = size * math.cos(angle), size * math.sin(angle)
-    friction = min(drive / SLIDING, constants.friction * normal)
-    return drive - friction, -friction / (SPHERE * constants.particle.radius_m)
-
-
-def incline_slopes(contact: RecordedContact) -> tuple[float, float]:
-    """The same, fitted to the second half of the run."""
-    run, half = contact.run, _steady(contact.run)
-    time = run.time_s[half]
-    velocity = float(np.polyfit(time, run.velocity_m_s[half, contact.at, 0], 1)[0])
-    return velocity, -float(np.polyfit(time, run.spin_rad_s[half, contact.at, 1], 1)[0])
-
-
 CHECKS: Mapping[str, Callable[[Recording], Iterator[QuantityCheck]]] = {
     "elastic_pair": _elastic,
     "elastic_plane": _elastic,
     "restitution": _restitution,
     **dict.fromkeys(QUANTITIES, _oblique),
-    "time_step": _time_step,
-    "bounce": _bounce,
-    "momentum": _momentum,
-    "column": _column,
-    "incline": _incline,
+    "time_step": lambda run: iter([_rebounds(run)]),
+    "bounce": bounce,
+    "momentum": momentum,
+    "column": column,
+    "incline": incline,
 }
 """How each test is judged, in the order of the page."""

@@ -9,20 +9,16 @@ import pandas as pd
 from markupsafe import Markup
 
 from dragchain.report.campaign import write_report
+from dragchain.tables.columns import UNITS, unit_end
 from dragdeck.cases.ranks import cores_here
 from dragdeck.decks.templates import environment
 from dragdeck.engine.batch import Batch
 from dragdeck.engine.reports import say
 from dragdeck.errors import RejectedRunError
 from dragdeck.project import find_project, run_path, study_templates
-from evidence.verification.checks import (
-    JUDGED,
-    CheckVerdict,
-    ComparedRuns,
-    check_rows,
-    checks_by_test,
-)
+from evidence.verification.checks import ComparedRuns, checks_by_test
 from evidence.verification.experiment import collide_scene
+from evidence.verification.quantity_check import JUDGED, CheckVerdict, check_rows
 from evidence.verification.recording import read_recording
 from evidence.verification.suite import suite_file, suite_of
 
@@ -174,21 +170,9 @@ def _shown(rows: pd.DataFrame) -> Rows:
     return shown.to_dict("records")
 
 
-_UNITS = {
-    "_rad_s2": "rad/s²",
-    "_m_s2": "m/s²",
-    "_rad_s": "rad/s",
-    "_m_s": "m/s",
-    "_deg": "degrees",
-    "_n": "N",
-    "_m": "m",
-    "_s": "s",
-}
-
-
 def quantity_words(quantity: str) -> str:
     """A quantity's name in words, its unit in brackets."""
-    for ending, unit in _UNITS.items():
-        if quantity.endswith(ending):
-            return f"{quantity.removesuffix(ending).replace('_', ' ')} ({unit})"
-    return quantity.replace("_", " ")
+    if not (end := unit_end(quantity)):
+        return quantity.replace("_", " ")
+    unit = UNITS[end].replace("s2", "s\u00b2")
+    return f"{quantity.removesuffix(f'_{end}').replace('_', ' ')} ({unit})"

@@ -12,59 +12,43 @@ runs give ratio and scatter, too, and the slope is 0.
 import math
 import tarfile
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from scipy.optimize import brentq, least_squares
+from scipy.optimize import brentq
 from scipy.special import digamma, polygamma
-from scipy.stats import binom, truncnorm
+from scipy.stats import truncnorm
 
 from dragchain.arrays import Floats
 from dragchain.errors import SeriesError
 from dragchain.quantities.blocks import neighbour_correlation
 from dragchain.quantities.document import RunQuantities
 from dragchain.quantities.registry import MEASURED, Quantity
-from dragchain.statistics.estimate import CONFIDENCE, NORMAL_QUANTILE, student_quantile
+from dragchain.statistics.estimate import NORMAL_QUANTILE
 from dragchain.windows.estimate import WindowOfRun
 from dragchain.windows.rounds import beside, of_windows, stretches, window_of
-from dragdeck.physics.contact_mechanics import damping_ratio
-from dragdeck.records.stability import StableStepLaw, StableStepRecord
-from dragdeck.records.tradeoff import SixDigits
-from dragdeck.records.windows import (
-    TYPICAL_FRONT,
-    UNKNOWN,
-    Known,
-    WindowsRecord,
-    front_of,
-    softening,
+from dragdeck.records.windows import TYPICAL_FRONT, UNKNOWN, Known, WindowsRecord, front_of
+from evidence.windows.scene_runs import (
+    QuantityOfRun,
+    Scenes,
+    is_soft,
+    last_day,
+    mean_attribute,
+    read_scenes,
+    runs_with,
 )
-
-_SOFT = 1e-3
-_FEWEST_SCENES = 5
-_LARGEST_STD = 0.08
-"""A ratio that differs by more than this from scene to scene says too little."""
-
-_BY_CHANCE = 0.01
-"""Probability of so many misses of scenes that are left out below which intervals do not cover."""
+from evidence.windows.softened import FEWEST_SCENES, Softened, between_scenes, ratio_of_softness
+from evidence.windows.stable_step import stable_step_record
 
 _FEWEST_DEGREES, _MOST_DEGREES = 0.5, 10.0
 """Windows' worth of evidence on a variance: never more, whatever the scenes agree on."""
 
 
-class SceneRun(RunQuantities):
-    """The quantities of a run, with the number of the acceptance check of the time step."""
-
-    stability_number: float | None = None
-
-
 _LARGEST_VARIANCE = 0.05
 """Relative, of means whose scatter between packings is of use: not of those that may be zero."""
-
-Scenes = Sequence[Sequence[SceneRun]]
-"""The runs of each scene."""
 
 
 def write_scene_records(out_dir: Path, archives: Sequence[Path], windows: Path | None) -> str:
@@ -84,9 +68,8 @@ def write_scene_records(out_dir: Path, archives: Sequence[Path], windows: Path |
         Too few scenes or runs.
     """
     scenes = read_scenes(archives)
-    of_windows = [windows] if windows else []
-    windowed = [of for file in of_windows for of in read_windows(file)]
-    record = windows_record(scenes, windowed, [file.name for file in (*of_windows, *archives)])
+    windowed, files = (read_windows(windows), [windows]) if windows else ([], [])
+    record = windows_record(scenes, windowed, [file.name for file in (*files, *archives)])
     step = stable_step_record(scenes)
     record.write(out_dir / "windows.json")
     step.write(out_dir / "stable_step.json")
@@ -94,51 +77,6 @@ def write_scene_records(out_dir: Path, archives: Sequence[Path], windows: Path |
         f"windows.json: {len(record.quantities)} quantities\n"
         f"stable_step.json: {step.stable_step.runs} runs"
     )
-
-
-def read_scenes(archives: Sequence[Path]) -> Scenes:
-    """All runs, by what tells one scene from another: archive and dimensionless numbers."""
-    scenes = defaultdict[object, list[SceneRun]](list)
-    for archive in archives:
-        with tarfile.open(archive) as files:
-            for member in files:
-                if member.name.endswith(".json") and (stream := files.extractfile(member)):
-                    run = SceneRun.model_validate_json(stream.read())
-                    numbers = {
-                        name: run.numbers[name] for name in run.numbers.keys() - {"particles"}
-                    }
-                    scenes[archive, frozenset(numbers.items())].append(run)
-    return list(scenes.values())
-
-
-def _measured(scenes: Sequence[Sequence[RunQuantities]]) -> str:
-    return max(run.started for runs in scenes for run in runs)[:10]
-
-
-# --- windows.json --------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class QuantityOfRun:
-    """The blocks of a quantity along the path of a run, (B,)."""
-
-    run: SceneRun
-    blocks: Floats
-
-    @cached_property
-    def value(self) -> float:
-        """Magnitude of the mean."""
-        return abs(float(self.blocks.mean()))
-
-    @cached_property
-    def variance(self) -> float:
-        """Of a block, relative to the square of the mean."""
-        return float(self.blocks.var(ddof=1)) / self.value**2
-
-    @property
-    def variance_of_mean(self) -> float:
-        """Relative variance of the mean, for blocks that are independent."""
-        return self.variance / len(self.blocks)
 
 
 @dataclass(frozen=True)
@@ -249,36 +187,18 @@ def windows_record(
     rows = {quantity.name: _known(quantity, scenes, windowed) for quantity in MEASURED}
     quantities = {name: known for name, known in rows.items() if known}
     if not quantities:
-        raise SeriesError(f"no quantity is known in {_FEWEST_SCENES} scenes or more")
+        raise SeriesError(f"no quantity is known in {FEWEST_SCENES} scenes or more")
     return WindowsRecord(
-        measured=_measured([*scenes, [of.soft for of in windowed]]),
+        measured=last_day([*scenes, [of.soft for of in windowed]]),
         source=f"runs of scenes: {', '.join(sources)}",
         quantities=quantities,
     )
 
 
-def _between_scenes(
-    values: Sequence[float], variances: Sequence[float]
-) -> tuple[float, float, float]:
-    """Mean over scenes, its standard error, and standard deviation of a further scene from it.
-
-    The variance between scenes is by the method of moments (DerSimonian and Laird 1986, Controlled
-    Clinical Trials 7, 177), and never taken as less than that of the mean.
-    """
-    of, variance = np.asarray(values), np.asarray(variances)
-    weight = 1.0 / variance
-    mean = float(np.average(of, weights=weight))
-    excess = float(weight @ (of - mean) ** 2) - (len(of) - 1)
-    between = max(excess / float(weight.sum() - weight @ weight / weight.sum()), 0.0)
-    weight = 1.0 / (variance + between)
-    error = 1.0 / float(weight.sum())
-    return float(np.average(of, weights=weight)), math.sqrt(error), math.sqrt(between + error)
-
-
 def _known(quantity: Quantity, scenes: Scenes, windowed: Sequence[Windowed]) -> Known | None:
-    measured = [[*_runs_with(quantity, runs)] for runs in scenes]
+    measured = [[*runs_with(quantity, runs)] for runs in scenes]
     pairs = [of for windows in windowed if (of := windows.pairs(quantity)) and of.is_usable]
-    if len(pairs) >= _FEWEST_SCENES:
+    if len(pairs) >= FEWEST_SCENES:
         said = _of_windows(quantity, pairs)
     elif (whole := _of_whole_runs(measured)) is None:
         return None
@@ -286,13 +206,13 @@ def _known(quantity: Quantity, scenes: Scenes, windowed: Sequence[Windowed]) -> 
         said = whole
     of_blocks = [of.of_block for of in pairs]
     of_blocks += [
-        (front_of(soft[0].run.numbers), _mean(soft, "variance"))
+        (front_of(soft[0].run.numbers), mean_attribute(soft, "variance"))
         for runs in measured
         if (soft := _soft(runs))
     ]
     block_std, front_power = _of_blocks(of_blocks)
     softened = [softened for runs in measured if (softened := Softened.of(runs))]
-    per_softness, std, covered = _ratio([] if quantity.signed else softened)
+    per_softness, std, covered = ratio_of_softness([] if quantity.signed else softened)
     return Known(
         **{name: round(value, 4) for name, value in said.items()},
         block_std=round(block_std, 4),
@@ -322,7 +242,7 @@ def _of_blocks(scenes: Sequence[tuple[float, float]]) -> tuple[float, float]:
 
 def _of_windows(quantity: Quantity, pairs: Sequence[Pairs]) -> dict[str, float]:
     """What soft runs and their windows say."""
-    slope, error, slope_std = _between_scenes(
+    slope, error, slope_std = between_scenes(
         [of.slope for of in pairs], [of.slope_variance for of in pairs]
     )
     if quantity.signed or slope < NORMAL_QUANTILE * error:  # it would add more than it removes
@@ -349,7 +269,7 @@ def _of_windows(quantity: Quantity, pairs: Sequence[Pairs]) -> dict[str, float]:
 
 
 def _soft(runs: Sequence[QuantityOfRun]) -> list[QuantityOfRun]:
-    return [run for run in runs if _is_soft(run.run)]
+    return [run for run in runs if is_soft(run.run)]
 
 
 def _of_whole_runs(scenes: Sequence[Sequence[QuantityOfRun]]) -> dict[str, float] | None:
@@ -360,106 +280,20 @@ def _of_whole_runs(scenes: Sequence[Sequence[QuantityOfRun]]) -> dict[str, float
         if (stiff := [run for run in runs if run.run.fidelity.youngs_modulus_scale == 1.0])
         and (soft := _soft(runs))
     ]
-    if len(pairs) < _FEWEST_SCENES:
+    if len(pairs) < FEWEST_SCENES:
         return None
-    logs = [math.log(_mean(stiff, "variance") / _mean(soft, "variance")) for stiff, soft in pairs]
-    by_chance = float(np.mean([sum(map(_log_variance, map(_degrees_of, pair))) for pair in pairs]))
+    logs = [
+        math.log(mean_attribute(stiff, "variance") / mean_attribute(soft, "variance"))
+        for stiff, soft in pairs
+    ]
+    degrees = [[sum(len(run.blocks) - 1 for run in runs) for runs in pair] for pair in pairs]
+    by_chance = float(np.mean([sum(map(_log_variance, of_pair)) for of_pair in degrees]))
     return {
         "slope": 0.0,
         "slope_std": 0.0,
         "variance_ratio": math.exp(float(np.mean(logs))),
         "degrees": _degrees(float(np.var(logs, ddof=1)) - by_chance),
     }
-
-
-@dataclass(frozen=True)
-class Softened:
-    """A quantity of a scene at the physical modulus and at reduced ones.
-
-    Attributes
-    ----------
-    stiff : sequence of QuantityOfRun
-    soft : sequence of sequence of QuantityOfRun
-        The packings at each reduced modulus, (M,).
-    differences : (M,) ndarray
-        By how much their `softness` is above that of the physical modulus.
-    """
-
-    stiff: Sequence[QuantityOfRun]
-    soft: Sequence[Sequence[QuantityOfRun]]
-    differences: Floats
-
-    @classmethod
-    def of(cls, runs: Sequence[QuantityOfRun]) -> "Softened | None":
-        """Of all packings of a scene; None if a modulus is missing."""
-        by_scale = defaultdict[float, list[QuantityOfRun]](list)
-        for run in runs:
-            by_scale[run.run.fidelity.youngs_modulus_scale].append(run)
-        stiff = by_scale.pop(1.0, [])
-        if not stiff or not by_scale:
-            return None
-        number = stiff[0].run.numbers["stiffness_number"]
-        soft = [softening(number, scale) for scale in by_scale]
-        return cls(stiff, list(by_scale.values()), np.array(soft))
-
-    @cached_property
-    def per_softness(self) -> float:
-        """The logarithm of the ratio per difference of softness, by least squares."""
-        soft = np.array([_mean(runs, "value") for runs in self.soft])
-        logs = np.log(_mean(self.stiff, "value") / soft)
-        return float(self.differences @ logs / (self.differences @ self.differences))
-
-    @cached_property
-    def variance(self) -> float:
-        """Of that, by the scatter along the paths."""
-        x, of_stiff = self.differences, _variance_of_mean(self.stiff)
-        of_soft = np.array([_variance_of_mean(runs) for runs in self.soft])
-        return float(of_stiff * x.sum() ** 2 + x**2 @ of_soft) / float(x @ x) ** 2
-
-    def misses(self, per_softness: float, std: float, degrees: int) -> Iterator[bool]:
-        """Of each soft run, whether its estimate and the stiff runs exclude each other."""
-        stiff, of_stiff = math.log(_mean(self.stiff, "value")), _variance_of_mean(self.stiff)
-        for runs, difference in zip(self.soft, self.differences, strict=True):
-            for run in runs:
-                along = student_quantile(len(run.blocks) - 1) ** 2 * run.variance_of_mean
-                between = (student_quantile(degrees) * std * difference) ** 2
-                half = math.sqrt(along + between + NORMAL_QUANTILE**2 * of_stiff)
-                yield abs(math.log(run.value) + per_softness * difference - stiff) > half
-
-
-def _ratio(scenes: Sequence[Softened]) -> tuple[float, float, float]:
-    """Logarithm of the ratio per difference of softness, its standard deviation, and coverage.
-
-    The coverage is that of scenes that are left out by what the others give. Where that is too low
-    by more than chance, the standard deviation is infinite.
-    """
-    if len(scenes) < _FEWEST_SCENES:
-        return 0.0, math.inf, 0.0
-    mean, std = _over(scenes)
-    missed = [
-        miss
-        for number, scene in enumerate(scenes)
-        for miss in scene.misses(*_over([*scenes[:number], *scenes[number + 1 :]]), len(scenes) - 2)
-    ]
-    by_chance = binom.sf(sum(missed) - 1, len(missed), 1.0 - CONFIDENCE)
-    useful = std <= _LARGEST_STD and by_chance >= _BY_CHANCE
-    return mean, std if useful else math.inf, 1.0 - sum(missed) / len(missed)
-
-
-def _over(scenes: Sequence[Softened]) -> tuple[float, float]:
-    mean, _, std = _between_scenes(
-        [scene.per_softness for scene in scenes], [scene.variance for scene in scenes]
-    )
-    return mean, std
-
-
-def _is_soft(run: SceneRun) -> bool:
-    return math.isclose(run.fidelity.youngs_modulus_scale, _SOFT, rel_tol=0.1)
-
-
-def _degrees_of(runs: Sequence[QuantityOfRun]) -> int:
-    """Degrees of freedom of the variance of their blocks."""
-    return sum(len(run.blocks) - 1 for run in runs)
 
 
 def _log_variance(degrees: int) -> float:
@@ -473,17 +307,6 @@ def _log_bias(values: Floats) -> float:
     return float(digamma(half) - math.log(half))
 
 
-def _runs_with(quantity: Quantity, runs: Sequence[SceneRun]) -> list[QuantityOfRun]:
-    """The accepted runs at the speed of their scene in which every block has the quantity."""
-    plain = [run for run in runs if run.fidelity.speed_factor == 1 and run.complete]
-    blocks = [run.of_blocks(quantity.name).values for run in plain]
-    rows = [
-        QuantityOfRun(run, np.sqrt(of) if quantity.squared else of)
-        for run, of in zip(plain, blocks, strict=True)
-    ]
-    return [row for row in rows if len(row.blocks) > 1 and np.isfinite(row.blocks).all()]
-
-
 def _correlation(scenes: Sequence[Sequence[QuantityOfRun]]) -> float:
     """Mean correlation of neighbouring blocks; that of a quantity of which nothing is known."""
     series = [run.blocks for runs in scenes for run in runs if run.variance]
@@ -491,14 +314,6 @@ def _correlation(scenes: Sequence[Sequence[QuantityOfRun]]) -> float:
         return UNKNOWN.correlation
     of_runs = [neighbour_correlation(blocks) for blocks in series]
     return float(np.average(of_runs, weights=[len(blocks) for blocks in series]))
-
-
-def _mean(runs: Sequence[QuantityOfRun], name: str) -> float:
-    return float(np.mean([getattr(run, name) for run in runs]))
-
-
-def _variance_of_mean(runs: Sequence[QuantityOfRun]) -> float:
-    return _mean(runs, "variance_of_mean") / len(runs)
 
 
 def _degrees(excess: float) -> float:
@@ -525,7 +340,7 @@ def _between_packings(measured: Sequence[Sequence[QuantityOfRun]]) -> float:
             groups[fidelity.youngs_modulus_scale, fidelity.timestep_fraction].append(run)
         for group in groups.values():
             values, free = np.array([run.value for run in group]), len(group) - 1
-            along = _mean(group, "variance_of_mean")
+            along = mean_attribute(group, "variance_of_mean")
             if free and along < _LARGEST_VARIANCE:
                 excess = float((values / values.mean()).var(ddof=1)) - along
                 squares += excess * free
@@ -535,80 +350,3 @@ def _between_packings(measured: Sequence[Sequence[QuantityOfRun]]) -> float:
         return 0.0
     error = math.sqrt(square_error)
     return math.sqrt(truncnorm.mean(-squares / error, math.inf, squares, error) / degrees)
-
-
-# --- stable_step.json ----------------------------------------------------------------------------
-
-
-class MeasuredStepLaw(StableStepLaw):
-    """The law with the range of the stiffness numbers and restitutions of its runs."""
-
-    stiffness: SixDigits
-    damping: SixDigits
-    spread: SixDigits
-    scatter: SixDigits
-    largest: SixDigits
-    stiffness_numbers: tuple[SixDigits, SixDigits]
-    restitutions: tuple[SixDigits, SixDigits]
-
-
-class MeasuredStepRecord(StableStepRecord):
-    """The content of ``stable_step.json``."""
-
-    engine_versions: tuple[str, ...]
-    stable_step: MeasuredStepLaw
-
-
-def stable_step_record(scenes: Scenes) -> MeasuredStepRecord:
-    """The law of the stability number, by least squares on the logarithms of the measured ones.
-
-    In a packing, the product of contact frequency and Rayleigh time is proportional to
-    kappa^(-1/4), with the stiffness number kappa, since the stiffness of a Hertz contact is
-    proportional to the square root of its overlap.
-
-    Raises
-    ------
-    SeriesError
-        Fewer runs with a number than constants of the law.
-    """
-    runs = [run for scene in scenes for run in scene if run.stability_number and run.numbers]
-    if len(runs) <= 3:
-        raise SeriesError(f"{len(runs)} runs have a stability number, too few to fit a law")
-    rows = np.array([_step_row(run) for run in runs])
-    number, kappa, restitution, fraction, spread = rows.T
-    reach = fraction * kappa**-0.25
-    damping = np.array([damping_ratio(coefficient) for coefficient in restitution]) * reach
-
-    def misfit(constants: Floats) -> Floats:
-        stiffness, of_damping = np.exp(constants[:2])
-        of_mean = 0.5 * np.log(stiffness * reach**2 + of_damping * damping)
-        return np.asarray(np.log(number) - of_mean - constants[2] * spread)
-
-    fit = least_squares(misfit, [math.log(50.0), math.log(50.0), 0.0])
-    return MeasuredStepRecord(
-        measured=_measured(scenes),
-        engine_versions=tuple(sorted({run.versions["engine"] for run in runs})),
-        stable_step=MeasuredStepLaw(
-            stiffness=math.exp(fit.x[0]),
-            damping=math.exp(fit.x[1]),
-            spread=float(fit.x[2]),
-            scatter=math.sqrt(float(np.sum(fit.fun**2)) / (len(runs) - 3)),
-            largest=float(fit.fun.max()),
-            runs=len(runs),
-            stiffness_numbers=(kappa.min(), kappa.max()),
-            restitutions=(restitution.min(), restitution.max()),
-        ),
-    )
-
-
-def _step_row(run: SceneRun) -> tuple[float, ...]:
-    """Stability number, kappa, restitution, step over Rayleigh time, relative spread of radii."""
-    media = run.study.media
-    kappa = run.numbers["stiffness_number"] * run.fidelity.youngs_modulus_scale ** (2.0 / 3.0)
-    return (
-        run.stability_number or math.nan,
-        kappa,
-        run.study.pair(media.main_material, media.main_material).restitution,
-        run.fidelity.timestep_fraction,
-        media.typical_std_m / media.typical_radius_m,
-    )

@@ -14,8 +14,8 @@ from pybtex.database import parse_file
 
 import dragchain
 from dragchain.report.page import MINUS
-from dragchain.scaling.document import ScalingFile
-from dragchain.scaling.fit import read_scalings, said
+from dragchain.scaling.document import ScalingFile, read_scalings
+from dragchain.scaling.fit import said
 from dragdeck.errors import CautionCode
 from dragdeck.project import Project
 from dragdeck.records.run import CheckCode

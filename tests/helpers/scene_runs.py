@@ -10,7 +10,7 @@ from dragdeck.physics.contact_mechanics import damping_ratio
 from dragdeck.records.case import FidelityOfRun
 from dragdeck.records.windows import softness
 from dragdeck.study.model import Study
-from evidence.windows.record import SceneRun
+from evidence.windows.scene_runs import SceneRun
 
 COST = RunCost(steps=1, wall_time_s=1, cpu_time_s=1, ranks=1, timestep_s=1e-6, axis_speed_m_s=0.1,
                steps_per_m=1e7)  # fmt: skip

@@ -19,7 +19,7 @@ from dragchain.arrays import Floats
 from dragchain.calibration.drops import IMPACTS, DropTestOfStudy
 from dragchain.calibration.measured_impacts import Impact, MeasuredImpacts, pulse
 from dragchain.calibration.simulated_drops import DropRun, Drops, Emulator, Waveform
-from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate
+from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate, birge_factor
 from dragdeck.errors import RecordError
 from dragdeck.parts import Part
 
@@ -168,8 +168,8 @@ class Fit(Part):
     p_value : float or None
         Probability of a larger `chi2` if the model is right.
     inflation : float
-        Factor by which the interval is widened if the residuals exceed their uncertainties:
-        sqrt(chi2 / degrees), at least 1 (Birge 1932, Physical Review 40, 207).
+        Factor by which the interval is widened if the residuals exceed their uncertainties, see
+        `birge_factor`.
     residuals : tuple of float
         (Measured - simulated) / standard uncertainty.
     """
@@ -223,7 +223,7 @@ def fit(observed: Observed, emulator: Emulator, contact: Emulator, known: DropTe
         xtol=1e-12, ftol=1e-12, gtol=1e-12,
     )  # fmt: skip
     least, degrees = 2.0 * float(best.cost), flights + peaks - 1
-    inflation = math.sqrt(max(1.0, least / degrees)) if degrees else 1.0
+    inflation = birge_factor(least, degrees)
     slopes = np.asarray(best.jac)
     std = math.sqrt(np.linalg.inv(slopes.T @ slopes)[0, 0])
     value = Estimate.around(float(best.x[0]), NORMAL_QUANTILE * inflation * std)

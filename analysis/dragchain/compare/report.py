@@ -4,13 +4,8 @@ Cases are compared with the first one. Where both have the same packings (seeds)
 are taken packing by packing, so that what the packings have in common cancels.
 """
 
-import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
-from dataclasses import dataclass
-from functools import cached_property
-from itertools import combinations, product
+from collections.abc import Sequence
 from pathlib import Path
 from textwrap import fill
 from typing import Any
@@ -20,256 +15,21 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from pydantic import JsonValue
 
 from dragchain.arrays import Floats
+from dragchain.compare.cases import CaseDifference, ComparedCase, differences
+from dragchain.compare.factors import FactorEffect, changed_between, effects_of, factors_of
 from dragchain.drag import circumference
-from dragchain.errors import SeriesError, TableError
+from dragchain.errors import TableError
 from dragchain.figures.panels import new_panels
 from dragchain.figures.style import WIDE_IN, force_map
 from dragchain.quantities.along import MAP_AZIMUTHS, MAP_DEPTHS
-from dragchain.quantities.basis import Standing
-from dragchain.quantities.registry import REPORTED, Quantity
+from dragchain.quantities.registry import REPORTED
 from dragchain.report.campaign import write_report
 from dragchain.report.cases import ReportedCase, StudyRuns, cases_of, read_study_runs
 from dragchain.report.page import NETWORK_PAGE, TIMES, render_page, with_interval, write_bundle
-from dragchain.run.case import changed_inputs
-from dragchain.statistics.bed_effects import Factors, fit_effects
 from dragchain.statistics.estimate import Estimate, flattened, mean_of
 from dragchain.tables.by_step import read_table
-
-
-@dataclass(frozen=True)
-class ComparedCase:
-    """A case of a comparison, with its name there."""
-
-    name: str
-    case: ReportedCase
-
-    @cached_property
-    def by_seed(self) -> Mapping[int, StudyRuns]:
-        """Its process runs by the seed of their packing."""
-        return {runs.process.study.seed: runs for runs in self.case.studies}
-
-    @cached_property
-    def inputs(self) -> Mapping[str, JsonValue]:
-        """Values of its study by dotted name."""
-        return self.case.first.process.study.inputs()
-
-    @cached_property
-    def load_maps(self) -> Mapping[int, Floats]:
-        """Mean normal load of each packing by depth and azimuth, N."""
-        return {seed: _load_map(study) for seed, study in self.by_seed.items()}
-
-
-@dataclass(frozen=True)
-class CaseDifference:
-    """A quantity of a case beside that of the first one.
-
-    Attributes
-    ----------
-    name : str
-        Of the case.
-    quantity : Quantity
-    first, value : Estimate
-        In the first case, and in this one.
-    difference : Estimate
-        Of the two; the interval is NaN where a single packing gives none.
-    basis : str
-        Whether both are as simulated, or from windows.
-    paired : bool
-        Whether it is the mean over packings that both cases have.
-    """
-
-    name: str
-    quantity: Quantity
-    first: Estimate
-    value: Estimate
-    difference: Estimate
-    basis: str
-    paired: bool
-
-    @property
-    def relative(self) -> Estimate:
-        """The difference over the value in the first case: positive where this one is larger."""
-        size = self.first.value
-        return self.difference.over(size) if size else Estimate(math.nan, math.nan, math.nan)
-
-    @property
-    def verdict(self) -> str:
-        """Whether the interval excludes zero, and what that says of the magnitude."""
-        if not self.difference.known or self.difference.contains(0.0):
-            return "undecided" if self.difference.known else "no interval"
-        return "larger" if self.relative.value > 0 else "smaller"
-
-
-def differences(first: ComparedCase, other: ComparedCase) -> list[CaseDifference]:
-    """Every quantity that two cases have."""
-    rows = []
-    for quantity in REPORTED:
-        pair = [case.case.values.of(quantity.name) for case in (first, other)]
-        if all(pair):
-            rows.append(_difference(quantity, first, other))
-    return rows
-
-
-def _difference(quantity: Quantity, first: ComparedCase, other: ComparedCase) -> CaseDifference:
-    standings = [_standings(case, quantity) for case in (first, other)]
-    corrected = all(standing.corrected for packings in standings for standing in packings.values())
-    before, after = (_mean(case, quantity, corrected) for case in (first, other))
-    numbers = [
-        {seed: _number(standing, corrected).value for seed, standing in packings.items()}
-        for packings in standings
-    ]
-    paired = len(numbers[0]) > 1 and numbers[0].keys() == numbers[1].keys()
-    if paired:
-        change = mean_of([numbers[1][seed] - numbers[0][seed] for seed in numbers[0]])
-    else:
-        half = math.hypot(before.half_width, after.half_width)
-        change = Estimate.around(after.value - before.value, half)
-    basis = str(next(iter(standings[0].values())).basis) if corrected else "as simulated"
-    return CaseDifference(other.name, quantity, before, after, change, basis, paired)
-
-
-def _standings(case: ComparedCase, quantity: Quantity) -> dict[int, Standing]:
-    standings = {seed: study.values.of(quantity.name) for seed, study in case.by_seed.items()}
-    return {seed: standing for seed, standing in standings.items() if standing}
-
-
-def _number(standing: Standing, corrected: bool) -> Estimate:
-    return standing.shown if corrected else standing.run
-
-
-def _mean(case: ComparedCase, quantity: Quantity, corrected: bool) -> Estimate:
-    standing = case.case.values.of(quantity.name)
-    assert standing is not None
-    return _number(standing, corrected)
-
-
-# --- factors -------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class FactorEffect:
-    """What a factor does to a quantity, or two of them together.
-
-    Attributes
-    ----------
-    quantity : Quantity
-    factors : tuple of str
-        One: the change from its first level to another, averaged over the other factors.
-        Two: half of the difference between the changes of the first factor at another and at the
-        first level of the second.
-    levels : tuple of str
-        Of each factor: the two levels.
-    effect : Estimate
-    """
-
-    quantity: Quantity
-    factors: tuple[str, ...]
-    levels: tuple[str, ...]
-    effect: Estimate
-
-    @property
-    def words(self) -> Sequence[str]:
-        """Each factor with its levels."""
-        return [f"{name} ({both})" for name, both in zip(self.factors, self.levels, strict=True)]
-
-
-def _changed(cases: Sequence[ComparedCase]) -> dict[str, list[JsonValue]]:
-    """Inputs but the seed that differ between cases, with the value of each case."""
-    first, *others = (case.inputs for case in cases)
-    names = {name for inputs in others for name in changed_inputs(inputs, first)} - {"seed"}
-    return {name: [case.inputs.get(name) for case in cases] for name in sorted(names)}
-
-
-def factors_of(cases: Sequence[ComparedCase]) -> dict[str, list[JsonValue]]:
-    """Inputs that are set independently of each other, with the level of each case.
-
-    Empty unless there are at least two, and every combination of their levels is a case.
-    """
-    levels_by_name = _changed(cases)
-    levels = [{repr(level) for level in column} for column in levels_by_name.values()]
-    combined = {tuple(map(repr, row)) for row in zip(*levels_by_name.values(), strict=True)}
-    crossed = len(combined) == math.prod(map(len, levels)) == len(cases)
-    return levels_by_name if len(levels_by_name) > 1 and crossed else {}
-
-
-def effects_of(
-    cases: Sequence[ComparedCase], factors: Mapping[str, Sequence[JsonValue]], quantity: Quantity
-) -> list[FactorEffect]:
-    """Main effects and interactions of two factors on a quantity, by least squares.
-
-    Every combination of levels has a coefficient of its own, so that no shape of the response is
-    assumed; numbers are ordered, others are as they come. A packing that all cases share is a
-    block. Where too few runs remain for the scatter, the effects of single factors are added up.
-    """
-    levels = {name: _levels(column) for name, column in factors.items()}
-    settings = [dict(zip(factors, map(str, row), strict=True))
-                for row in zip(*factors.values(), strict=True)]  # fmt: skip
-    values = [
-        (number, seed, standing.run.value)
-        for number, case in enumerate(cases)
-        for seed, standing in _standings(case, quantity).items()
-    ]
-    if len({number for number, *_ in values}) < len(cases):
-        return []
-    numbers, seeds, measured = zip(*values, strict=True)
-    if not 0.0 < np.ptp(measured) < math.inf:
-        return []
-    shared = all(case.by_seed.keys() == cases[0].by_seed.keys() for case in cases)
-    packings = list(dict.fromkeys(seeds))[1:] if shared else []
-    blocks = np.array([[float(seed == packing) for packing in packings] for seed in seeds])
-    reference = {name: known[0] for name, known in levels.items()}
-    for additive in (False, True):
-        model = Factors([settings[number] for number in numbers], reference, additive)
-        design = np.hstack([model.design(), blocks])
-        with suppress(SeriesError):
-            fit = fit_effects(design, np.array(measured), range(len(design)))
-            break
-    else:
-        return []
-    of_cases = np.array([model.row(setting) for setting in settings])
-    terms = [[name] for name in levels] + ([] if additive else [*combinations(levels, 2)])
-    effects = []
-    for term in terms:
-        for others in product(*(levels[name][1:] for name in term)):
-            change = {name: (reference[name], other)
-                      for name, other in zip(term, others, strict=True)}  # fmt: skip
-            weights = np.append(_contrast(of_cases, settings, change), np.zeros(len(packings)))
-            words = tuple(" to ".join(both) for both in change.values())
-            effects.append(FactorEffect(quantity, tuple(change), words, fit.estimate(weights)))
-    return effects
-
-
-def _levels(column: Sequence[JsonValue]) -> list[str]:
-    """What the levels of a factor are called, numbers in their order."""
-    if all(isinstance(level, int | float) for level in column):
-        column = sorted(column, key=lambda level: float(str(level)))
-    return list(dict.fromkeys(map(str, column)))
-
-
-def _contrast(
-    of_cases: Floats, settings: Sequence[Mapping[str, str]], change: Mapping[str, tuple[str, str]]
-) -> Floats:
-    """Weights of coefficients: from the first levels to others, averaged over other factors."""
-    weights = np.zeros(of_cases.shape[1])
-    for ends in product((0, 1), repeat=len(change)):
-        levels = {name: change[name][end] for name, end in zip(change, ends, strict=True)}
-        alike = [setting.items() >= levels.items() for setting in settings]
-        weights += (-1) ** (len(change) - sum(ends)) * of_cases[alike].mean(axis=0)
-    return weights / len(change)  # of an interaction, half
-
-
-# --- figures -------------------------------------------------------------------------------------
-
-
-def _load_map(study: StudyRuns) -> Floats:
-    """Load map of a run: that from its windows where it has one."""
-    load_map = study.extrapolated.load_map if study.extrapolated else None
-    if load_map is not None:
-        return np.array(load_map.value).reshape(MAP_DEPTHS, MAP_AZIMUTHS)
-    return np.array(study.measured.load_map).reshape(MAP_DEPTHS, MAP_AZIMUTHS)
 
 
 def draw_maps(cases: Sequence[ComparedCase]) -> Figure:
@@ -419,7 +179,7 @@ def write_comparison(out_dir: Path, folders: Sequence[Path]) -> None:
         notes=notes,
         effects=effects,
         linked=linked,
-        changed=_changed(cases),
+        changed=changed_between(cases),
     )
 
 

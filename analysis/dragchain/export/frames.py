@@ -236,7 +236,8 @@ class FrameSeries:
             contacts = RisingSteps(run.file("contacts.parquet"), CONTACTS, steps)
         if self.has_chains:
             chains = RisingSteps(run.file("chains.parquet"), _CHAINS, steps)
-        searched = _steps(run.file("network.parquet")) if chains is not None else frozenset()
+        network_file = run.file("network.parquet")
+        searched = set(_frame_times(network_file)[0].tolist()) if chains is not None else set()
         place = workpiece_places(run.folder, run.case) if run.case.workpiece is not None else None
         for step, time_s in zip(steps.tolist(), self.times_s.tolist(), strict=True):
             of_particles = particles.at(step).sort_values("particle_id", ignore_index=True)
@@ -264,7 +265,3 @@ def _frame_times(file: Path) -> tuple[Ints, Floats]:
         steps.append(step)
         times_s.append(rows["time_s"].iloc[0])
     return np.array(steps, dtype=np.int64), np.array(times_s, dtype=np.float64)
-
-
-def _steps(file: Path) -> frozenset[int]:
-    return frozenset(_frame_times(file)[0].tolist())

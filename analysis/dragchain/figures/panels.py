@@ -1,6 +1,6 @@
 """The axes of a figure, and the marks that figures have in common."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -111,6 +111,10 @@ def compass_bars(axes: Any, edges_rad: Sequence[float], columns: EstimateColumns
     axes.set_xlabel(f"mean normal force (N per {np.degrees(edges[1] - edges[0]):.0f}°)")
 
 
+Row = tuple[str, Estimate, str]
+"""Name, value and colour of a row."""
+
+
 def row_mark(axes: Axes, place: float, estimate: Estimate, colour: str) -> None:
     """Draw a value with its interval in a row."""
     span = [estimate.ci95_low, estimate.ci95_high]
@@ -122,6 +126,25 @@ def row_names(axes: Axes, names: Sequence[str]) -> None:
     """Name rows, the first at the top; they lie at 0, 1, ..."""
     axes.set_yticks(range(len(names)), names)
     axes.set_ylim(len(names) - 0.5, -0.5)
+
+
+def interval_rows(
+    rows: Sequence[Row], lines: Mapping[str, float], xlabel: str, *, zero: bool = False
+) -> Figure:
+    """Values with their intervals, one below the other, and reference values as dashed lines.
+
+    The first word of a line's label has the colour of that line; `zero` has a line too.
+    """
+    figure, (axes,) = new_panels(1.2 + 0.3 * len(rows))
+    for place, (_, estimate, colour) in enumerate(rows):
+        row_mark(axes, place, estimate, colour)
+    for label, value in lines.items():
+        axes.axvline(value, color=COLOURS[label.split()[0]], ls="--", label=label)
+    if zero:
+        axes.axvline(0.0, color="black", lw=0.7)
+    row_names(axes, [name for name, *_ in rows])
+    axes.set_xlabel(xlabel)
+    return legend_below(figure) if lines else figure
 
 
 def key(axes: Axes, label: str, **style: Any) -> None:

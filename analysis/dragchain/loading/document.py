@@ -20,7 +20,7 @@ class Totals(Part):
         By amount, `AMOUNTS` and ``normal_work_j``, ``workpiece_work_j`` and ``events``.
     front_fraction : mapping
         Fraction of each amount on the front half of the workpiece.
-    friction_fraction_of_work, normal_fraction_of_work : Estimate
+    friction_fraction_of_work : Estimate
         Of the work that the workpiece does on the particles.
     load_while_sliding_fraction : Estimate
         Of the normal impulse.
@@ -29,7 +29,6 @@ class Totals(Part):
     totals: Mapping[str, int | float]
     front_fraction: Mapping[str, Estimate]
     friction_fraction_of_work: Estimate
-    normal_fraction_of_work: Estimate
     load_while_sliding_fraction: Estimate
 
 
@@ -88,14 +87,11 @@ class LoadClosure(Part):
     ----------
     workpiece_relative_error : float
         Of the impulse on the workpiece, summed over the facets and from the total force.
-    facets_relative_error : float
-        The largest of an amount, summed over facets and over contacts.
     point_off_facet_max_m : float
         Largest distance of a contact point from its facet, m.
     """
 
     workpiece_relative_error: float
-    facets_relative_error: float
     point_off_facet_max_m: float
 
 

@@ -141,13 +141,8 @@ def _view(axes: Axes, mesh: Any, name: str, scale: Normalize, case: CaseOfRun) -
     axes.axhline(0.0, color=GREY, linewidth=0.8, linestyle="--")
     axes.grid(False)
     axes.xaxis.set_major_locator(MaxNLocator(2, integer=True))
-    when = motion if _keeps_direction(case) else "(at the start)"
+    when = motion if motion_of(case).keeps_direction else "(at the start)"
     axes.set(xlabel="width (mm)", title=f"{name}\n{when}")
-
-
-def _keeps_direction(case: CaseOfRun) -> bool:
-    """Whether the workpiece's motion has one direction in its own frame."""
-    return motion_of(case).keeps_direction
 
 
 def _render(mesh: Any, eye: tuple[float, float], scale: Normalize, case: CaseOfRun) -> Image:

@@ -159,7 +159,8 @@ def _read_contacts(file: Path, run_dir: Path, case: CaseOfRun) -> Iterator[pd.Da
     """Counted contacts with force, a row group at a time."""
     columns = [*_CONTACT, *([ATTRACTION] if attracts(case) else [])]
     for contacts in read_groups(file, columns):
-        loaded = contacts[_loaded(contacts)].reset_index(drop=True)
+        loads = contacts["in_statistics"] & (contacts[_FORCE] != 0.0).any(axis=1)
+        loaded = contacts[loads].reset_index(drop=True)
         if loaded[_VELOCITY].isna().any(axis=None):
             raise TableError(
                 f"{file}: slip_x_m_s is missing: the output workpiece_particles of this older "
@@ -168,11 +169,6 @@ def _read_contacts(file: Path, run_dir: Path, case: CaseOfRun) -> Iterator[pd.Da
             )
         if len(loaded):
             yield loaded
-
-
-def _loaded(contacts: pd.DataFrame) -> pd.Series:
-    """Which contacts count and carry force."""
-    return contacts["in_statistics"] & (contacts[_FORCE] != 0.0).any(axis=1)
 
 
 def _counted_steps(run_dir: Path, case: CaseOfRun, table: str) -> tuple[Ints, float]:

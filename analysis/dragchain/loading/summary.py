@@ -4,8 +4,6 @@ These are the quantities a law of wear starts from; no wear coefficient enters,
 so none of them is a removed volume. See docs/explanation/loading.md.
 """
 
-from collections.abc import Mapping
-
 import numpy as np
 import pandas as pd
 
@@ -84,28 +82,21 @@ def _totals(sampled: Sampled, events: pd.DataFrame) -> Totals:
             sampled.per_frame(rows["normal_impulse_n_s"] * (1.0 - rows["mobilised"])),
         ]
     )
-    friction, normal, whole = (
-        _KNOWN.index(name) for name in ("friction_work_j", "normal_work_j", "workpiece_work_j")
-    )
+    friction, whole = map(_KNOWN.index, ("friction_work_j", "workpiece_work_j"))
 
     def statistic(means: Floats) -> Floats:
         front, back = means[..., :count], means[..., count : 2 * count]
         sliding, sticking = np.moveaxis(means[..., 2 * count :], -1, 0)
         total = front + back
-        others = [
-            total[..., friction] / total[..., whole],
-            total[..., normal] / total[..., whole],
-            sliding / (sliding + sticking),
-        ]
+        others = [total[..., friction] / total[..., whole], sliding / (sliding + sticking)]
         return np.concatenate([front / total, np.stack(others, -1)], axis=-1)
 
     ratios = estimates(sums, statistic)
-    friction_part, normal_part, sliding_part = ratios[count:]
+    friction_part, sliding_part = ratios[count:]
     return Totals(
         totals={name: float(rows[name].sum()) for name in _KNOWN} | {"events": len(events)},
         front_fraction=dict(zip(_KNOWN, ratios, strict=False)),
         friction_fraction_of_work=friction_part,
-        normal_fraction_of_work=normal_part,
         load_while_sliding_fraction=sliding_part,
     )
 
@@ -161,20 +152,11 @@ def _profile(sampled: Sampled) -> Profile:
 
 
 def _closure(sampled: Sampled, facets: pd.DataFrame, off_facet_m: float) -> LoadClosure:
-    whole = {name: float(sampled.rows[name].sum()) for name in AMOUNTS}
     placed = facets[list(WORKPIECE)].to_numpy().sum(axis=0)
     missing = sampled.workpiece_impulse_n_s - placed
     return LoadClosure(
         workpiece_relative_error=float(
             np.linalg.norm(missing) / np.linalg.norm(sampled.workpiece_impulse_n_s)
         ),
-        facets_relative_error=_largest_error(facets, whole),
         point_off_facet_max_m=off_facet_m,
-    )
-
-
-def _largest_error(table: pd.DataFrame, whole: Mapping[str, float]) -> float:
-    return max(
-        abs(float(table[name].sum()) - total) / abs(total) if total else 0.0
-        for name, total in whole.items()
     )

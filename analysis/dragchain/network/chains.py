@@ -171,13 +171,11 @@ def widest_paths(frame: NetworkFrame) -> list[WidestPath]:
     pairs = zip(
         rows.particle_lists(), split_chains(rows.contacts, rows.contact_starts), strict=True
     )
-    return [
-        WidestPath(tuple(particles), tuple(links), _end(frame, links)) for particles, links in pairs
-    ]
-
-
-def _end(frame: NetworkFrame, contacts: list[int]) -> int | None:
-    return int(frame.other[contacts[-1]]) if len(contacts) > 1 else None
+    paths = []
+    for particles, links in pairs:
+        end = int(frame.other[links[-1]]) if len(links) > 1 else None
+        paths.append(WidestPath(tuple(particles), tuple(links), end))
+    return paths
 
 
 def path_rows(frame: NetworkFrame) -> ChainRows:

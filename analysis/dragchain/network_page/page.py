@@ -3,7 +3,8 @@
 from importlib.resources import files
 from pathlib import Path
 
-from dragchain.network_page.scene import ROUNDING, PageScene, page_scene
+from dragchain.network_page.packed import ROUNDING
+from dragchain.network_page.scene import PageScene, page_scene
 from dragchain.quantities.basis import changed_settings, effects
 from dragchain.report.page import NETWORK_PAGE, page_environment
 from dragchain.run.case import with_changes

@@ -3,204 +3,34 @@
 `Scene.head` is what the page's scripts read as JSON; its entries have the names used there.
 """
 
-import base64
-import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any, Literal
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from matplotlib.colors import to_hex
-from numpy.typing import NDArray
 from pydantic import JsonValue
-from scipy.spatial.transform import Rotation
 
 from dragchain.arrays import Floats, Ints
-from dragchain.drag import drag_peaks, peak_separation_s, read_counted
-from dragchain.errors import TableError
-from dragchain.export.frames import FrameSeries
+from dragchain.drag import peak_separation_s
 from dragchain.figures.style import force_map, top_of_scale
-from dragchain.network.frame import BODY_NAMES, PARTICLE, NetworkFrame
+from dragchain.network.frame import BODY_NAMES, PARTICLE
+from dragchain.network_page.packed import PackedColumns
+from dragchain.network_page.shown import (
+    BODIES,
+    MOST_PARTICLES,
+    Shown,
+    highest_peaks,
+    read_shown,
+    shown_frames,
+)
 from dragchain.run.kinematics import drag_phase, needed, process_time
 from dragchain.run.workpiece import read_surface
 from dragchain.tables.by_step import read_table
 from dragchain.tables.columns import CENTRE, ORIENTATION, POINT, VELOCITY
 from dragchain.tables.run_folder import Run
-from dragdeck.records.bed import BodiesOfRun
 from dragdeck.records.case import CaseOfRun
-
-# --- columns as bytes ----------------------------------------------------------------------------
-
-
-NumberKind = Literal["u8", "u16", "u32", "f24"]
-"""Whole numbers of 1, 2 or 4 bytes, or the first 3 bytes of a single-precision number."""
-
-_BYTES = {"u8": 1, "u16": 2, "u32": 4, "f24": 3}
-
-ROUNDING = 2.0**-16
-"""Largest relative error of a number of kind ``f24``: it keeps 16 significant bits."""
-
-
-def short_floats(values: Floats) -> NDArray[np.uint32]:
-    """Numbers in single precision, rounded to their first 3 bytes, (N,)."""
-    bits = np.ascontiguousarray(values, dtype=np.float32).view(np.uint32)
-    return (bits + np.uint32(0x80)) >> np.uint32(8)
-
-
-@dataclass
-class PackedColumns:
-    """Columns in the order in which they were added.
-
-    Attributes
-    ----------
-    entries : list of dict
-        ``name``, ``kind`` and ``length`` of each, for the page.
-    """
-
-    entries: list[dict[str, str | int]] = field(default_factory=list)
-    _parts: list[bytes] = field(default_factory=list)
-
-    def add(self, name: str, kind: NumberKind, values: NDArray[Any]) -> None:
-        """Add a column; values are (N,) or are taken row by row."""
-        flat = np.ravel(values)
-        whole = short_floats(flat) if kind == "f24" else flat
-        planes = whole.astype(">u4").view(np.uint8).reshape(-1, 4)[:, 4 - _BYTES[kind] :]
-        self.entries.append({"name": name, "kind": kind, "length": flat.size})
-        self._parts.append(np.ascontiguousarray(planes.T).tobytes())
-
-    def text(self) -> str:
-        """All columns, one after another, compressed (zlib) and in base64."""
-        return base64.b64encode(zlib.compress(b"".join(self._parts))).decode("ascii")
-
-
-# --- shown frames --------------------------------------------------------------------------------
-
-
-FRAMES = 100
-"""Frames at equal intervals that are shown, or fewer if the run has fewer."""
-
-PEAKS = 10
-"""The highest peaks of the drag force, whose nearest frames are shown too."""
-
-MOST_PARTICLES = 2000
-"""Of a frame; if it has more, those nearest to the workpiece are shown."""
-
-QUASI_LINEAR, PATH, DOMINANT = 1, 2, 4
-"""Flags of a contact: in a quasi-linear chain, on a path to the bowl, on the dominant one."""
-
-BODIES = 0xFFFF
-"""Stands for the body 0, the workpiece; others, with negative numbers, come before it."""
-
-
-@dataclass(frozen=True)
-class Shown:
-    """What is shown of F frames: the rows of all frames, one frame after another.
-
-    Attributes
-    ----------
-    particles : DataFrame
-        Rows of ``particles.parquet``, and ``frame``, 0 to F - 1.
-    contacts : DataFrame
-        Rows of ``contacts.parquet`` of which no particle is left out; ``frame``; ``a`` and ``b``,
-        places of the particles in their frame, where a body that is no particle is its ``b_id``
-        plus `BODIES`; and ``flags``, sums of `QUASI_LINEAR`, `PATH` and `DOMINANT`.
-    poses : (F, 7) float
-        The workpiece's reference point in m, and its orientation as a quaternion.
-    most : int
-        Particles of the frame that has most, with those that are left out.
-    """
-
-    particles: pd.DataFrame
-    contacts: pd.DataFrame
-    poses: Floats
-    most: int
-
-    def touching(self) -> pd.DataFrame:
-        """The contacts on workpiece and bowl."""
-        return self.contacts[self.contacts["b"] > BODIES - len(BODY_NAMES)]
-
-    def reach_m(self) -> float:
-        """How far the particles of the first frame are from the workpiece's axis, at most."""
-        first = self.particles[self.particles["frame"] == 0][list(CENTRE)].to_numpy()
-        return float(np.hypot(*(first - self.poses[0, :3])[:, :2].T).max())
-
-
-def highest_peaks(run: Run) -> pd.DataFrame:
-    """The peaks of the drag force in the counted stretch, the highest first, `PEAKS` at most.
-
-    Raises
-    ------
-    SeriesError
-        If the run is too short to have peaks.
-    """
-    peaks = drag_peaks(read_counted(run.folder, ("time_s", "drag_n")), run.case)
-    peak_rows = pd.DataFrame({"time_s": peaks.time_s, "drag_n": peaks.drag_n})
-    return peak_rows.nsmallest(PEAKS, "drag_n")
-
-
-def shown_frames(run: Run, peak_time_s: Floats) -> FrameSeries:
-    """`FRAMES` network frames of the counted stretch, and the nearest one to each peak.
-
-    Raises
-    ------
-    TableError
-        If the run wrote no contact network.
-    """
-    if not run.wrote("contacts", "particles", "workpiece_contacts", "workpiece_particles"):
-        raise TableError(
-            f"{run.folder}: this {run.case.scene} run wrote no contact network, which the"
-            " page requires\n  remedy: use the outputs contacts and particles"
-        )
-    network = run.table("network", ["step", "time_s"])
-    steps, times = network["step"].to_numpy(np.int64), network["time_s"].to_numpy(np.float64)
-    even = np.linspace(0, len(steps) - 1, min(FRAMES, len(steps))).round().astype(np.int64)
-    nearest = np.abs(times[:, None] - peak_time_s).argmin(axis=0)
-    rows = np.union1d(even, nearest)
-    series = FrameSeries(run, steps[rows], times[rows])
-    if not series.has_chains:
-        raise TableError(
-            f"{run.folder}: the force chains are missing: run `./run dragchain chains {run.folder}`"
-        )
-    return series
-
-
-def read_shown(series: FrameSeries) -> Shown:
-    """Read the frames of a series; errors are those of its iterator."""
-    particles, contacts, poses, most = [], [], [], 0
-    for number, data in enumerate(series):
-        network, membership = data.network, data.membership
-        assert network is not None and membership is not None
-        assert data.contacts is not None and data.workpiece is not None
-        kept, chain = _near(network, data.workpiece[0]), membership.contacts
-        place = np.where(kept, np.cumsum(kept) - 1, -1)
-        bodies = BODIES + data.contacts["b_id"].to_numpy(np.int64)
-        shown = data.contacts.assign(
-            frame=number,
-            a=place[network.a],
-            b=np.where(network.between_particles(), place[network.b], bodies),
-            flags=QUASI_LINEAR * (chain["peters_chain"] > 0)
-            + PATH * (chain["widest_paths"] > 0)
-            + DOMINANT * chain["dominant"],
-        )
-        particles.append(data.particles[kept].assign(frame=number))
-        contacts.append(shown[(shown["a"] >= 0) & (shown["b"] >= 0)])
-        turn = Rotation.from_matrix(data.workpiece[1].matrices[0]).as_quat()
-        poses.append([*data.workpiece[0], *turn])
-        most = max(most, kept.size)
-    return Shown(pd.concat(particles), pd.concat(contacts), np.array(poses), most)
-
-
-def _near(frame: NetworkFrame, workpiece_m: Floats) -> NDArray[np.bool_]:
-    """The `MOST_PARTICLES` particles that are nearest to the workpiece's axis, (N,) bool."""
-    away = np.hypot(*(frame.centre[:, :2] - workpiece_m[:2]).T)
-    if away.size <= MOST_PARTICLES:
-        return np.ones(away.size, dtype=bool)
-    return np.asarray(away < np.partition(away, MOST_PARTICLES)[MOST_PARTICLES])
-
-
-# --- scene ---------------------------------------------------------------------------------------
-
 
 _LOADS = {
     "force_slide_pa": ("sliding load", "N/m²"),
@@ -241,6 +71,10 @@ def page_scene(run: Run) -> PageScene:
     series = shown_frames(run, peaks["time_s"].to_numpy())
     shown = read_shown(series)
     times_s = process_time(series.times_s, case)
+    clumps = [
+        {"first": of.first_id, "spheres": (1e3 * np.array(of.spheres_m)).tolist()}
+        for of in case.bodies
+    ]
     bowl, surface = case.bowl, 1e3 * needed(case.surface_m, "surface_m")
     head = {
         "run": case.run,
@@ -264,18 +98,13 @@ def page_scene(run: Run) -> PageScene:
             "reach": 1e3 * shown.reach_m(),
             "classes": [{"name": class_.name, "first": class_.first_id} for class_ in case.classes],
         },
-        **({"clumps": [_clump(body) for body in case.bodies]} if case.bodies else {}),
+        **({"clumps": clumps} if clumps else {}),
         "workpieces": [_workpiece(columns, run, shown, series.steps)],
         "curve": _curve(columns, run),
         "peaks": _peaks(peaks, times_s, case),
         "colours": _colours(),
     }
     return PageScene(head | {"columns": columns.entries}, columns)
-
-
-def _clump(bodies: BodiesOfRun) -> dict[str, JsonValue]:
-    """First id of clumps of one size, and x, y, z and radius of their spheres, mm."""
-    return {"first": bodies.first_id, "spheres": (1e3 * np.array(bodies.spheres_m)).tolist()}
 
 
 def _colours() -> list[str]:

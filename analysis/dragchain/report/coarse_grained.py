@@ -19,7 +19,7 @@ from scipy.stats import chi2
 from dragchain.arrays import Floats
 from dragchain.quantities.document import RunQuantities
 from dragchain.quantities.registry import REPORTED, Quantity
-from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate, flattened
+from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate, birge_factor, flattened
 
 NO_RULE, TOO_FEW = "no rule is known", "fewer than two sizes with intervals"
 _UNTESTED = "not tested: two sizes fit any line"
@@ -87,19 +87,19 @@ def fit_line(factors: Floats, values: Floats, errors: Floats) -> Line | None:
     sizes = len(np.unique(k))
     if sizes < 2:
         return None
-    design = np.column_stack([np.ones_like(k), k - 1.0]) / error[:, None]
-    covariance = np.linalg.inv(design.T @ design)
-    effects = covariance @ design.T @ (y / error)
-    square, left = float(np.sum((y / error - design @ effects) ** 2)), len(k) - 2
-    error_of_value = math.sqrt(covariance[0, 0]) * _wider(square, left)
-    value = Estimate.around(float(effects[0]), NORMAL_QUANTILE * error_of_value)
+    value, se, p = _fitted(np.column_stack([np.ones_like(k), k - 1.0]), y, error)
+    return Line(value, se, sizes, p)
+
+
+def _fitted(design: Floats, values: Floats, errors: Floats) -> tuple[Estimate, float, float]:
+    """The first effect of weighted least squares, its standard error, and p of the residuals."""
+    white, known = design / errors[:, None], values / errors
+    covariance = np.linalg.inv(white.T @ white)
+    effects = covariance @ white.T @ known
+    square, left = float(np.sum((known - white @ effects) ** 2)), len(known) - len(effects)
+    se = math.sqrt(covariance[0, 0]) * birge_factor(square, left)
     p = float(chi2.sf(square, left)) if left else math.nan
-    return Line(value, error_of_value, sizes, p)
-
-
-def _wider(square: float, left: int) -> float:
-    """Factor on standard errors from the squares of residuals, with so many degrees of freedom."""
-    return math.sqrt(max(1.0, square / left)) if left else 1.0
+    return Estimate.around(float(effects[0]), NORMAL_QUANTILE * se), se, p
 
 
 def coarse_grained(runs: Sequence[RunQuantities]) -> list[Extrapolation]:
@@ -207,8 +207,4 @@ def mean_of_runs(runs: Sequence[RunQuantities], name: str) -> Estimate | None:
     known = np.isfinite(values) & (errors > 0)
     if not known.any():
         return None
-    weight = errors[known] ** -2.0
-    mean = float(np.average(values[known], weights=weight))
-    square = float((weight * (values[known] - mean) ** 2).sum())
-    error = math.sqrt(1 / weight.sum()) * _wider(square, int(known.sum()) - 1)
-    return Estimate.around(mean, NORMAL_QUANTILE * error)
+    return _fitted(np.ones((int(known.sum()), 1)), values[known], errors[known])[0]

@@ -1,4 +1,4 @@
-"""The figures of a run, as PNG files, and that of all cases.
+"""The figures of a run, as PNG files.
 
 The panels of a process run's figures are functions of their own, each drawn on given axes.
 """
@@ -23,8 +23,6 @@ from dragchain.figures.panels import (
     legend_below,
     new_figure,
     new_panels,
-    row_mark,
-    row_names,
 )
 from dragchain.figures.style import BLUE, COLOURS, HALF_IN, RED, drawing
 from dragchain.report.findings import DropFindings, FillingFindings, ProcessFindings
@@ -335,25 +333,3 @@ def write_figures(run_dir: Path) -> list[Path]:
             if (figure := _DRAW[name](run, findings)) is not None:
                 written.append(save(figure, run_dir / "figures" / f"{name}.png"))
     return written
-
-
-def drag_of_cases(
-    names: list[str], forces: list[Estimate], references: list[tuple[str, float]]
-) -> Figure:
-    """The mean drag of each case with its interval, beside reference means.
-
-    Parameters
-    ----------
-    names, forces : list
-        Name and mean drag of each case.
-    references : list of (str, float)
-        ``experiment`` or ``simulation``, and mean in N of each figure to compare with.
-    """
-    figure, (axes,) = new_panels(1.2 + 0.32 * len(names))
-    for place, force in enumerate(forces):
-        row_mark(axes, place, force, BLUE)
-    for label, value in references:
-        axes.axvline(value, color=COLOURS[label], linestyle="--", label=f"{label} {value:.2f} N")
-    row_names(axes, names)
-    axes.set(xlabel="mean drag (N); bars: 95 % confidence interval")
-    return legend_below(figure)

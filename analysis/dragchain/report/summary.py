@@ -56,7 +56,7 @@ def _summary_row(study: StudyRuns, headline: str) -> Row:
         "peak_max_n": findings.peaks.largest_n,
         **_wake(findings),
         **_network(findings),
-        **_chains(findings),
+        **dict(findings.chains),
         **_upstream(study),
         **_corrected(values.standings),
     }
@@ -144,16 +144,6 @@ def _network(findings: ProcessFindings) -> Row:
         "behind_mean_n": findings.ahead_behind.behind_n.value,
         **_interval("depth_slope", "N/m", findings.depth.slope_n_per_m),
     }
-
-
-_OF_CHAINS = (
-    *("widest_paths_per_frame", "widest_paths_to_side_fraction", "dominant_bottleneck_max_n"),
-    *("dominant_particles_mean", "dominant_altitude_mean_m", "dominant_azimuth_mean_rad"),
-)
-
-
-def _chains(findings: ProcessFindings) -> Row:
-    return {name: getattr(findings.chains, name) for name in _OF_CHAINS}
 
 
 def _upstream(study: StudyRuns) -> Row:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Literal, NamedTuple
 
 from dragchain.statistics.estimate import CONFIDENCE, Estimate, Verdict
@@ -188,3 +189,15 @@ class ScalingFile(Document):
             pair = entry.removesuffix(".friction")
             return Axis(f"friction coefficient, {pair.replace('-', ' on ')}")
         return _AXES.get(self.field, Axis(self.field))
+
+
+_STORED = Path(__file__).parent / "data"
+"""The scalings that were measured for the documentation."""
+
+_ORDER = ("drag-depth", "drag-diameter", "drag-speed", "drag-friction")
+"""Their studies, in the order of the documentation."""
+
+
+def read_scalings() -> list[ScalingFile]:
+    """The scalings that come with the package."""
+    return [ScalingFile.read(_STORED / f"{study}.json") for study in _ORDER]

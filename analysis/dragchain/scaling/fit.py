@@ -28,12 +28,6 @@ from dragdeck.records.run import RunRecord
 from dragdeck.study.model import Scaling
 from dragdeck.study.paths.circle import CirclePath
 
-_STORED = Path(__file__).parent / "data"
-"""The scalings that were measured for the documentation."""
-
-_ORDER = ("drag-depth", "drag-diameter", "drag-speed", "drag-friction")
-"""The studies of slow drag, in the order of the documentation; others follow."""
-
 SCENE = ("bowl_to_particle", "particle_friction", "lowest_restitution", "particles")
 """Numbers of the scene that a scaling reports."""
 
@@ -279,15 +273,6 @@ def write_scaling(study: str, out_dir: Path, run_dirs: Sequence[Path], command: 
 def table(scaling: ScalingFile) -> pd.DataFrame:
     """The levels of a scaling, one row each."""
     return pd.DataFrame(map(dict, scaling.levels)).rename(columns={"x": scaling.field})
-
-
-def read_scalings() -> list[ScalingFile]:
-    """The scalings that come with the package, those of slow drag first."""
-    scalings = [ScalingFile.read(file) for file in _STORED.glob("*.json")]
-    place = {name: number for number, name in enumerate(_ORDER)}
-    return sorted(
-        scalings, key=lambda scaling: (place.get(scaling.study, len(_ORDER)), scaling.study)
-    )
 
 
 def said(scaling: ScalingFile) -> str:

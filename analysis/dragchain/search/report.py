@@ -14,16 +14,8 @@ from dragchain.figures.panels import band, legend_below, new_panels
 from dragchain.figures.style import BLUE, GREEN, GREY, MARKERS, ORANGE, RED, WIDE_IN
 from dragchain.report.campaign import write_report
 from dragchain.report.page import number, with_interval
-from dragchain.search.rounds import (
-    PointMeasure,
-    SearchedStudy,
-    SearchFindings,
-    label,
-    loss,
-    next_points,
-    read_findings,
-    read_point,
-)
+from dragchain.search.rounds import SearchFindings, loss, next_points, read_findings
+from dragchain.search.studied import PointMeasure, SearchedStudy, label, read_point
 from dragchain.statistics.estimate import Estimate, EstimateColumns, Verdict, flattened, t_interval
 from dragdeck.engine.reports import say
 from dragdeck.errors import InputError

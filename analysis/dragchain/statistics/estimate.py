@@ -146,6 +146,14 @@ def flattened(row: Mapping[str, object]) -> dict[str, object]:
     return flat
 
 
+def birge_factor(chi2: float, degrees: int) -> float:
+    """Factor on standard errors where residuals exceed them: sqrt(chi2 / degrees), 1 at least.
+
+    Birge 1932, Physical Review 40, 207.
+    """
+    return math.sqrt(max(1.0, chi2 / degrees)) if degrees else 1.0
+
+
 def student_quantile(degrees: float, confidence: float = CONFIDENCE) -> float:
     """Half-width of a two-sided interval of Student's t, in standard errors."""
     from scipy.special import stdtrit

@@ -67,10 +67,10 @@ IMPACTS = (
 # --- meanings ------------------------------------------------------------------------------------
 
 
-_UNITS: Mapping[str, str] = {
+UNITS: Mapping[str, str] = {
     "n_m_per_m": "N m/m", "n_s_per_m": "N s/m", "m_per_m": "m/m", "n_per_m": "N/m",
     "j_per_m": "J/m", "per_m2_s": "1/(m2 s)", "per_m": "1/m", "per_s": "1/s",
-    "kg_m3": "kg/m3", "m_s2": "m/s2",
+    "kg_m3": "kg/m3", "rad_s2": "rad/s2", "m_s2": "m/s2",
     "m_s": "m/s", "rad_s": "rad/s", "n_m": "N m", "n_s": "N s", "m2": "m2", "n": "N", "m": "m",
     "s": "s", "j": "J", "pa": "Pa", "rad": "rad", "deg": "degree", "hz": "Hz", "rpm": "1/min",
     "percent": "%",
@@ -120,13 +120,13 @@ def descriptions(column: str) -> dict[str, str]:
 def unit_end(column: str) -> str:
     """The end of a column's name that is its unit, empty if there is none."""
     name = column.removesuffix("_se")
-    return next((end for end in _UNITS if name.endswith(f"_{end}")), "")
+    return next((end for end in UNITS if name.endswith(f"_{end}")), "")
 
 
 def unit_of(field: pa.Field) -> str:
     """The unit of a column: ``1`` for plain numbers, empty for ids, text and flags."""
     if end := unit_end(field.name):
-        return _UNITS[end]
+        return UNITS[end]
     name = field.name.removesuffix("_se")
     number = pa.types.is_integer(field.type) or pa.types.is_floating(field.type)
     return "1" if number and not name.endswith("_id") else ""

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -55,17 +55,7 @@ from dragdeck.study.rotations import wrap_angle
 
 @dataclass(frozen=True)
 class RunTable:
-    """A file that is made of a run.
-
-    Attributes
-    ----------
-    name : str
-        Of the file in ``tables/``.
-    needs : tuple of str
-        The raw outputs that it is made of.
-    write : callable
-        Writes it, given the run and the file.
-    """
+    """A file in ``tables/``: its name, the raw outputs that it needs, and what writes it."""
 
     name: str
     needs: tuple[str, ...]
@@ -100,10 +90,6 @@ def write_tables(run_dir: Path | str) -> list[Path]:
     for table in tables:
         table.write(run, run.file(table.name))
     return [run.file(table.name) for table in tables]
-
-
-def _write_thermo(run: Run, file: Path) -> None:
-    _write_all(file, run.outputs["thermo"].columns, run.prints("thermo"))
 
 
 def _write_all(file: Path, columns: Sequence[str], parts: Iterable[Rows]) -> None:
@@ -315,15 +301,7 @@ def _write_contacts(run: Run, file: Path) -> None:
             table.write(_contact_columns(frame.step, rows, run.case))
 
 
-class _Stepped(Protocol):
-    @property
-    def step(self) -> int: ...
-
-
-F = TypeVar("F", bound=_Stepped)
-
-
-def _frame_at(frames: Iterator[F], step: int, name: str) -> F:
+def _frame_at(frames: Iterator[Any], step: int, name: str) -> Any:
     """The frame of a step above those asked for before, from frames whose steps rise."""
     frame = next((frame for frame in frames if frame.step >= step), None)
     if frame is None or frame.step > step:
@@ -388,7 +366,11 @@ def _write_packing(run: Run, file: Path) -> None:
     describe_bed(of_bodies, run.case, spheres).write(file)
 
 
-_THERMO = RunTable("thermo.parquet", ("thermo",), _write_thermo)
+_THERMO = RunTable(
+    "thermo.parquet",
+    ("thermo",),
+    lambda run, file: _write_all(file, run.outputs["thermo"].columns, run.prints("thermo")),
+)
 _PARTICLES = RunTable("particles.parquet", ("particles",), _write_particles)
 
 _TABLES: Mapping[str, tuple[RunTable, ...]] = {

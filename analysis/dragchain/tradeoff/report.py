@@ -3,6 +3,7 @@
 import math
 import platform
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ import pandas as pd
 from dragchain.quantities.along import LONG_WAVE, SHORT_WAVE
 from dragchain.quantities.registry import MAIN, MEASURED
 from dragchain.report.campaign import write_report
-from dragchain.report.page import MINUS, number
+from dragchain.report.page import MINUS, fixed, number
 from dragchain.statistics.estimate import CONFIDENCE
 from dragchain.tradeoff.compare import Setting, read_plan_runs
 from dragchain.tradeoff.figures import draw_pareto
@@ -48,28 +49,16 @@ def error_percent(value: float, sign: bool = True) -> str:
     """A share in per cent with as many digits as matter."""
     size = abs(100.0 * value)
     digits = 0 if size >= 9.95 else 1 if size >= 0.095 else 2 if size >= 0.0095 else 3
-    text = f"{100.0 * value:{'+' if sign else ''}.{digits}f}"
-    text = text if float(text) else "0"
-    return text.replace("-", MINUS)
+    text = fixed(100.0 * value, digits, sign)
+    return text if text.strip(f"+{MINUS}0.") else "0"
 
 
-def size_percent(value: float) -> str:
-    """As `error_percent`, of a size that has no sign."""
-    return error_percent(value, False)
-
-
-def error_size(error: ErrorEntry) -> str:
-    """An error in per cent; a large one as a multiple."""
-    if error.value >= _FOLD:
-        return f"{number(1.0 + error.value, 2)}-fold"
-    return f"{error_percent(error.value)} %"
-
-
-def error_interval(error: ErrorEntry) -> str:
-    """The interval of an error, in per cent; that of a large one in multiples."""
-    if error.value >= _FOLD:
-        return f"{number(1.0 + error.ci95_low, 2)} to {number(1.0 + error.ci95_high, 2)}"
-    return f"{error_percent(error.ci95_low)} to {error_percent(error.ci95_high)} %"
+def error_size(error: ErrorEntry, *, interval: bool = False) -> str:
+    """An error, or the ends of its interval, in per cent; of a large one as multiples."""
+    values = (error.ci95_low, error.ci95_high) if interval else (error.value,)
+    large = error.value >= _FOLD
+    texts = [number(1.0 + of, 2) if large else error_percent(of) for of in values]
+    return " to ".join(texts) + ("" if large and interval else "-fold" if large else " %")
 
 
 def cheaper(ratio: float) -> str:
@@ -79,8 +68,11 @@ def cheaper(ratio: float) -> str:
 
 
 FILTERS: Mapping[str, Callable[..., str]] = {
-    function.__name__: function
-    for function in (error_percent, size_percent, error_size, error_interval, cheaper)
+    "error_percent": error_percent,
+    "size_percent": partial(error_percent, sign=False),
+    "error_size": error_size,
+    "error_interval": partial(error_size, interval=True),
+    "cheaper": cheaper,
 }
 """Filters of the page."""
 
@@ -137,6 +129,7 @@ def tradeoff_record(
 ) -> TradeoffRecord:
     """The content of ``tradeoff.json``: when, with what and on what was measured, and what."""
     measures = [run.measures for run in tradeoff.runs]
+    at_reference = tradeoff.of(tradeoff.reference)
     return TradeoffRecord(
         measured=max(run.started for run in measures)[:10],
         commands=tuple(commands),
@@ -153,7 +146,7 @@ def tradeoff_record(
         machine=Machine.here(),
         runs=len(measures),
         engine_hours=sum(run.cost.cpu_time_s for run in measures) / 3600.0,
-        scene=_scene_numbers(tradeoff),
+        scene=next(filter(None, (run.measures.numbers for run in at_reference)), {}),
         reference=FidelityParameters(**tradeoff.reference.parameters()),
         quantities={
             name: QuantityEntry(
@@ -183,12 +176,6 @@ def tradeoff_record(
 
 def _joined(names: Iterable[object]) -> str:
     return ", ".join(sorted(set(map(str, names))))
-
-
-def _scene_numbers(tradeoff: Tradeoff) -> Mapping[str, float]:
-    """Dimensionless numbers of the scene, as the runs at the reference have them."""
-    numbers = [run.measures.numbers for run in tradeoff.of(tradeoff.reference)]
-    return next((known for known in numbers if known), {})
 
 
 def _setting_entry(tradeoff: Tradeoff, setting: Setting) -> SettingEntry:

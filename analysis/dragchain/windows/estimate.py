@@ -19,7 +19,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import erf
+from scipy.stats import foldnorm
 
 from dragchain.arrays import Floats
 from dragchain.quantities.document import Extrapolated, LoadMap, Need, Reached
@@ -240,6 +240,5 @@ def corrected_map(
 def _absolute(mean: Floats, std: Floats) -> Floats:
     """Mean absolute values of normal variables, (M,) each (the folded normal distribution)."""
     away = np.abs(mean)
-    scaled = np.divide(away, std, out=np.full_like(std, math.inf), where=std > 0.0)
-    spread = std * math.sqrt(2.0 / math.pi) * np.exp(-(scaled**2) / 2.0)
-    return np.asarray(spread + away * erf(scaled / math.sqrt(2.0)))
+    scaled = np.divide(away, std, out=np.zeros_like(std), where=std > 0.0)
+    return np.where(std > 0.0, std * foldnorm.mean(scaled), away)

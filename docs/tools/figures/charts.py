@@ -8,7 +8,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 from records import chosen, record_table
 
-from dragchain.figures.panels import log_ticks, row_mark, row_names
+from dragchain.figures.panels import interval_rows, key, log_ticks, row_mark, row_names
 from dragchain.figures.style import (
     ABOVE_SCALE,
     BLUE,
@@ -23,10 +23,11 @@ from dragchain.figures.style import (
     force_map,
     top_of_scale,
 )
-from dragchain.scaling.fit import draw_scalings, read_scalings
+from dragchain.scaling.document import read_scalings
+from dragchain.scaling.fit import draw_scalings
 from dragchain.statistics.estimate import Estimate
 from evidence.stability.report import draw_regime
-from evidence.validation.report import draw_drags, effect_bar
+from evidence.validation.report import MEAN_DRAG, effect_bar
 
 
 def _panels(width: float, height: float, count: int = 1, **options: bool) -> tuple[Figure, Any]:
@@ -147,16 +148,11 @@ _ENDS = ("_ci95_low", "_ci95_high")
 
 def _draw_simplifications() -> Figure:
     """Confidence intervals of the change of the mean drag in simpler scenes."""
-    rows = record_table("scenes/simplifications")
-    places = range(len(rows), 0, -1)
-    figure, axes = _panels(7.6, 2.8)
-    low, high = (100 * rows[f"drag_mean_{end}"] for end in _CI)
-    axes.hlines(places, low, high, color=COLOURS["drag"], lw=4)
-    axes.axvline(0, color="black", lw=0.7)
-    axes.set_yticks(places, rows["change"])
-    axes.set_xlabel("change of the mean drag (%), 95 % CI")
-    axes.grid(axis="y", visible=False)
-    return figure
+    rows = []
+    for row in record_table("scenes/simplifications").to_dict("records"):
+        change = Estimate(*(100 * row[f"drag_mean_{end}"] for end in ("value", *_CI)))
+        rows.append((row["change"], change, COLOURS["drag"]))
+    return interval_rows(rows, {}, "change of the mean drag (%), 95 % CI", zero=True)
 
 
 def _draw_spin() -> Figure:
@@ -247,7 +243,9 @@ def _draw_validation() -> Figure:
         bars.append((f"packing {row.seed}", packing, BLUE))
     effects = chosen("validation/effects", "quantity == 'drag_mean'").fillna({"field": ""})
     bars += [effect_bar(drag.value, effect) for effect in effects.itertuples()]
-    return draw_drags(bars, record_table("validation/comparison").set_index("label")["mean_n"])
+    published = record_table("validation/comparison").itertuples()
+    lines = {f"{row.label} (published)": row.mean_n for row in published}
+    return interval_rows(bars, lines, MEAN_DRAG)
 
 
 def _draw_published() -> Figure:
@@ -291,24 +289,17 @@ def _draw_verification(smallest: float = 1e-12) -> Figure:
 
 def _draw_windows() -> Figure:
     """Soft run and windows in the scene of the paper, relative to a run with the physical E."""
-    rows = record_table("windows/paper").dropna(subset=["stiff"])
-    places = np.arange(len(rows), 0, -1)
+    rows = record_table("windows/paper").dropna(subset=["stiff"]).reset_index()
     figure, axes = _panels(7.6, 3.0)
     widths = 100 * rows["stiff_half_width"]
-    axes.barh(places, 2 * widths, left=-widths, color=LIGHT, label="reference, 95 % CI")
-    ratios = {
-        column: 100 * (rows[column] / rows["stiff"] - 1) for column in ("soft", "value", *_CI)
-    }
-    ends = np.sort([ratios[end] for end in _CI], axis=0)
-    sides = [ratios["value"] - ends[0], ends[1] - ratios["value"]]
-    axes.plot(ratios["soft"], places, "s", color=ORANGE, label="soft run")
-    axes.errorbar(
-        ratios["value"], places, xerr=sides,
-        fmt="o", color=BLUE, capsize=3, label="windows, 95 % CI",
-    )  # fmt: skip
+    axes.barh(rows.index, 2 * widths, left=-widths, color=LIGHT, label="reference, 95 % CI")
+    ratios = rows[["soft", "value", *_CI]].div(rows["stiff"], axis=0).sub(1).mul(100)
+    axes.plot(ratios["soft"], rows.index, "s", color=ORANGE, label="soft run")
+    for place, (_, *windows) in enumerate(ratios.to_numpy()):
+        row_mark(axes, place, Estimate(*windows), BLUE)
+    key(axes, "windows, 95 % CI", color=BLUE)
     axes.axvline(0, color="black", lw=0.7)
-    labels = record_table("quantities").set_index("name")["label"]
-    axes.set_yticks(places, labels[rows["quantity"]])
+    row_names(axes, record_table("quantities").set_index("name")["label"][rows["quantity"]])
     axes.set_xlabel("difference from the reference (%)")
     figure.legend(loc="outside upper center", ncols=3)
     axes.grid(axis="y", visible=False)

@@ -21,7 +21,7 @@ from report_files import (
 )
 
 from dragchain.cli import main
-from dragchain.compare import report
+from dragchain.compare.factors import effects_of
 from dragchain.compare.report import read_compared, write_comparison
 from dragchain.errors import TableError
 from dragchain.quantities.document import EXTRAPOLATED, Extrapolated, LoadMap
@@ -130,8 +130,9 @@ def planted(random: np.random.Generator, levels: list[Any], seeds: int, curved: 
     factors = dict(zip(("edge", "fast"), map(list, zip(*cases, strict=True)), strict=True))
     some: Any = [SimpleNamespace(by_seed=one) for one in cases.values()]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(report, "_standings", lambda one, quantity: one.by_seed)
-        return report.effects_of(some, factors, REPORTED[0])
+        name = "dragchain.compare.factors.standings_of"
+        patch.setattr(name, lambda case, quantity: case.by_seed)
+        return effects_of(some, factors, REPORTED[0])
 
 
 @pytest.mark.parametrize(

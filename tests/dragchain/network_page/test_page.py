@@ -21,16 +21,10 @@ from report_files import change_scripts
 from scipy.spatial.transform import Rotation
 
 from dragchain.cli import main
-from dragchain.network_page import scene as scene_module
+from dragchain.network_page import scene, shown
+from dragchain.network_page.packed import ROUNDING, PackedColumns
 from dragchain.network_page.page import write_page
-from dragchain.network_page.scene import (
-    BODIES,
-    DOMINANT,
-    PATH,
-    QUASI_LINEAR,
-    ROUNDING,
-    PackedColumns,
-)
+from dragchain.network_page.shown import BODIES, DOMINANT, PATH, QUASI_LINEAR
 
 _BYTES = {"u8": 1, "u16": 2, "u32": 4, "f24": 3}
 
@@ -180,12 +174,12 @@ def test_the_curve_is_the_drag_over_its_phase(run: Path, page: Written) -> None:
 def test_frames_are_equally_spaced_and_hold_the_peaks(
     run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(scene_module, "FRAMES", 4)
+    monkeypatch.setattr(shown, "FRAMES", 4)
     even = {200, 300, 400, 500}
     page = shown_again(run, tmp_path)
-    shown = [page.head["steps"][peak["frame"]] for peak in page.head["peaks"]]
-    assert shown == [240, 400, 360]
-    assert set(page.head["steps"]) == even | set(shown)
+    peak_steps = [page.head["steps"][peak["frame"]] for peak in page.head["peaks"]]
+    assert peak_steps == [240, 400, 360]
+    assert set(page.head["steps"]) == even | set(peak_steps)
 
 
 def shown_again(run: Path, folder: Path) -> Written:
@@ -200,7 +194,8 @@ def shown_again(run: Path, folder: Path) -> Written:
 def test_a_wide_bowl_shows_the_surroundings_and_says_so(
     run: Path, page: Written, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(scene_module, "MOST_PARTICLES", 80)
+    for module in (scene, shown):
+        monkeypatch.setattr(module, "MOST_PARTICLES", 80)
     part = shown_again(run, tmp_path)
     assert "216 particles" in part.text and "only the 80 that are nearest" in part.text
     assert "that are nearest" not in page.text

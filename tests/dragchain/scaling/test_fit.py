@@ -14,7 +14,7 @@ from tiny_run_files import DENSITY_KG_M3, GRAVITY_M_S2, RADIUS_M, WORKPIECE_RADI
 
 from dragchain.cli import main
 from dragchain.errors import SeriesError, TableError
-from dragchain.scaling.document import ScaledRun, ScalingFile
+from dragchain.scaling.document import ScaledRun, ScalingFile, read_scalings
 from dragchain.scaling.fit import (
     draw_scalings,
     find,
@@ -22,7 +22,6 @@ from dragchain.scaling.fit import (
     floor_particles,
     gap_particles,
     read_scaled_runs,
-    read_scalings,
     table,
 )
 from dragchain.statistics.correlated import estimate_mean

@@ -14,7 +14,8 @@ from pages import stands_alone
 from dragchain.search import report, rounds
 from dragchain.search.proposals import Trials, best_place, propose, spread_places
 from dragchain.search.report import advance, at_bounds
-from dragchain.search.rounds import SearchedStudy, read_findings
+from dragchain.search.rounds import read_findings
+from dragchain.search.studied import SearchedStudy
 from dragdeck.cli import main
 from dragdeck.errors import InputError
 from dragdeck.project import Project

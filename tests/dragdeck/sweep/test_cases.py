@@ -137,6 +137,8 @@ REFUSED = [
     *(({"assumptions": [{"field": "media", "why": "any"}, {"field": field, "why": "any"}]},
        "assumptions.1.field", f"no such field {field!r}")
       for field in ("media.cuont", "path", "motion.path.lenght_m", "media.")),
+    ({"assumptions": [{"field": "media.material", "why": "any", "std": 0.1}]},
+     "assumptions.0.std", "is no number"),
 ]  # fmt: skip
 
 

@@ -15,7 +15,7 @@ from dragdeck.project import Project
 from dragdeck.scenes.bed_space import expected_bed
 from dragdeck.scenes.motion import course
 from dragdeck.scenes.process import process_scene
-from evidence.second_engine.compare import compared, rows_of_case
+from evidence.second_engine.compare import engine_differences, rows_of_case
 from evidence.second_engine.script import script
 
 
@@ -79,7 +79,7 @@ def test_engines_are_compared_packing_by_packing() -> None:
         "modulus_scale": 1e-3, "seed": [1, 1, 2, 2], "engine": 2 * ["LIGGGHTS", "LAMMPS"],
         "quantity": "drag_n", "value": [-2.0, -1.0, -4.0, -1.0], "half": 0.3,
     })  # fmt: skip
-    (row,) = compared(runs).to_dict("records")
+    (row,) = engine_differences(runs).to_dict("records")
     assert row["difference"] == pytest.approx(2.0)
     assert row["difference_high"] - 2.0 == pytest.approx(0.3)
 

@@ -20,10 +20,8 @@ from evidence.stability.judge import (
     UNSTABLE,
     Seen,
     classify,
-    conditions,
-    largest_safe,
-    regimes,
 )
+from evidence.stability.safe_steps import conditions, largest_safe, regimes
 
 
 def seen(**changes: Any) -> Seen:

@@ -11,7 +11,7 @@ from dragdeck.physics.contact_network import largest_eigenvalue, touching
 from dragdeck.physics.walls import round_container
 from dragdeck.records.bed import MediaOfRun
 from dragdeck.records.case import CaseOfRun
-from evidence.stability.measures import (
+from evidence.stability.network import (
     BOWL,
     PARTICLE,
     WORKPIECE,

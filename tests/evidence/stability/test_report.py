@@ -13,14 +13,8 @@ from paths import DATA, ROOT
 
 from dragdeck.records.stability import StabilityFile
 from evidence.__main__ import main as evidence
-from evidence.stability.judge import (
-    ENERGY,
-    REFUSED,
-    STABLE,
-    TOLERANCE,
-    UNSTABLE,
-    restitution_errors,
-)
+from evidence.stability.judge import ENERGY, REFUSED, STABLE, TOLERANCE, UNSTABLE
+from evidence.stability.safe_steps import restitution_errors
 
 pytestmark = [pytest.mark.engine, pytest.mark.slow]
 

@@ -10,19 +10,9 @@ from recordings import recording
 
 from dragdeck.errors import RejectedRunError
 from evidence.verification import checks
-from evidence.verification.checks import (
-    COULOMB,
-    EXACT,
-    QUANTITIES,
-    QuantityCheck,
-    abscissa,
-    check_rows,
-    fitted_order,
-    flight_energy,
-    incline_reference,
-    momentum_changes,
-    published_curve,
-)
+from evidence.verification.checks import QUANTITIES, abscissa, fitted_order, published_curve
+from evidence.verification.motion_checks import flight_energy, incline_reference, momentum_changes
+from evidence.verification.quantity_check import COULOMB, EXACT, QuantityCheck, check_rows
 from evidence.verification.report import verdict, worst_rows
 
 

@@ -15,7 +15,8 @@ from dragdeck.decks.templates import environment
 from dragdeck.project import Project
 from dragdeck.study.model import Study
 from evidence.verification.experiment import Experiment, collide_scene
-from evidence.verification.suite import Impacts, hertz_time, suite_of
+from evidence.verification.impacts import Impacts, hertz_time
+from evidence.verification.suite import suite_of
 
 
 @pytest.fixture

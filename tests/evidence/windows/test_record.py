@@ -18,7 +18,8 @@ from dragchain.quantities.document import RunQuantities
 from dragdeck.records.stability import StableStepRecord
 from dragdeck.records.windows import WindowsRecord
 from evidence.__main__ import COMMANDS, main
-from evidence.windows.record import SceneRun, Windowed, read_scenes, read_windows, windows_record
+from evidence.windows.record import Windowed, read_windows, windows_record
+from evidence.windows.scene_runs import SceneRun, read_scenes
 
 DATA = ROOT / "workflow/dragdeck/data"
 

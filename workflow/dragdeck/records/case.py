@@ -92,11 +92,14 @@ class AssumptionOfRun(Part):
         The assumed value.
     why : str
         Reason for the value.
+    std : float or None
+        Its standard uncertainty.
     """
 
     field: str
     value: JsonValue
     why: str
+    std: PositiveFloat | None = omitted(None)
 
 
 class StatisticsOfRun(Part):

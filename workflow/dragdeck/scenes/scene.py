@@ -133,7 +133,7 @@ class SceneType:
             said |= {
                 **values,
                 "asked": asked,
-                "assumptions": [dict(assumption) for assumption in assumed(study)],
+                "assumptions": [assumption.model_dump() for assumption in assumed(study)],
             }
         else:
             said |= without_fields(study.plain(), *_NOT_SAID, *_OF_PROCESS)
@@ -317,7 +317,7 @@ def assumed(study: Study) -> list[AssumptionOfRun]:
     """What a study assumes, with the values."""
     values = flat(study.plain())
     assumptions = [
-        AssumptionOfRun(field=entry.field, value=values.get(entry.field), why=entry.why)
+        AssumptionOfRun(value=values.get(entry.field), **dict(entry))
         for entry in study.assumptions
         if entry.field in values or not entry.field.startswith(_OF_A_KIND)
     ]

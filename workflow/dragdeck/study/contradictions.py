@@ -237,6 +237,12 @@ def _assumptions(study: models.Study) -> _Found:
         if entry.field not in known:
             limit = f"{near(entry.field, known)}the dotted name of a field, such as media.count"
             yield f"assumptions.{number}.field", f"no such field {entry.field!r}", limit
+        value = flat(study.model_dump(mode="json")).get(entry.field)
+        if entry.std is not None and (
+            isinstance(value, bool) or not isinstance(value, int | float)
+        ):
+            limit = "a field with a number"
+            yield f"assumptions.{number}.std", f"{entry.field} is no number", limit
 
 
 def _removal(study: models.Study) -> _Found:

@@ -136,6 +136,9 @@ class Assumption(Model):
     """dotted name of the field whose value is assumed"""
     why: str
     """what the source reports, and the reason for the value"""
+    std: Positive | None = None
+    """standard uncertainty of the value; of depth, speed, radius of the workpiece, or friction on
+    it, the report says how uncertain it makes the mean drag"""
 
 
 class Accepted(Model):
