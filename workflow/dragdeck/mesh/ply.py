@@ -279,9 +279,9 @@ class _Lines:
 
     def __init__(self, body: bytes, head: re.Match[bytes]) -> None:
         rows = mesh_text(body)
-        refuse_two_marks(rows, "^.*")
-        self._pieces = pieces(rows, _LINE, "a line")
         self._before = text_of(head.string[: head.end()]).count("\n")
+        refuse_two_marks(rows, r"^(?:.*\s)?", self._before)
+        self._pieces = pieces(rows, _LINE, "a line")
         self._words, self._starts, self._lines = np.empty(0), np.zeros(1, int), np.empty(0, int)
         self._text, self._first = "", 0
         self._damage: InputError | None = None
