@@ -57,7 +57,8 @@ def read(
 ) -> Trimesh:
     """Read a surface from STL (ASCII or binary), OBJ, PLY, legacy VTK or VTU, or mesh a STEP part.
 
-    Modules here read all but VTU, which meshio reads. gmsh meshes STEP; MMG meshes a closed surface anew for which a facet size is given.
+    Modules here read all but VTU, which meshio reads. gmsh meshes STEP; MMG meshes a closed surface
+    anew for which a facet size is given.
 
     Parameters
     ----------
@@ -104,7 +105,7 @@ def read(
                 remedy="reduce them in the program that made it, or in MeshLab: Simplification",
             )
         points = points * UNITS[unit]
-        endless = ~are_lengths(points).all(axis=1)
+        endless = np.asarray(~are_lengths(points).all(axis=1))
         if endless.any() and (bad := joined[endless[joined]]).size:
             value = f"node {bad[0] + 1} of {len(points)}: {' '.join(map(str, points[bad[0]]))}"
             limit = "finite numbers, at most 1e100 m"
