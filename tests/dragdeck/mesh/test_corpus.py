@@ -2,7 +2,9 @@
 
 import gzip
 import locale
+import math
 import struct
+import tracemalloc
 from collections.abc import Iterator, Sequence
 from itertools import product
 from pathlib import Path
@@ -354,3 +356,28 @@ def test_all_defects_of_a_body_are_told_at_once(tmp_path: Path) -> None:
         check(read(tmp_path / "part.obj", "mm"))
     for words in ("has no area", "is duplicated", "is not closed", "several bodies"):
         assert words in str(refused.value)
+
+
+LARGE = trimesh.creation.icosphere(6, 5.0)
+SOUP = LARGE.export(file_type="stl")
+BAD = {
+    "nan.stl": SOUP[:-38] + struct.pack("<f", math.nan) + SOUP[-34:],
+    "cut.stl": SOUP[:-1],
+    "word.stl": LARGE.export(file_type="stl_ascii").replace("vertex", "vertex x", 1).encode(),
+    "node.obj": f"{LARGE.export(file_type='obj')}\nf 1 2 999999\n".encode(),
+    "cut.ply": LARGE.export(file_type="ply")[:-1],
+    "polygons.vtk": vtk(dataset="POLYDATA").encode() + b"1 " * 1_000_000,
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_a_bad_file_takes_little_memory(name: str, tmp_path: Path) -> None:
+    """At most ten times its size: 500 MB for the largest that are usual, of 50 MB."""
+    (tmp_path / name).write_bytes(BAD[name])
+    tracemalloc.start()
+    try:
+        with pytest.raises(InputError):
+            read(tmp_path / name, "mm")
+        assert tracemalloc.get_traced_memory()[1] < 10 * len(BAD[name])
+    finally:
+        tracemalloc.stop()
