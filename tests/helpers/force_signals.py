@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from dragdeck.study.force_record import low_passed
+from dragdeck.study.process_signal import low_passed
 
 BANDWIDTH_HZ = 20.0
 MEAN_N, SPREAD = 2.6, 0.23

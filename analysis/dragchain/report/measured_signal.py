@@ -29,8 +29,8 @@ from dragchain.statistics.correlated import MIN_SAMPLES, estimate_mean, estimate
 from dragchain.statistics.estimate import Estimate, flattened, t_interval
 from dragdeck.errors import DragdeckError
 from dragdeck.study.driven import directions
-from dragdeck.study.force_record import RATES_PER_BANDWIDTH as PER_HZ
-from dragdeck.study.force_record import MeasuredSignal, low_passed, measured_signal
+from dragdeck.study.process_signal import RATES_PER_BANDWIDTH as PER_HZ
+from dragdeck.study.process_signal import MeasuredSignal, low_passed, measured_signal
 from dragdeck.study.reference import Signal
 
 # --- statistics ----------------------------------------------------------------------------------

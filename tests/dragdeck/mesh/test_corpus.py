@@ -2,7 +2,9 @@
 
 import gzip
 import locale
+import math
 import struct
+import tracemalloc
 from collections.abc import Iterator, Sequence
 from itertools import product
 from pathlib import Path
@@ -13,10 +15,12 @@ import pytest
 import pyvista
 import trimesh
 from trimesh import Trimesh
+from vtkmodules.vtkIOLegacy import vtkPolyDataWriter, vtkUnstructuredGridWriter
 
 from dragdeck.errors import InputError
 from dragdeck.mesh.checks import check, findings
 from dragdeck.mesh.files import read
+from dragdeck.mesh.vtk_legacy import vtk_legacy
 
 POINTS = [(x, y, z) for z in (0, 40) for y in (-6, 6) for x in (-6, 6)]
 QUADS = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
@@ -148,9 +152,45 @@ READ: dict[str, str | bytes] = {
     "binary.ply": binary_ply(),
     "binary, counts of 4 bytes.ply": binary_ply("int", "<4i"),
     **{f"of several sizes, {order}.ply": mixed_ply(order) for order in ("ascii", "little", "big")},
+    "nodes without facets that are no numbers.obj": NODES + "v nan nan nan\n" + ROWS,
+    "a backslash that leads nowhere.obj": f"# C:\\parts\\\n# box\n{NODES}{ROWS}",
+    "decimal commas with three digits.obj": NODES.replace("40", "40,125").replace("6 0", "6 0,125")
+    + ROWS,
     "triangles.vtk": vtk(),
     "quadrilaterals.vtk": vtk(QUADS, 9),
+    "polygon data.vtk": vtk(dataset="POLYDATA"),
+    "polygons of several sizes.vtk": vtk([*QUADS[:3], *FACETS[6:]], dataset="POLYDATA"),
+    "small letters.vtk": vtk(dataset="polydata").replace("ASCII", "ascii"),
+    "lines and values.vtk": vtk(dataset="POLYDATA").replace(
+        "POLYGONS", "METADATA\nINFORMATION 0\n\nLINES 1 3\n2 0 1\nPOLYGONS")
+    + "POINT_DATA 8\nSCALARS a float\nLOOKUP_TABLE default\n1 2 3 4 5 6 7 8\n",
 }  # fmt: skip
+
+
+@pytest.mark.usefixtures("same_locale")
+@pytest.mark.parametrize("binary", [True, False])
+@pytest.mark.parametrize("version", [42, 51])
+@pytest.mark.parametrize("grid", [True, False])
+def test_a_vtk_file_that_was_cut_is_refused(
+    binary: bool, version: int, grid: bool, tmp_path: Path
+) -> None:
+    """Of each version, dataset and form; as it was, it is what was written."""
+    cone = trimesh.creation.cone(radius=5, height=20, sections=8)
+    surface = pyvista.PolyData.from_regular_faces(cone.vertices, cone.faces)
+    writer = vtkUnstructuredGridWriter() if grid else vtkPolyDataWriter()
+    writer.SetInputData(surface.cast_to_unstructured_grid() if grid else surface)
+    writer.SetFileName(str(tmp_path / "cone.vtk"))
+    writer.SetFileVersion(version)
+    writer.SetFileType(2 if binary else 1)
+    writer.Write()
+    content = (tmp_path / "cone.vtk").read_bytes()
+    assert measured(read(tmp_path / "cone.vtk", "mm")) == pytest.approx(
+        (len(cone.faces), cone.area, cone.volume), rel=1e-6
+    )
+    end = max(content.rindex(name) for name in (b"POLYGONS", b"CELL_TYPES") if name in content)
+    for length in range(0, end, 7):
+        with pytest.raises(InputError):
+            vtk_legacy(content[:length])
 
 
 def measured(mesh: Trimesh) -> tuple[int, float, float]:
@@ -192,7 +232,7 @@ def test_what_other_libraries_write_is_what_they_read(
         meshio.Mesh(cone.vertices, [("triangle", cone.faces)]).write(file)
     elif writer == "pyvista":
         surface = pyvista.PolyData.from_regular_faces(cone.vertices, cone.faces)
-        (surface.cast_to_unstructured_grid() if suffix in (".vtk", ".vtu") else surface).save(file)
+        (surface.cast_to_unstructured_grid() if suffix == ".vtu" else surface).save(file)
     else:
         cone.export(file)
     other = pyvista.read(file).extract_surface(algorithm=None).triangulate()
@@ -274,9 +314,23 @@ REFUSED: dict[str, tuple[str | bytes, str, int | None]] = {
     "cut among sizes.ply": (mixed_ply("big")[:-1], "byte 510 of 541", None),
     "a huge list.ply": (binary_ply("int", "<4i", 2**31 - 1), "not a row", None),
     "a negative list.ply": (binary_ply("int", "<4i", -3), "not a row", None),
-    "polygon data.vtk": (vtk(dataset="POLYDATA"), "POLYDATA", None),
+    "thousands.obj": (NODES.replace("40", "1,040") + ROWS, "a mark of thousands", 5),
+    "thousands.stl": (stl().replace("40", "1,040"), "a mark of thousands", 18),
+    "thousands.ply": (ply().replace("40", "1,040"), "a mark of thousands", 14),
+    "a name that goes on.obj": (f"g C:\\parts\\\n{NODES}{ROWS}", "may go on here", 2),
+    "a comment that goes on.obj": (f"{NODES}# a \\\n{ROWS}", "may go on here", 10),
+    "no numbers.obj": (NODES.replace("-6 -6 0", "-6 nan 0") + ROWS, "node 1 of 8", None),
+    "a grid.vtk": (vtk(dataset="STRUCTURED_GRID"), "STRUCTURED_GRID", None),
+    "strips.vtk": (vtk(dataset="POLYDATA").replace("POLYGONS", "TRIANGLE_STRIPS"), "strips", None),
+    "points twice.vtk": (vtk() + "POINTS 1 float\n0 0 0\n", "stands there twice", None),
+    "more numbers.vtk": (vtk().replace("3 0 2 3", "3 0 2 3 7", 1), "not as many CELLS", None),
+    "a word.vtk": (vtk().replace("-6", "six", 1), "not numbers of POINTS", None),
+    "a decimal comma.vtk": (vtk().replace("40", "40,5"), "not numbers of POINTS", None),
+    "no node.vtk": (vtk([*FACETS[:-1], (0, 1, 8)]), "not there", None),
+    "wrong lengths.vtk": (vtk().replace("3 0 2 3", "2 0 2 3"), "are not 12 cells of 48", None),
+    "polygon data.vtp": ("<VTKFile/>", "unknown mesh format", None),
     "tetrahedra.vtk": (vtk([(0, 1, 2, 4)], 10), "no polygons", None),
-    "cut.vtk": (vtk()[:200].replace("POINTS 8", "POINTS 800"), "cut short", None),
+    "cut.vtk": (vtk()[:200].replace("POINTS 8", "POINTS 800"), "not as many POINTS", None),
     "cut.vtu": ("<?xml version='1.0'?><VTKFile type='UnstructuredGrid'>", "cut short", None),
 }  # fmt: skip
 
@@ -302,3 +356,28 @@ def test_all_defects_of_a_body_are_told_at_once(tmp_path: Path) -> None:
         check(read(tmp_path / "part.obj", "mm"))
     for words in ("has no area", "is duplicated", "is not closed", "several bodies"):
         assert words in str(refused.value)
+
+
+LARGE = trimesh.creation.icosphere(6, 5.0)
+SOUP = LARGE.export(file_type="stl")
+BAD = {
+    "nan.stl": SOUP[:-38] + struct.pack("<f", math.nan) + SOUP[-34:],
+    "cut.stl": SOUP[:-1],
+    "word.stl": LARGE.export(file_type="stl_ascii").replace("vertex", "vertex x", 1).encode(),
+    "node.obj": f"{LARGE.export(file_type='obj')}\nf 1 2 999999\n".encode(),
+    "cut.ply": LARGE.export(file_type="ply")[:-1],
+    "polygons.vtk": vtk(dataset="POLYDATA").encode() + b"1 " * 1_000_000,
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_a_bad_file_takes_little_memory(name: str, tmp_path: Path) -> None:
+    """At most ten times its size: 500 MB for the largest that are usual, of 50 MB."""
+    (tmp_path / name).write_bytes(BAD[name])
+    tracemalloc.start()
+    try:
+        with pytest.raises(InputError):
+            read(tmp_path / name, "mm")
+        assert tracemalloc.get_traced_memory()[1] < 10 * len(BAD[name])
+    finally:
+        tracemalloc.stop()

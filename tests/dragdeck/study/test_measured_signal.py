@@ -10,11 +10,11 @@ import pytest
 from numpy.typing import NDArray
 
 from dragdeck.errors import InputError, RecordError
-from dragdeck.study import force_record
 from dragdeck.study.check import validate
 from dragdeck.study.driven import directions
-from dragdeck.study.force_record import in_words, low_passed, measured_signal
+from dragdeck.study.force_record import in_words
 from dragdeck.study.motion import Motion
+from dragdeck.study.process_signal import MeasuredSignal, low_passed, measured_signal
 from dragdeck.study.reference import Signal
 from dragdeck.study.yaml import read_study
 
@@ -50,7 +50,7 @@ MOTION = {"path": CIRCLE, "speed_m_s": 0.01, "immersion_depth_m": 0.05, "transie
 
 def read(
     folder: Path, content: str, motion: dict[str, Any] = MOTION, **fields: Any
-) -> force_record.MeasuredSignal:
+) -> MeasuredSignal:
     file = folder / "force.csv"
     file.write_text(content)
     heading = partial(directions, Motion.model_validate(motion))

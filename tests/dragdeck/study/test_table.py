@@ -215,6 +215,13 @@ REFUSED: dict[str, tuple[str | bytes, dict[str, Any], int | None, str]] = {
         None, "200 Hz, the mean rate",
     ),
     "no header": ("0,1\n0.005,2\n", {}, 1, "no column(s) with a recognised name"),
+    "several records": (
+        "LabVIEW Measurement\n***End_of_Header***\nX_Value\tfx_n\tComment\n" + ROWS
+        + "\nChannels\t1\t\n***End_of_Header***\t\t\nX_Value\tfx_n\tComment\n" + ROWS,
+        {}, 9, "a second header"),
+    "names again": ("Time [s];fx_n\n0;1\n1;2\nTime [s];fx_n\n2;3\n", {}, 4, "a second header"),
+    "a time of the day": (HEAD + "10:00:00.005,1\n", {}, 2, "export seconds"),
+    "a date": (HEAD + "2026-11-28 10:00:00,1\n", {}, 2, "export seconds"),
     "the column twice": ("time_s,fx_n,fx_n\n0,1,2\n", {}, 1, "2 column(s)"),
     "a header of LabVIEW": ("LabVIEW Measurement\t\nSeparator\tTab\n", {}, 1, "no column(s)"),
     "a huge cell": (HEAD + '0,"' + "1" * 200_000, {}, 2, "not a CSV file"),

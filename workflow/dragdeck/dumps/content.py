@@ -162,7 +162,9 @@ class Cursor:
             offset=self.offset,
             expected=expected,
             kept=self._kept,
-            remedy="resume the run from its last checkpoint, or repeat it",
+            remedy="use the frames before it, or write the file again"
+            if self.layout.foreign
+            else "resume the run from its last checkpoint, or repeat it",
         )
 
     @property

@@ -20,7 +20,6 @@ from dragdeck.mesh.surface import (
     REMESHED,
     Floats,
     Integers,
-    are_lengths,
     facing_out,
     points_below,
 )
@@ -131,9 +130,9 @@ def findings(
     surroundings : Surroundings, optional
         To see whether the size is plausible.
     """
-    broken = _empty(mesh) or _no_lengths(mesh)
-    if broken:
-        return broken
+    if mesh.is_empty:
+        limit, remedy = "at least one facet", "export the surface as triangles; or it was cut short"
+        return [MeshDefect("the mesh is empty", "0 facets", limit, remedy)]
     problems = _implausible_size(mesh, surroundings) if surroundings else []
     problems += _degenerate(mesh) + _duplicates(mesh)
     sound = mesh.nondegenerate_faces(height=NODE_PRECISION_M) & mesh.unique_faces()
@@ -156,19 +155,6 @@ def _facets(
     more = ", ..." if len(numbers) > 5 else ""
     value = f"{measured}{len(numbers)} of {len(bad)} facets (counted from 0: {shown}{more})"
     return [MeshDefect(problem, value, limit, remedy)]
-
-
-def _empty(mesh: Trimesh) -> list[MeshDefect]:
-    if len(mesh.faces):
-        return []
-    remedy = "export the surface as triangles; the file may have been cut short"
-    return [MeshDefect("the mesh is empty", "0 facets", "at least one facet", remedy)]
-
-
-def _no_lengths(mesh: Trimesh) -> list[MeshDefect]:
-    bad = np.asarray(~are_lengths(mesh.triangles).all(axis=(1, 2)))
-    problem, limit = "a coordinate is not a length", "finite numbers, at most 1e100 m"
-    return _facets(bad, problem, limit, remedy="export the mesh again")
 
 
 def _implausible_size(mesh: Trimesh, scene: Surroundings) -> list[MeshDefect]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,7 +18,7 @@ from dragdeck.mesh.deviation import deviation
 from dragdeck.mesh.mesher import answer_of
 from dragdeck.mesh.obj import obj
 from dragdeck.mesh.ply import ply
-from dragdeck.mesh.polygons import Polygons
+from dragdeck.mesh.polygons import Polygons, no_polygons
 from dragdeck.mesh.step import step_text
 from dragdeck.mesh.stl import stl
 from dragdeck.mesh.surface import (
@@ -28,17 +27,22 @@ from dragdeck.mesh.surface import (
     REMESHED,
     Floats,
     Integers,
+    are_lengths,
     facing_out,
     obtuse_third,
     surface,
     weld,
 )
+from dragdeck.mesh.vtk_legacy import vtk_legacy
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
 
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
 """Length units that a mesh file may be declared in, in metres."""
+
+_MOST_FACETS = 500_000
+"""Of a surface file: checks of more take too long, and so does meshing them anew."""
 
 STEP = (".step", ".stp")
 """Suffixes of CAD parts, which are meshed here."""
@@ -53,9 +57,8 @@ def read(
 ) -> Trimesh:
     """Read a surface from STL (ASCII or binary), OBJ, PLY, legacy VTK or VTU, or mesh a STEP part.
 
-    Modules here read STL, OBJ and PLY, meshio the rest. VTK polygon data is refused: meshio does
-    not know it, and VTK's own reader fills a file that was cut short with whatever the memory
-    holds. gmsh meshes STEP; MMG meshes a closed surface anew for which a facet size is given.
+    Modules here read all but VTU, which meshio reads. gmsh meshes STEP; MMG meshes a closed surface
+    anew for which a facet size is given.
 
     Parameters
     ----------
@@ -94,7 +97,20 @@ def read(
         points, cells = _polygons(path)
         triangles = [_triangles(nodes, points) for nodes in cells]
         joined = np.concatenate([np.empty((0, 3), dtype=np.int64), *triangles])
-        body = surface(points * UNITS[unit], joined)
+        if len(joined) > _MOST_FACETS:
+            raise InputError(
+                "the mesh has too many facets",
+                value=f"{len(joined)}",
+                limit=f"at most {_MOST_FACETS}",
+                remedy="reduce them in the program that made it, or in MeshLab: Simplification",
+            )
+        points = points * UNITS[unit]
+        endless = np.asarray(~are_lengths(points).all(axis=1))
+        if endless.any() and (bad := joined[endless[joined]]).size:
+            value = f"node {bad[0] + 1} of {len(points)}: {' '.join(map(str, points[bad[0]]))}"
+            limit = "finite numbers, at most 1e100 m"
+            raise InputError("a coordinate is not a length", value=value, limit=limit)
+        body = surface(points, joined)
         mesh = weld(body)
     if path.suffix.lower() != ".stl":  # each facet of an STL file has nodes of its own
         mesh.metadata[MERGED] = int(body.referenced_vertices.sum()) - len(mesh.vertices)
@@ -157,42 +173,25 @@ def _polygons(path: Path) -> Polygons:
             file=path,
             value=path.suffix or "no suffix",
             limit=", ".join(FORMATS),
-            remedy="export the surface as STL",
+            remedy="export the surface as STL, in ParaView by File, Save Data",
         )
     _refuse_missing(path)
     return _READERS[suffix](path)
 
 
-def _vtk(path: Path) -> Polygons:
-    """Read legacy VTK or VTU; meshio's own `read` ends the interpreter on bad files."""
+def _vtu(path: Path) -> Polygons:
+    """Read VTU; meshio's own `read` ends the interpreter on bad files."""
     import meshio
 
-    _refuse_cut(path)
-    content = {".vtk": meshio.vtk.read, ".vtu": meshio.vtu.read}[path.suffix.lower()](path)
+    if not path.read_bytes().rstrip().endswith(b"</VTKFile>"):
+        raise InputError("the file was cut short", limit='"</VTKFile>" at its end')
+    content = meshio.vtu.read(path)
     blocks = [block for block in content.cells if block.type not in ("vertex", "line")]
     for block in blocks:
         if block.type not in ("triangle", "quad", "polygon"):
-            raise InputError(
-                "the mesh contains cells that are no polygons",
-                value=f"{len(block.data)} of type {block.type}",
-                limit="triangles, quadrilaterals, polygons",
-                remedy="export the surface alone",
-            )
+            raise no_polygons(len(block.data), block.type)
     points = np.asarray(content.points, dtype=np.float64).reshape(len(content.points), 3)
     return Polygons(points, [np.asarray(block.data, dtype=np.int64) for block in blocks])
-
-
-def _refuse_cut(path: Path) -> None:
-    """Refuse a file that ends before what it announces, which meshio may take long to see."""
-    content = path.read_bytes()
-    if path.suffix.lower() == ".vtk":
-        counts = re.findall(rb"^POINTS\s+(\d{1,18})|^CELLS\s+\d+\s+(\d{1,18})", content, re.M)
-        numbers = sum(3 * int(points or 0) + int(cells or 0) for points, cells in counts)
-        if 2 * numbers > len(content):
-            value = f"{len(content)} bytes, {numbers} numbers announced"
-            raise InputError("the file was cut short", value=value)
-    elif not content.rstrip().endswith(b"</VTKFile>"):
-        raise InputError("the file was cut short", limit='"</VTKFile>" at its end')
 
 
 def _bytes(read: Callable[[bytes], Polygons]) -> Callable[[Path], Polygons]:
@@ -203,8 +202,8 @@ _READERS: Mapping[str, Callable[[Path], Polygons]] = {
     ".stl": _bytes(stl),
     ".obj": _bytes(obj),
     ".ply": _bytes(ply),
-    ".vtk": _vtk,
-    ".vtu": _vtk,
+    ".vtk": _bytes(vtk_legacy),
+    ".vtu": _vtu,
 }
 
 
@@ -225,7 +224,7 @@ def _damage(path: Path) -> Iterator[None]:
             f"the mesh file is damaged, or a variant of {path.suffix[1:].upper()} not read here",
             file=path,
             value=str(error).strip() or type(error).__name__,
-            remedy="export it again; VTK polygon data as STL or as an unstructured grid",
+            remedy="export it again, as STL",
         ) from error
 
 

@@ -25,6 +25,7 @@ _FACET = re.compile(r"f( \d+(?P<beside>(/\d*){0,2}))( \d+(/\d*){0,2})*")
 _DIGITS = b"0123456789"
 _FACETS = "f", "fo"
 _OTHER_FILES = "call", "csh"
+_GEOMETRY = ["v"], ["f"]
 _SLOWLY = ("\\", "\nv\n", "\nf\n", *(f"\n{key}" for key in ("fo", *_OTHER_FILES)))
 """What keeps a piece from being read at once."""
 
@@ -52,7 +53,7 @@ def obj(content: bytes) -> Polygons:
         corners.append(named)
         sizes.append(counts)
         nodes += len(points)
-    refuse_two_marks(text, r"^[ \t]*v(?:\s+\S+){0,2}\s+\S*")
+    refuse_two_marks(text, r"^[ \t]*v(?:\s+\S+){0,2}\s+")
     for most, line, piece in last:
         if most >= nodes:
             _refuse_beyond(piece, line, nodes)
@@ -149,10 +150,19 @@ def _slowly(piece: str, first: int, before: int) -> _Piece:
 
 def _lines(piece: str, first: int) -> Iterator[tuple[int, list[str]]]:
     """Lines with their numbers, without comments, those that go on joined."""
-    begun: list[str] = []
+    begun, doubtful = list[str](), False
     for number, line in enumerate(piece.split("\n"), first):
         text = line.partition("#")[0].rstrip()
+        if doubtful and text.lstrip()[:2].split() in _GEOMETRY:
+            raise InputError(
+                "the line before may go on here",
+                line=number,
+                value=line[:60],
+                limit="no backslash at the end of a comment or a name",
+            )
         begun += text.removesuffix("\\").split()
+        goes_on = line.rstrip().endswith("\\")
+        doubtful = goes_on and not ("#" not in line and begun[:1] in _GEOMETRY)
         if "\0" in text or len(begun) > _MOST_CORNERS:
             problem = "a byte is 0" if "\0" in text else "a line has too many words"
             limit = f"a text, UTF-8 for example, with at most {_MOST_CORNERS:,} words per line"

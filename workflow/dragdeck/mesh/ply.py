@@ -34,9 +34,6 @@ _KINDS = {
     **dict.fromkeys(("float", "float32"), "f4"),
     **dict.fromkeys(("double", "float64"), "f8"),
 }
-_FEW, _WALKED = 64, 10_000
-"""Rows that are tried first, and that are read one by one where lists differ in length."""
-
 _INDICES = "vertex_indices", "vertex_index"
 
 
@@ -185,29 +182,23 @@ class _Bytes:
 
     def __init__(self, body: bytes, order: str, before: int) -> None:
         self._body, self._order, self._place, self._before = body, order, 0, before
-        self._likely = _FEW
 
     def take(self, element: _Element, most: int) -> tuple[int, _Values]:
-        """As in `_Rows`."""
+        """As in `_Rows`: all rows, at once where their lists have one length."""
         kind = self._kind(element)
-        room = (len(self._body) - self._place) // max(kind.itemsize, 1)
-        if room == 0:
-            raise self._short(element)
-        rows = np.frombuffer(self._body, kind, min(most, room, self._likely), self._place)
-        alike = np.ones(len(rows), dtype=bool)
-        for place, field in enumerate(element.properties):
-            if field.length:
-                alike &= rows[f"{place} count"] == rows[f"{place} count"][0]
-        count, self._likely = _alike(alike, self._likely)
-        if count < min(_FEW, len(alike)):
-            return self._walk(element, min(most, _WALKED))
-        self._place += count * kind.itemsize
-        columns = [rows[str(place)][:count] for place in range(len(element.properties))]
-        return count, {
-            field.name: (column.ravel(), np.full(count, column.shape[1]))
+        if most * kind.itemsize > len(self._body) - self._place:
+            return self._walk(element, most)
+        rows = np.frombuffer(self._body, kind, most, self._place)
+        fields = [(str(place), field) for place, field in enumerate(element.properties)]
+        counts = [rows[f"{place} count"] for place, field in fields if field.length]
+        if any((count != count[0]).any() for count in counts):
+            return self._walk(element, most)
+        self._place += rows.nbytes
+        return most, {
+            field.name: (rows[place].ravel(), np.full(most, rows[place].shape[1]))
             if field.length
-            else column
-            for field, column in zip(element.properties, columns, strict=True)
+            else rows[place]
+            for place, field in fields
         }
 
     def _walk(self, element: _Element, rows: int) -> tuple[int, _Values]:
@@ -279,9 +270,9 @@ class _Lines:
 
     def __init__(self, body: bytes, head: re.Match[bytes]) -> None:
         rows = mesh_text(body)
-        refuse_two_marks(rows, "^.*")
-        self._pieces = pieces(rows, _LINE, "a line")
         self._before = text_of(head.string[: head.end()]).count("\n")
+        refuse_two_marks(rows, r"^(?:.*\s)?", self._before)
+        self._pieces = pieces(rows, _LINE, "a line")
         self._words, self._starts, self._lines = np.empty(0), np.zeros(1, int), np.empty(0, int)
         self._text, self._first = "", 0
         self._damage: InputError | None = None
@@ -362,9 +353,3 @@ def _quick_words(text: str) -> tuple[Floats, Integers, Integers] | None:
     marks = marks[(marks == ord(" ")) | (marks == ord("\n"))]
     ends = np.flatnonzero(np.append(marks == ord("\n"), [True])) + 1
     return columns[0], np.diff(ends, prepend=0), np.arange(len(ends))
-
-
-def _alike(alike: Any, likely: int) -> tuple[int, int]:
-    """How many rows are like the first, and how many to try next."""
-    count = len(alike) if alike.all() else int(np.argmin(alike))
-    return count, max(_FEW, 2 * count) if count < len(alike) else 4 * likely

@@ -16,6 +16,7 @@ from dragdeck.files import text_of
 from dragdeck.mesh.surface import Floats, Integers
 
 _NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eEdD][+-]?\d+)?|[+-]?(nan|inf(inity)?)", re.I)
+_GROUPED = r"[-+]?[1-9]\d{0,2}(,\d{3})+(?!\S)"
 _C_NUMBERS = str.maketrans(",Dd", ".ee")
 
 _PIECE, _LONGEST = 1 << 19, 4 << 20
@@ -65,8 +66,10 @@ def numbers(words: Sequence[str], line: int | None = None) -> Floats:
     return np.array(values)
 
 
-def refuse_two_marks(text: str, before: str) -> None:
-    """Refuse a text with decimal points and commas; `before` matches what stands before one.
+def refuse_two_marks(text: str, before: str, lines: int = 0) -> None:
+    """Refuse decimal points beside commas, and commas that may all be marks of thousands.
+
+    `before` matches what stands before a number; so many lines stand before the text.
 
     Raises
     ------
@@ -75,13 +78,23 @@ def refuse_two_marks(text: str, before: str) -> None:
     """
     if "," not in text:
         return
-    comma, point = (re.search(f"{before}{mark}", text, re.I | re.M) for mark in (",", r"\."))
-    if comma and point:
+    comma, point, sure = (
+        re.search(f"{before}{mark}", text, re.I | re.M)
+        for mark in (r"\S*,\S*", r"\S*\.", rf"(?!{_GROUPED})\S*,")
+    )
+    if comma and (point or not sure):
+        problem = "decimal commas beside decimal points"
+        limit = "one of both"
+        if point:
+            limit += f"; line {lines + text.count(chr(10), 0, point.end()) + 1} has a point"
+        else:
+            problem = "a comma may be a decimal comma or a mark of thousands"
+            limit = "a comma with other than three digits behind it, or decimal points"
         raise InputError(
-            "decimal commas beside decimal points",
-            line=text.count("\n", 0, comma.end()) + 1,
+            problem,
+            line=lines + text.count("\n", 0, comma.end()) + 1,
             value=comma[0].split("\n")[-1].strip()[-60:],
-            limit=f"one of both; line {text.count(chr(10), 0, point.end()) + 1} has a point",
+            limit=limit,
         )
 
 
@@ -103,6 +116,16 @@ def no_such_node(number: int, nodes: range, line: int | None = None) -> InputErr
         line=line,
         value=number,
         limit=f"{nodes.start} to {nodes.stop - 1}",
+    )
+
+
+def no_polygons(count: int, kind: object) -> InputError:
+    """Of cells of a kind that is no polygon."""
+    return InputError(
+        "the mesh contains cells that are no polygons",
+        value=f"{count} of type {kind}",
+        limit="triangles, quadrilaterals, polygons",
+        remedy="export the surface alone",
     )
 
 

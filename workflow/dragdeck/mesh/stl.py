@@ -74,7 +74,7 @@ def _text(text: str) -> Polygons:
         corners = _corners(piece, line) if triangles is None else [triangles]
         points += corners
         sizes += [3] * (len(triangles) // 3) if triangles is not None else map(len, corners)
-    refuse_two_marks(text, r"\bvertex(?:\s+\S+){0,2}\s+\S*")
+    refuse_two_marks(text, r"\bvertex(?:\s+\S+){0,2}\s+")
     joined = np.concatenate(points)
     return Polygons(joined, by_size(np.arange(len(joined)), sizes))
 

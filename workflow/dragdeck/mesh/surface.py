@@ -69,15 +69,26 @@ def weld(mesh: Trimesh, precision_m: float = NODE_PRECISION_M) -> Trimesh:
     from scipy.spatial import KDTree
     from trimesh.graph import connected_component_labels
 
-    if mesh.is_empty or not are_lengths(mesh.vertices).all():
+    if mesh.is_empty:
         return mesh
     used = surface(mesh.vertices[mesh.referenced_vertices], _renumbered(mesh))
-    places, same = np.unique(used.vertices, axis=0, return_inverse=True)
+    places, same = _unique_rows(used.vertices)
     tree = KDTree(places, compact_nodes=False, balanced_tree=False)  # made in half the time
     close = tree.query_pairs(precision_m, output_type="ndarray")
     label = connected_component_labels(close, node_count=len(places))[same]
     _, kept = np.unique(label, return_index=True)
     return surface(used.vertices[kept], label[used.faces])
+
+
+def _unique_rows(rows: Floats) -> tuple[Floats, Integers]:
+    """As `numpy.unique` of rows, (N, 3), in a fifth of the time: by one number of each."""
+    bits = (rows + 0.0).view(np.uint64)
+    mixed = (bits ^ bits >> 32) @ np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 1], np.uint64)
+    _, first, same = np.unique(mixed, return_index=True, return_inverse=True)
+    if (rows[first][same] != rows).any():  # two rows have one number
+        return np.unique(rows, axis=0, return_inverse=True)
+    order = np.lexsort(rows[first].T[::-1])
+    return rows[first[order]], np.argsort(order)[same]
 
 
 def are_lengths(coordinates: Floats) -> NDArray[np.bool_]:

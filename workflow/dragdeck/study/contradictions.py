@@ -346,7 +346,7 @@ def _signal(study: models.Study, file: Path) -> Iterator[InputError]:
     signal = study.reference.signal if study.reference else None
     if signal is None:
         return
-    from dragdeck.study.force_record import RATES_PER_BANDWIDTH, measured_signal
+    from dragdeck.study.process_signal import RATES_PER_BANDWIDTH, measured_signal
 
     motion, most = study.motion, study.outputs.workpiece_force_hz / RATES_PER_BANDWIDTH
     if signal.low_pass_hz > most * (1 + 1e-9):

@@ -28,6 +28,9 @@ LINE = re.compile("\n")
 _SHORTEST = 2
 """Characters of the shortest row, its end included."""
 
+_HEADER_AGAIN = re.compile(r"(channels$|\*\*\*|x_value|time\b)", re.I)
+"""First cells of lines that begin another record, as in a file of LabVIEW with several headers."""
+
 _MISSING = ("", "nan", "n/a", "#n/a", "#nv", "null")
 MOST_MISSING = 0.01
 """Part of the values of a column that may be missing where its reader can do without them."""
@@ -241,6 +244,12 @@ class _Rows:
         """Refuse rows that are longer or shorter than the header, or have a value without name."""
         table, errors = self.table, []
         for line, row in zip(lines.tolist(), rows, strict=True):
+            if _HEADER_AGAIN.match(row[0]):
+                raise InputError(
+                    "a second header: the file has several records", file=table.file, line=line,
+                    value=table.separator.join(row)[:80], limit="one header and its rows",
+                    remedy="export one record per file; in LabVIEW: one header only",
+                )  # fmt: skip
             divided = table.joined and not all(row)
             even = len(row) == self._count and not divided
             if even and not any(row[column].strip() for column in self._unnamed):
@@ -348,6 +357,8 @@ def is_number(cell: str) -> bool:
 def _said(cell: str) -> str:
     if len(cell.split()) > 1 and all(map(is_number, cell.split())):
         return f"{cell[:60]!r} is several numbers, without a semicolon, tab or comma between them"
+    if re.match(r"[\d-]+[ T]?[\d:]*:\d\d", cell):
+        return f"{cell[:60]!r} is a time of the day; export seconds, or state rate_hz without times"
     return f"{cell[:60]!r} is text, not a number" if cell else "the value is missing"
 
 

@@ -199,5 +199,7 @@ def _facets(part: Path, unit: str | None, axis: str, scene: _Scene) -> tuple[flo
         mended = not any("facet_size_m" in problem.remedy for problem in problems)
         if mended and all(problem.severity == "warning" for problem in problems):
             break  # a mesher may fold a thin edge at one size, and not at another
+    else:
+        check(upright(read(part, unit), axis) if unit else mesh, file=part, surroundings=around)
     check(mesh, file=part, surroundings=around)
     return tried, "of the mesh of the part" if unit is None else "its facets are meshed anew"
