@@ -1,17 +1,20 @@
 """Kinds of bowl: walls, sections, meshes, places of the particles, and what is refused."""
 
 from copy import deepcopy
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from bowls import SMALL_BOWLS
+from bowls import OWN_BOWL, SMALL_BOWLS
 from made_study import Made, plain_study
 from scipy.spatial import KDTree
 
+from dragdeck.decks import CASE_FILE
 from dragdeck.errors import InputError
 from dragdeck.physics.contact_network import touching
 from dragdeck.physics.domain_split import FilledBowl, split
+from dragdeck.records.case import load_case
 from dragdeck.scenes.bed_space import first_particles
 from dragdeck.scenes.process import process_scene
 from dragdeck.study.bowls.bowl import Bowl
@@ -53,6 +56,16 @@ def test_lines_of_a_bowl_have_a_length(profile: list[list[float]] | None) -> Non
     data = {**plain_study({}), "bowl": {"material": "steel"} | shape}
     lines = list(Study.model_validate(data).bowl.container.lines(0.04))
     assert len(lines) > 6 and min(np.ptp(line, axis=0).max() for line in lines) > 1e-3
+
+
+@pytest.mark.parametrize("changes", [*SMALL_BOWLS.values(), OWN_BOWL], ids=[*SMALL_BOWLS, "own"])
+def test_a_run_knows_its_bowl(changes: dict[str, Any], made: Made, tmp_path: Path) -> None:
+    """``case.json`` has the study, which is read strictly."""
+    written = process_scene(made({**deepcopy(changes), "motion.immersion_depth_m": 0.01})).case
+    file = tmp_path / CASE_FILE
+    file.write_text(written.as_text())
+    read = load_case(tmp_path)
+    assert read.study is not None and read.study.bowl == written.study.bowl
 
 
 @pytest.mark.parametrize("name", SMALL_BOWLS)

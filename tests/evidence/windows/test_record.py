@@ -17,7 +17,7 @@ from dragchain.errors import SeriesError
 from dragchain.quantities.document import RunQuantities
 from dragdeck.records.stability import StableStepRecord
 from dragdeck.records.windows import WindowsRecord
-from evidence.__main__ import COMMANDS, main
+from evidence.__main__ import PROGRAM, main
 from evidence.windows.record import Windowed, read_windows, windows_record
 from evidence.windows.scene_runs import SceneRun, read_scenes
 
@@ -171,7 +171,7 @@ def test_every_shipped_record_has_a_command_that_exists() -> None:
     targets = re.findall(r"^rule (\w+):", rules, re.M)
     (direct,) = re.findall(r"^    (verify.*)\)$", (ROOT / "run").read_text(), re.M)
     known = {f"./run {name}" for name in [*targets, *direct.split(" | ")]}
-    known |= {f"python -m evidence {one.name}" for one in COMMANDS}
+    known |= {f"python -m evidence {command.name}" for command in PROGRAM.commands}
     for name, made_by in rows.items():
         if not made_by.startswith("by hand"):
             command = re.match(r"`((?:\./run|python -m evidence) [\w-]+)", made_by)

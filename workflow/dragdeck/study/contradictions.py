@@ -221,7 +221,7 @@ _OF_OTHER_KINDS = [
     for block, kinds in {
         "motion.path": get_args(AnyPath),
         "workpiece.shape": get_args(get_args(Shape)[0]),
-        "bowl": get_args(models.AnyBowl),
+        "bowl": [get_args(kind)[0] for kind in get_args(models.AnyBowl)],
     }.items()
     for kind in kinds
     for name in kind.model_fields

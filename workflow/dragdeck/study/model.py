@@ -7,7 +7,7 @@ run.
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 
 from dragdeck.parts import omitted
 from dragdeck.study.base import (
@@ -39,13 +39,21 @@ from dragdeck.study.roughness import Roughness
 from dragdeck.study.search import Search
 from dragdeck.study.workpiece import Carousel, Material, Station, Workpiece
 
-AnyBowl = CylinderBowl | AnnulusBowl | TroughBowl | RevolvedBowl | MeshBowl
+AnyBowl = (
+    Annotated[CylinderBowl, Tag("cylinder")]
+    | Annotated[AnnulusBowl, Tag("annulus")]
+    | Annotated[TroughBowl, Tag("trough")]
+    | Annotated[RevolvedBowl, Tag("revolved")]
+    | Annotated[MeshBowl, Tag("mesh")]
+)
 """The registry of bowls."""
 
 
-def _with_kind(value: object) -> object:
+def _kind_of_bowl(value: object) -> object:
     """A bowl without a kind is a cylinder."""
-    return {"kind": "cylinder", **value} if isinstance(value, Mapping) else value
+    if isinstance(value, Mapping):
+        return value.get("kind", "cylinder")
+    return getattr(value, "kind", "cylinder")
 
 
 class Compound(Model):
@@ -171,7 +179,7 @@ class Study(Model):
     pairs: dict[str, Pair]
     """'a-b': contact coefficients of the materials a and b"""
     media: Media
-    bowl: Annotated[AnyBowl, Field(discriminator="kind"), BeforeValidator(_with_kind)]
+    bowl: Annotated[AnyBowl, Discriminator(_kind_of_bowl)]
     compound: Compound | None = omitted(None)
     workpiece: Workpiece
     workpieces: Carousel | None = None
