@@ -45,7 +45,7 @@ def rows(project: Project) -> Iterator[dict[str, object]]:
 
 def law(runs: pd.DataFrame) -> pd.DataFrame:
     """Drag at rest, N, and its rise with the square of the speed, N s2/m2, with 95 % intervals."""
-    drag, half = runs["drag_n_value"].abs(), runs["drag_n_ci95_high"] - runs["drag_n_value"]
+    drag, half = runs["drag_n"].abs(), runs["drag_n_ci95_high"] - runs["drag_n"]
     values, covariance = np.polyfit(runs["speed_m_s"] ** 2, drag, 1, w=1 / half, cov=True)
     halves = t.ppf(0.975, len(runs) - 2) * np.sqrt(np.diag(covariance))
     names = ("rise_n_s2_m2", "at_rest_n")

@@ -128,7 +128,7 @@ def _draw_machine_speed() -> Figure:
     rows = record_table("scaling/machine_speed")
     figure, (drags, contacts) = _panels(7.6, 2.8, 2)
     for axes, name in ((drags, "drag_n"), (contacts, "contacts")):
-        value, low, high = (rows[f"{name}{end}"].abs() for end in ("_value", *_ENDS))
+        value, low, high = (rows[f"{name}{end}"].abs() for end in ("", *_ENDS))
         sides = value - np.minimum(low, high), np.maximum(low, high) - value
         axes.errorbar(rows["speed_m_s"], value, sides, fmt="o", color=COLOURS["drag"], capsize=3)
         axes.set(xlabel="speed (m/s)", xlim=(0, None), ylim=(0, None))
@@ -136,7 +136,7 @@ def _draw_machine_speed() -> Figure:
     at_rest, rise = law["at_rest_n"], law["rise_n_s2_m2"]
     speeds = np.linspace(0, rows["speed_m_s"].max(), 50)
     drags.plot(speeds, at_rest + rise * speeds**2, color=GREY, lw=1,
-               label=f"{at_rest:.2f} N + {rise:.2f} N s²/m² v²")  # fmt: skip
+               label=f"{at_rest:.2f} N + {rise:.2f} N s²/m² · v²")  # fmt: skip
     drags.set_ylabel("mean drag (N)")
     drags.legend()
     contacts.set_ylabel("contacts on the workpiece at a time")
