@@ -86,7 +86,7 @@ def test_a_wheel_has_all_that_a_project_needs(wheel: Path) -> None:
     with zipfile.ZipFile(wheel) as archive:
         names = set(archive.namelist())
     assert {name.split("/")[0] for name in names if ".dist-info/" not in name} == TOP_LEVEL
-    for pattern in ("templates/*", "meshes/*", "workflow/*.*", "workflow/*/*.yaml", "config/*",
+    for pattern in ("templates/*", "meshes/*", "workflow/*.*", "workflow/plans/*", "config/*",
                     "workflow/rules/*", "workflow/report/*", "studies/quickstart/*"):  # fmt: skip
         files = [file.relative_to(ROOT) for file in ROOT.glob(pattern) if file.is_file()]
         assert files and names >= {f"dragdeck/share/{file}" for file in files}

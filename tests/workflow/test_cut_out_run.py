@@ -18,11 +18,11 @@ from dragdeck.engine.run_folder import run
 pytestmark = [pytest.mark.engine, pytest.mark.slow]
 
 CUT: dict[str, Any] = {
-    "bowl": {"kind": "annulus", "material": "steel", "radius_m": 0.046, "core_radius_m": 0.010,
+    "bowl": {"kind": "annulus", "material": "steel", "radius_m": 0.065, "core_radius_m": 0.010,
              "height_m": 0.08},
-    "reduction": {"cut_out": True, "counted_m": 0.03},
+    "reduction": {"cut_out": True, "counted_m": 0.035},
 }  # fmt: skip
-REST = {"kind": "rest", "radius_m": 0.028, "bowl_rpm": 179, "revolutions": 0.5}
+REST = {"kind": "rest", "radius_m": 0.037, "bowl_rpm": 155, "revolutions": 0.5}
 
 
 @pytest.fixture(scope="module")
