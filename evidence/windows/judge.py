@@ -97,7 +97,7 @@ def _rows(project: Project, study: str) -> Iterator[dict[str, Any]]:
     plain = [run for case in project.cases(study + PLAIN) for run in of_each_workpiece(case)]
     plain_cpu = _cpu_time(project, plain) / len({case.study.seed for case in plain})
     cpu = _cpu_time(project, with_leads(asked))
-    for case in (run for each in asked for run in of_each_workpiece(each)):
+    for case in (workpiece for whole in asked for workpiece in of_each_workpiece(whole)):
         folder = project.run_folder(case, PROCESS)
         result = Extrapolated.read(folder / EXTRAPOLATED)
         assert result.tolerance is not None
@@ -108,7 +108,7 @@ def _rows(project: Project, study: str) -> Iterator[dict[str, Any]]:
         ]
         for name in result.tolerance.asked:
             value, (mean, error) = result.values[name], _reference(beside, name)
-            half = (value.ci95_high - value.ci95_low) / 2
+            spread = math.hypot(value.half_width, NORMAL_QUANTILE * error)
             yield {
                 "study": study,
                 "workpiece": case.number,
@@ -116,13 +116,13 @@ def _rows(project: Project, study: str) -> Iterator[dict[str, Any]]:
                 "windows": len(result.tolerance.runs),
                 "whole_drag": result.tolerance.whole or not result.tolerance.runs,
                 "tolerance": result.tolerance.tolerance,
-                "reached": half <= result.tolerance.tolerance * abs(value.value),
+                "reached": value.relative_half_width <= result.tolerance.tolerance,
                 "value": value.value,
-                "half_width": half / abs(value.value),
+                "half_width": value.relative_half_width,
                 "reference": mean,
                 "reference_error": error / abs(mean),
                 "error": value.value / mean - 1,
-                "covered": abs(value.value - mean) <= math.hypot(half, NORMAL_QUANTILE * error),
+                "covered": abs(value.value - mean) <= spread,
                 "cpu_time_s": cpu,
                 "plain_cpu_time_s": plain_cpu,
             }
@@ -132,8 +132,8 @@ def _reference(runs: Sequence[RunQuantities], name: str) -> tuple[float, float]:
     """Mean over packings and its standard error, no smaller than the runs' own scatter explains."""
     estimates = [run.estimates({})[name] for run in runs]
     means = np.array([estimate.value for estimate in estimates])
-    widths = np.array([estimate.ci95_high - estimate.ci95_low for estimate in estimates])
-    within = float(np.mean((widths / 2 / NORMAL_QUANTILE) ** 2))
+    errors = np.array([estimate.half_width for estimate in estimates]) / NORMAL_QUANTILE
+    within = float(np.mean(errors**2))
     between = float(means.var(ddof=1)) if len(means) > 1 else 0.0
     return float(means.mean()), math.sqrt(max(within, between) / len(means))
 

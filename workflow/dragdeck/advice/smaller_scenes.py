@@ -46,7 +46,7 @@ def smaller_scenes(
 def _ways(
     machine: Case, quantities: Sequence[str], tradeoff: TradeoffRecord, extrapolated: bool
 ) -> Iterator[WayEntry]:
-    plain = _cost([machine], tradeoff)
+    plain = 0.0
     for cut_out, name in ((False, "machine"), (True, "cut-out")):
         for factors in ((1.0,), _FACTORS) if extrapolated else ((1.0,),):
             try:
@@ -55,19 +55,17 @@ def _ways(
                 continue
             label = f"{name}, particles {' and '.join(f'{k:g}' for k in factors)} times as large"
             counts = ", ".join(f"{member.study.particle_count:,}" for member in cases)
-            half = _half_width(cases, factors, quantities)
+            half, cost = _half_width(cases, factors, quantities), _cost(cases, tradeoff)
+            plain = plain or cost  # the machine comes first
             yield WayEntry(
                 name=f"{label if len(factors) > 1 else name}: {counts} particles",
                 half_width=half if math.isfinite(half) else None,
-                relative_cost=_cost(cases, tradeoff) / plain,
+                relative_cost=cost / plain,
             )
 
 
 def _reduced(machine: Case, cut_out: bool, factor: float) -> Case:
-    coarser = None if factor == 1 else factor
-    reduction = Reduction(cut_out=cut_out, coarser=coarser)
-    if not cut_out and coarser is None:
-        return machine
+    reduction = Reduction(cut_out=cut_out, coarser=None if factor == 1 else factor)
     study = machine.study.model_copy(update={"reduction": reduction})
     return with_larger_particles(with_cut_out(replace(machine, study=study)))
 
@@ -97,6 +95,7 @@ def _of_run(case: Case, quantities: Sequence[str]) -> float:
     motion = case.study.motion
     counted_m = motion.path_length_m - motion.uncounted_m
     blocks = counted_m / (2 * case.study.media.typical_radius_m)
-    record, front = WindowsRecord.shipped(), front_of(describe(case))
-    known = [record.quantities.get(name) for name in quantities]
-    return max(of.at_front(front).soft_half_width(blocks, 0.0) if of else math.inf for of in known)
+    front = front_of(describe(case))
+    return WindowsRecord.shipped().widest(
+        quantities, front, lambda known: known.soft_half_width(blocks, 0.0)
+    )

@@ -237,5 +237,4 @@ class Ways:
 
     def _largest(self, half_width: Callable[[Known], float]) -> float:
         """The largest half-width of the quantities."""
-        known = [self.record.quantities.get(name) for name in self.asked.quantities]
-        return max(half_width(of.at_front(self.front)) if of else math.inf for of in known)
+        return self.record.widest(self.asked.quantities, self.front, half_width)

@@ -1,7 +1,7 @@
 """``windows.json``: what soft runs, their windows and whole runs of other scenes say."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -146,6 +146,13 @@ class WindowsRecord(Document):
     measured: str
     source: str
     quantities: Mapping[str, Known]
+
+    def widest(
+        self, quantities: Iterable[str], front: float, half_width: Callable[[Known], float]
+    ) -> float:
+        """The largest half-width of quantities on a front; infinite if one is not known."""
+        known = [self.quantities.get(name) for name in quantities]
+        return max(half_width(of.at_front(front)) if of else math.inf for of in known)
 
     @classmethod
     def shipped(cls) -> "WindowsRecord":

@@ -15,7 +15,7 @@ from dragdeck.errors import Caution, InputError, near, together
 from dragdeck.files import table_rows
 from dragdeck.study import model as models
 from dragdeck.study.base import Json, Model
-from dragdeck.study.contradictions import _decimal_commas, _signal, contradictions
+from dragdeck.study.contradictions import contradictions, decimal_commas, signal_problems
 from dragdeck.study.fidelity import BUILT_IN_FIDELITIES, Fidelity
 from dragdeck.study.plausible import implausible
 from dragdeck.study.recorded import Places, mesh_errors, with_recording
@@ -50,8 +50,8 @@ def validate(data: Json, file: Path | str, *, whole: bool = False) -> models.Stu
     doubts = [row for row in implausible({**data, **implied}) if row[0].field not in wrong]
     problems += [error for error, _ in doubts]
     known = {error.field for error, refused in doubts if refused}
-    others = [*contradictions(study, whole), *_signal(study, Path(file))] if study else []
-    others += _decimal_commas(study, Path(file)) if study and whole else ()
+    others = [*contradictions(study, whole), *signal_problems(study, Path(file))] if study else []
+    others += decimal_commas(study, Path(file)) if study and whole else ()
     more = [error for error in others if error.field not in known]
     if study is None or more or any(refused for _, refused in doubts):
         meshes = mesh_errors(data, Path(file)) if whole else ()

@@ -230,14 +230,14 @@ _OF_OTHER_KINDS = [
 
 
 def _assumptions(study: models.Study) -> _Found:
-    values = [*flat(study.model_dump(mode="json")), *_OF_OTHER_KINDS]
-    parts = (name.split(".") for name in values)
+    values = flat(study.model_dump(mode="json"))
+    parts = (name.split(".") for name in (*values, *_OF_OTHER_KINDS))
     known = {".".join(words[:count]) for words in parts for count in range(1, len(words) + 1)}
     for number, entry in enumerate(study.assumptions):
         if entry.field not in known:
             limit = f"{near(entry.field, known)}the dotted name of a field, such as media.count"
             yield f"assumptions.{number}.field", f"no such field {entry.field!r}", limit
-        value = flat(study.model_dump(mode="json")).get(entry.field)
+        value = values.get(entry.field)
         if entry.std is not None and (
             isinstance(value, bool) or not isinstance(value, int | float)
         ):
@@ -341,7 +341,7 @@ def _scaling(scaling: models.Scaling, study: models.Study) -> _Found:
         yield f"sweep.{field}", problem, f"{_LEAST_LEVELS} levels or more"
 
 
-def _signal(study: models.Study, file: Path) -> Iterator[InputError]:
+def signal_problems(study: models.Study, file: Path) -> Iterator[InputError]:
     """What keeps the measured force signal from being compared with that of a run."""
     signal = study.reference.signal if study.reference else None
     if signal is None:
@@ -369,7 +369,7 @@ def _signal(study: models.Study, file: Path) -> Iterator[InputError]:
         yield error
 
 
-def _decimal_commas(study: models.Study, file: Path) -> Iterator[InputError]:
+def decimal_commas(study: models.Study, file: Path) -> Iterator[InputError]:
     """Lists of a sweep that may be one number, ``[1,5]``; whole numbers have no fraction."""
     values, written = flat(study.plain()), comma_lists(file) if study.sweep else {}
     for name in study.sweep:
