@@ -33,28 +33,36 @@ MATERIALS = {
     "porcelain": (77e9, 0.19, 2656.0),
     "steel": (210e9, 0.30, 7800.0),
     "polyester": (4e9, 0.38, 1400.0),
+    "acrylic": (3e9, 0.37, 1190.0),
+    "polyamide": (2.5e9, 0.40, 1140.0),
+    "polypropylene": (1.5e9, 0.42, 905.0),
 }
 """Young's modulus, Pa, Poisson's ratio, and density, kg/m3, of common media."""
 
 _SOLID, _GRAVITY = 0.59, 9.81
 
 
-def drawn(random: np.random.Generator, number: int) -> dict[str, Any]:
+def drawn(
+    random: np.random.Generator, number: int, name: str, inertial: Sequence[float]
+) -> dict[str, Any]:
     """A scene as plain data: 400 to 800 particles, lengths in particle diameters d.
 
     Parameters
     ----------
     random : numpy.random.Generator
     number : int
-        From 0; the material follows from it.
+        From 0.
+    name : str
+        Of the material of the media.
+    inertial : (2,) sequence of float
+        Range of the inertial number.
     """
-    name = [*MATERIALS][number % len(MATERIALS)]
     d = random.uniform(4e-3, 9e-3)
     thick, gap, reach = random.uniform(0.8, 1.4), random.uniform(2.8, 3.2), random.uniform(1.2, 1.8)
     outer, height = reach + thick / 2 + gap, random.uniform(6.0, 7.0)
     depth = height - random.uniform(2.8, 3.2)
-    inertial = math.exp(random.uniform(math.log(0.02), math.log(0.1)))
-    speed = inertial * math.sqrt(_SOLID * _GRAVITY * depth * d)
+    low, high = (math.log(limit) for limit in inertial)
+    speed = math.exp(random.uniform(low, high)) * math.sqrt(_SOLID * _GRAVITY * depth * d)
     restitution, friction = random.uniform(0.5, 0.9), random.uniform(0.15, 0.5)
     on_tool = friction * random.uniform(0.6, 1.0)
     return {
@@ -106,7 +114,14 @@ def _short(number: float) -> float:
     return float(f"{number:.4g}")
 
 
-def draw_scenes(seed: int, scenes: int, fidelity: str, packings: int) -> str:
+def draw_scenes(
+    seed: int,
+    scenes: int,
+    fidelity: str,
+    packings: int,
+    materials: Sequence[str],
+    inertial: Sequence[float],
+) -> str:
     """Write a study for each scene into the project, and perhaps one of plain runs; their names.
 
     Parameters
@@ -117,11 +132,16 @@ def draw_scenes(seed: int, scenes: int, fidelity: str, packings: int) -> str:
         Block of each study, as YAML.
     packings : int
         Of the plain runs; 0: no such study.
+    materials : sequence of str
+        Of the media; scenes have them in turn.
+    inertial : (2,) sequence of float
+        Range of the inertial number.
     """
     random, names = np.random.default_rng(seed), []
     for number in range(scenes):
         names.append(f"drawn-{seed}-{number:02d}")
-        case = settle_case(Path(names[-1]), drawn(random, number), {})
+        scene = drawn(random, number, materials[number % len(materials)], inertial)
+        case = settle_case(Path(names[-1]), scene, {})
         write_pair(names[-1], case, fidelity, packings)
     return "\n".join(names)
 
