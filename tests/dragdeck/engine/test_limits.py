@@ -124,3 +124,20 @@ def test_an_unstable_run_is_stopped_early_with_the_reason(unstable: Path) -> Non
     assert list(failed_checks(unstable)) == ["within_limits"]
     assert state(unstable).stopped_early
     assert not (unstable / "run.json").exists()
+
+
+@pytest.mark.engine
+def test_spheres_that_only_spin_rest(project: Project, made: Made) -> None:
+    """Without friction about the normal of a contact, nothing ends a spin about the vertical."""
+    case = made({"media.count": 9, "media.fill_height_m": None})
+    folder = project.run_folder(case, FILLING)
+    write_run(filling_scene(case), folder, environment(project.templates))
+    particles = folder / "particles.data"
+    still = re.sub(
+        r"(?m)^(\d+) \S+ \S+ \S+ 0.0 0.0 0.0$", r"\1 0.0 0.0 0.0 0.0 0.0 100.0", particles.read_text()
+    )
+    rewrite(particles, still)
+    run(folder, lambda line: None)
+    last = thermo_samples((folder / "thermo.1.txt").read_text().splitlines()[1:], COLUMNS)[-1]
+    deck = filling_scene(case).deck
+    assert last.rotational_energy_j > 100 * deck.energy_ratio * deck.energy_unit_j
