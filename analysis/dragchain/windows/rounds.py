@@ -156,11 +156,11 @@ def judged(
 def _expected(pairs: Sequence[Paired], windows: int, asked: Asked, good: int) -> tuple[bool, bool]:
     """Whether so many windows, and whether the whole drag, are expected to meet the tolerance.
 
-    With fewer than two good windows, nothing is known yet; and nothing gives a quantity that two
-    good windows lack.
+    Where no window was good, others will hardly be; of a single one, nothing is known yet; and
+    nothing gives a quantity that two good windows lack.
     """
     if good < _FEWEST:
-        return True, False
+        return bool(good), not good
     if len(pairs) < len(asked.quantities):
         return False, False
     widths = [pair.relative_half_width(windows, scatter=_DOUBT) for pair in pairs]

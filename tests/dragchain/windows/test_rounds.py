@@ -132,6 +132,12 @@ def test_a_refused_window_does_not_enter_and_is_made_up_for() -> None:
     assert found.wanted == min(8, 4 + max(1, found.tolerance.needed.windows - 3)) > 4
 
 
+def test_the_whole_drag_is_tried_where_no_window_was_good() -> None:
+    bad = [window.model_copy(update={"refused": "lost"}) for window in windows([15.0, 15.1, 14.9])]
+    first = judged(SOFT, bad, asked(0.2), RECORD)
+    assert first.whole and not first.last and first.wanted == 3
+
+
 def test_a_quantity_that_a_window_lacks_is_never_reached() -> None:
     some = windows([15.0, 15.0, 15.0])
     some[1] = some[1].model_copy(update={"values": {}})

@@ -38,7 +38,8 @@ class Wall(Part):
     ends_m : tuple of 4 floats
         Of a cone: radius and height of one end, then of the other.
     sides : int
-        Of a cone, which is a polygon around the circle: the number of its sides.
+        Of a cone, or of a cylinder that is a mesh, which are polygons around the circle: the number
+        of their sides; 0 for the cylinder itself.
     corners_m : tuple of 9 floats each
         Of facets that face inwards: x, y and z of their corners.
     """
@@ -71,6 +72,8 @@ class Wall(Part):
             return facets.nearest(centre_m, self.triangles)
         if self.ends_m is not None:
             return _from_cone(centre_m, np.array(self.ends_m), self.sides)
+        if self.sides:
+            return _from_polygon(centre_m, self.at_m, self.inwards, self.sides)
         distance, normal = from_primitive(self.shape, (self.at_m, 0.0, 0.0), centre_m)
         return self.inwards * distance, self.inwards * normal
 
@@ -104,12 +107,36 @@ def from_primitive(shape: str, sizes_m: Sequence[float], centre_m: Floats) -> tu
     return place - sizes_m[0], normal
 
 
+def _outwards(centre_m: Floats, sides: int) -> Floats:
+    """Unit vectors, (N, 2), to the middles of the sides of a polygon in front of which points are."""
+    side = np.floor(np.arctan2(centre_m[:, 1], centre_m[:, 0]) / math.tau * sides)
+    middle = math.tau * (side + 0.5) / sides
+    return np.column_stack([np.cos(middle), np.sin(middle)])
+
+
+def _from_polygon(
+    centre_m: Floats, radius_m: float, inwards: int, sides: int
+) -> tuple[Floats, Floats]:
+    """Distances of points from the nearest side of a polygon about a circle, and normals.
+
+    In front of a column, beyond the end of a side, its corner is nearest.
+    """
+    outwards = _outwards(centre_m, sides)
+    across = np.column_stack([-outwards[:, 1], outwards[:, 0]])
+    out = (centre_m[:, :2] * outwards).sum(axis=1) - radius_m
+    along = (centre_m[:, :2] * across).sum(axis=1)
+    end = radius_m * math.tan(math.pi / sides) if inwards > 0 else math.inf
+    beyond = np.sign(along) * np.clip(np.abs(along) - end, 0.0, None) * (out > 0)
+    distance = np.copysign(np.hypot(out, beyond), out)
+    away = out[:, None] * outwards + beyond[:, None] * across
+    normal = away / np.where(distance == 0, 1e-300, distance)[:, None]
+    return inwards * distance, inwards * np.column_stack([normal, np.zeros_like(out)])
+
+
 def _from_cone(centre_m: Floats, ends_m: Floats, sides: int) -> tuple[Floats, Floats]:
     """Distances of points from the nearest side of a cone, and normals away from it."""
     begin, along = ends_m[:2], ends_m[2:] - ends_m[:2]
-    side = np.floor(np.arctan2(centre_m[:, 1], centre_m[:, 0]) / math.tau * sides)
-    middle = math.tau * (side + 0.5) / sides
-    outwards = np.column_stack([np.cos(middle), np.sin(middle)])
+    outwards = _outwards(centre_m, sides)
     place = np.column_stack([(centre_m[:, :2] * outwards).sum(axis=1), centre_m[:, 2]])
     share = np.clip((place - begin) @ along / (along @ along), 0.0, 1.0)
     away = place - begin - share[:, None] * along

@@ -10,13 +10,16 @@ import numpy as np
 from dragdeck.cases import bed as beds
 from dragdeck.cases.case import Case
 from dragdeck.mesh.files import stl_text
+from dragdeck.mesh.shapes import polygon_sides
 from dragdeck.physics import contact_mechanics as mechanics
 from dragdeck.physics.domain_split import FilledBowl, Split, split
 from dragdeck.physics.packing import Bed, Particles, pour, room_to_insert
 from dragdeck.physics.run_limits import RunLimits, run_limits
 from dragdeck.physics.walls import Container
+from dragdeck.records.bed import BowlOfRun
 from dragdeck.study.media import Media
 from dragdeck.study.model import Study
+from dragdeck.study.motion import AnyBowlMotion
 from dragdeck.study.shapes import SOLID_FRACTION_STD
 
 
@@ -103,6 +106,19 @@ def bowl_files(study: Study, top_m: float) -> dict[str, Callable[[], str]]:
     height = highest if study.bowl.container.rim else min(study.bowl.height_m, highest)
     mesh = study.bowl.mesh(height, size)
     return {"bowl.stl": lambda: stl_text(mesh)}
+
+
+def bowl_of_run(study: Study, motion: AnyBowlMotion | None) -> BowlOfRun:
+    """The bowl of a process, with the polygons that stand for its cylinders if it is a mesh."""
+    closed, size = dict(study.bowl.closed), study.bowl_facet_size_m
+    if size is not None:
+        closed["walls"] = tuple(
+            wall.model_copy(update={"sides": polygon_sides(wall.at_m, size)})
+            if wall.shape == "zcylinder"
+            else wall
+            for wall in closed["walls"]
+        )
+    return BowlOfRun(**closed, meshed=size is not None, motion=motion)
 
 
 def bed_limits(study: Study, top_m: float, speed_m_s: float) -> RunLimits:

@@ -17,7 +17,6 @@ from dragdeck.physics.domain_split import rank_warnings
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import round_to
 from dragdeck.physics.run_limits import ENGINE_NEIGHBOURS, RunLimits, thrown_speed
-from dragdeck.records.bed import BowlOfRun
 from dragdeck.records.case import AssumptionOfRun, ProcessCase, StatisticsOfRun, WorkpieceOfRun
 from dragdeck.records.run import Phase, SteadyCriterion
 from dragdeck.scenes import bed_space, moving_bowl
@@ -251,11 +250,7 @@ def _process_case(
         settings=study.chosen_fidelity().model_dump(include={"timestep_fraction", "speed_factor"}),
         run=PROCESS.run_id(case),
         media=scenes.media_of_run(study, buoyancy_density(study)),
-        bowl=BowlOfRun(
-            **dict(study.bowl.closed),
-            meshed=study.bowl_facet_size_m is not None,
-            motion=way.driven.bowl,
-        ),
+        bowl=bed_space.bowl_of_run(study, way.driven.bowl),
         assumptions=[*scenes.assumed(study), *_of_liquid(case, surface_m)],
         asked=case.advised,
         study=scenes.said_study(study),
