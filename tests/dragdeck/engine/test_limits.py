@@ -133,10 +133,8 @@ def test_spheres_that_only_spin_rest(project: Project, made: Made) -> None:
     folder = project.run_folder(case, FILLING)
     write_run(filling_scene(case), folder, environment(project.templates))
     particles = folder / "particles.data"
-    still = re.sub(
-        r"(?m)^(\d+) \S+ \S+ \S+ 0.0 0.0 0.0$", r"\1 0.0 0.0 0.0 0.0 0.0 100.0", particles.read_text()
-    )
-    rewrite(particles, still)
+    falling, spinning = r"(?m)^(\d+) \S+ \S+ \S+ 0.0 0.0 0.0$", r"\1 0.0 0.0 0.0 0.0 0.0 100.0"
+    rewrite(particles, re.sub(falling, spinning, particles.read_text()))
     run(folder, lambda line: None)
     last = thermo_samples((folder / "thermo.1.txt").read_text().splitlines()[1:], COLUMNS)[-1]
     deck = filling_scene(case).deck

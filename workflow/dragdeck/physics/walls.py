@@ -108,7 +108,7 @@ def from_primitive(shape: str, sizes_m: Sequence[float], centre_m: Floats) -> tu
 
 
 def _outwards(centre_m: Floats, sides: int) -> Floats:
-    """Unit vectors, (N, 2), to the middles of the sides of a polygon in front of which points are."""
+    """Unit vectors, (N, 2), to the middles of those sides of a polygon that points face."""
     side = np.floor(np.arctan2(centre_m[:, 1], centre_m[:, 0]) / math.tau * sides)
     middle = math.tau * (side + 0.5) / sides
     return np.column_stack([np.cos(middle), np.sin(middle)])

@@ -19,7 +19,6 @@ from dragdeck.physics.walls import Container
 from dragdeck.records.bed import BowlOfRun
 from dragdeck.study.media import Media
 from dragdeck.study.model import Study
-from dragdeck.study.motion import AnyBowlMotion
 from dragdeck.study.shapes import SOLID_FRACTION_STD
 
 
@@ -108,8 +107,8 @@ def bowl_files(study: Study, top_m: float) -> dict[str, Callable[[], str]]:
     return {"bowl.stl": lambda: stl_text(mesh)}
 
 
-def bowl_of_run(study: Study, motion: AnyBowlMotion | None) -> BowlOfRun:
-    """The bowl of a process, with the polygons that stand for its cylinders if it is a mesh."""
+def bowl_of_run(study: Study) -> BowlOfRun:
+    """The bowl of a process at rest, with polygons in place of its cylinders if it is a mesh."""
     closed, size = dict(study.bowl.closed), study.bowl_facet_size_m
     if size is not None:
         closed["walls"] = tuple(
@@ -118,7 +117,7 @@ def bowl_of_run(study: Study, motion: AnyBowlMotion | None) -> BowlOfRun:
             else wall
             for wall in closed["walls"]
         )
-    return BowlOfRun(**closed, meshed=size is not None, motion=motion)
+    return BowlOfRun(**closed, meshed=size is not None)
 
 
 def bed_limits(study: Study, top_m: float, speed_m_s: float) -> RunLimits:
