@@ -110,6 +110,13 @@ def project(tmp_path: Path) -> Project:
     return Project(tmp_path)
 
 
+@pytest.fixture
+def inside(project: Project, monkeypatch: pytest.MonkeyPatch) -> Project:
+    """The same project, as the working folder."""
+    monkeypatch.chdir(project.root)
+    return project
+
+
 WriteStudy = Callable[..., Path]
 
 

@@ -26,10 +26,7 @@ from dragdeck.scenes.scene import SceneType
 from dragdeck.sweep.cases import load_cases
 from evidence.__main__ import PROGRAM as EVIDENCE
 
-
-@pytest.fixture(autouse=True)
-def inside(project: Project, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(project.root)
+pytestmark = pytest.mark.usefixtures("inside")
 
 
 @pytest.mark.parametrize("program", [DRAGDECK, DRAGCHAIN])

@@ -15,8 +15,7 @@ from dragdeck.scenes.process import PROCESS, SCENES
 
 
 @pytest.fixture(autouse=True)
-def inside(project: Project, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(project.root)
+def without_display(inside: Project, monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
 

@@ -82,14 +82,11 @@ def test_an_option_that_the_study_has_itself_or_cannot_have_is_left_out(
     assert "rotating_bowl" not in cases(made({"motion.path": line}))
 
 
-def test_a_measurement_is_not_overwritten(
-    case: Case, project: Project, monkeypatch: pytest.MonkeyPatch, capsys: Any
-) -> None:
-    (project.root / "costs.json").write_text("kept")
-    monkeypatch.chdir(project.root)
+def test_a_measurement_is_not_overwritten(case: Case, inside: Project, capsys: Any) -> None:
+    (inside.root / "costs.json").write_text("kept")
     assert main(["costs", case.study_name, "--out", "costs.json"]) == 1
     assert "there already" in capsys.readouterr().err
-    assert (project.root / "costs.json").read_text() == "kept"
+    assert (inside.root / "costs.json").read_text() == "kept"
 
 
 def test_no_round_is_nothing_to_time(case: Case, project: Project, tmp_path: Path) -> None:

@@ -182,13 +182,9 @@ def test_strong_damping_shortens_the_steps_of_the_filling(
         pair["restitution"] = 0.3
     damped = made()
     found = advised_settings(damped, asked(), tradeoff)
-    standard = BUILT_IN_FIDELITIES["standard"]
-    study = damped.study.model_copy(update={"fidelity": standard})
-    for fidelity in (
-        found.chosen.fidelity,
-        found.reference.fidelity,
-        consistent(replace(damped, study=study)),
-    ):
+    study = damped.study.model_copy(update={"fidelity": BUILT_IN_FIDELITIES["standard"]})
+    named = consistent(replace(damped, study=study))
+    for fidelity in (found.chosen.fidelity, found.reference.fidelity, named):
         assert fidelity.filling_timestep_fraction == pytest.approx(0.8 * 0.2)
 
 
@@ -245,10 +241,8 @@ def test_a_study_that_asks_gets_settings_and_remembers(asking: Case) -> None:
 
 def test_the_question_is_part_of_the_process_alone(asking: Case) -> None:
     plain = replace(asking, requested=None, advised=None)
-    differing = {
-        scene for scene in SCENES if SCENES[scene].digest(plain) != SCENES[scene].digest(asking)
-    }
-    assert differing == {"process"}
+    differing = [name for name, kind in SCENES.items() if kind.digest(plain) != kind.digest(asking)]
+    assert differing == ["process"]
     assert PROCESS.content(plain) == PROCESS.content(asking)
 
 
@@ -280,21 +274,18 @@ def test_the_packages_own_tradeoff_knows_costs_and_drop_tests(case: Case) -> Non
 # --- the command ---------------------------------------------------------------------------------
 
 
-def test_advise_prints_and_keeps_what_it_says(
-    case: Case,
-    project: Project,
-    tradeoff: TradeoffRecord,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    monkeypatch.chdir(project.root)
+def kept_advice(project: Project, tradeoff: TradeoffRecord) -> Any:
+    """What the command keeps of the only case."""
     commands.advise("small", None, None, None, tradeoff=tradeoff)
-    said = " ".join(capsys.readouterr().out.split())
-    for words in ("drag_mean within 10 %", "advised", "reference", "sets no tolerance",
-                  "wall time"):  # fmt: skip
-        assert words in said
-    kept = json.loads((project.root / "results/small/advice.json").read_text())
-    (one,) = kept["cases"]
+    (advice,) = json.loads((project.root / "results/small/advice.json").read_text())["cases"]
+    return advice
+
+
+def test_advise_prints_and_keeps_what_it_says(
+    case: Case, inside: Project, tradeoff: TradeoffRecord, capsys: pytest.CaptureFixture[str]
+) -> None:
+    one, said = kept_advice(inside, tradeoff), " ".join(capsys.readouterr().out.split())
+    assert "drag_mean within 10 %" in said and "sets no tolerance" in said
     assert [option["role"] for option in one["options"]] == ["advised", "reference"]
     for option in one["options"]:
         assert option["wall_time_s"]["process"] == pytest.approx(
@@ -304,24 +295,17 @@ def test_advise_prints_and_keeps_what_it_says(
 
 
 def test_the_kept_advice_names_the_run_of_a_study_that_asks(
-    asking: Case, tradeoff: TradeoffRecord, project: Project, monkeypatch: pytest.MonkeyPatch
+    asking: Case, inside: Project, tradeoff: TradeoffRecord
 ) -> None:
-    monkeypatch.chdir(project.root)
-    commands.advise("small", None, None, None, tradeoff=tradeoff)
-    kept = json.loads((project.root / "results/small/advice.json").read_text())
-    assert kept["cases"][0]["run"] == PROCESS.run_id(asking)
-    assert kept["cases"][0]["options"][0]["inputs"] == process_scene(asking).case.study.inputs()
+    advice = kept_advice(inside, tradeoff)
+    assert advice["run"] == PROCESS.run_id(asking)
+    assert advice["options"][0]["inputs"] == process_scene(asking).case.study.inputs()
 
 
 def test_an_advice_that_cannot_be_kept_is_still_shown(
-    case: Case,
-    project: Project,
-    tradeoff: TradeoffRecord,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    case: Case, inside: Project, tradeoff: TradeoffRecord, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.chdir(project.root)
-    (project.root / "results").write_text("a file where the folder should be")
+    (inside.root / "results").write_text("a file where the folder should be")
     commands.advise("small", None, 0.02, None, tradeoff=tradeoff)
     shown = capsys.readouterr()
     assert "drag_mean within 2 %" in shown.out and "not written: " in shown.err
@@ -333,15 +317,10 @@ def test_the_command_line_goes_before_the_study(case: Case, asking: Case) -> Non
     assert question(asking, None, "drag_std") == asked(0.05, quantity="drag_std")
 
 
+@pytest.mark.usefixtures("inside")
 @pytest.mark.parametrize(("tolerance", "quantity"), [(2.0, None), (None, "colour")])
 def test_a_wrong_question_is_explained(
-    case: Case,
-    project: Project,
-    tradeoff: TradeoffRecord,
-    monkeypatch: pytest.MonkeyPatch,
-    tolerance: float | None,
-    quantity: str | None,
+    case: Case, tradeoff: TradeoffRecord, tolerance: float | None, quantity: str | None
 ) -> None:
-    monkeypatch.chdir(project.root)
     with pytest.raises(InputError, match="command line: "):
         commands.advise("small", None, tolerance, quantity, tradeoff=tradeoff)

@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 import yaml
 from made_scenes import rendered
+from made_study import Made
 from paths import ROOT
 from pydantic import ValidationError
 
@@ -23,6 +24,7 @@ from dragdeck.cases.bed import (
     expected_surface,
     farthest_point,
 )
+from dragdeck.cases.case import Case
 from dragdeck.engine.run_folder import run
 from dragdeck.errors import InputError
 from dragdeck.physics.contact_mechanics import rayleigh_time
@@ -98,11 +100,18 @@ GOLD = MIXTURE["fine"] | {"material": "gold"}
 PAIR = {"restitution": 0.6, "friction": 0.2}
 
 
-def mixed(small: Small, **changes: Any) -> Small:
-    """The small study with two classes of media."""
-    media = {"count": 300, "classes": MIXTURE} | changes
-    media = {name: value for name, value in media.items() if value is not None}
-    return small | {"media": media, "pairs": small["pairs"] | {"steel-steel": PAIR}}
+@pytest.fixture
+def mixed(small: Small, write_study: Write) -> Made:
+    """The case of the small study with two classes of media."""
+
+    def mix(**changes: Any) -> Case:
+        media = {"count": 300, "classes": MIXTURE} | changes
+        media = {name: value for name, value in media.items() if value is not None}
+        pairs = small["pairs"] | {"steel-steel": PAIR}
+        (case,) = load_cases(write_study(small | {"media": media, "pairs": pairs}))
+        return case
+
+    return mix
 
 
 @pytest.mark.parametrize("fractions_of", ["number", "mass", "volume"])
@@ -111,9 +120,9 @@ def mixed(small: Small, **changes: Any) -> Small:
     [{"count": 3000}, {"count": None, "mass_kg": 0.6}, {"count": None, "fill_height_m": 0.1}],
 )
 def test_asked_fractions_and_totals_are_obtained(
-    fractions_of: str, total: Small, small: Small, write_study: Write
+    fractions_of: str, total: Small, mixed: Made
 ) -> None:
-    (case,) = load_cases(write_study(mixed(small, fractions_of=fractions_of, **total)))
+    case = mixed(fractions_of=fractions_of, **total)
     study, classes = case.study, bed_classes(case.study)
     volume = np.array([(4 / 3 * math.pi * one.radii_m**3).sum() for one in classes])
     mass = volume * [study.materials[one.material].density_kg_m3 for one in classes]
@@ -127,10 +136,8 @@ def test_asked_fractions_and_totals_are_obtained(
     assert bed_density(study) == pytest.approx(mass.sum() / volume.sum())
 
 
-def test_every_particle_has_the_density_and_the_type_of_its_class(
-    small: Small, write_study: Write
-) -> None:
-    (case,) = load_cases(write_study(mixed(small)))
+def test_every_particle_has_the_density_and_the_type_of_its_class(mixed: Made) -> None:
+    case = mixed()
     scene = filling_scene(case)
     lines = scene.texts()["particles.data"].splitlines()
     start = lines.index("Atoms") + 2
@@ -145,8 +152,8 @@ def test_every_particle_has_the_density_and_the_type_of_its_class(
     assert abs(places[: coarse.count, 2].mean() / places[coarse.count :, 2].mean() - 1) < 0.2
 
 
-def test_pairs_of_all_materials_are_in_the_script(small: Small, write_study: Write) -> None:
-    (case,) = load_cases(write_study(mixed(small)))
+def test_pairs_of_all_materials_are_in_the_script(mixed: Made, small: Small) -> None:
+    case = mixed()
     law = process_scene(case, Bed(0.022, 0.026)).deck.materials.law
     restitution = next(table for table in law.tables if table.name == "restitution").values
     known = small["pairs"]
@@ -154,10 +161,8 @@ def test_pairs_of_all_materials_are_in_the_script(small: Small, write_study: Wri
     assert restitution == [*both, both[1], 0.6]
 
 
-def test_the_class_with_the_shortest_rayleigh_time_sets_the_time_step(
-    small: Small, write_study: Write
-) -> None:
-    (case,) = load_cases(write_study(mixed(small)))
+def test_the_class_with_the_shortest_rayleigh_time_sets_the_time_step(mixed: Made) -> None:
+    case = mixed()
     study = case.study
     scale = study.chosen_fidelity().youngs_modulus_scale
     steel, ceramic = (
@@ -167,14 +172,12 @@ def test_the_class_with_the_shortest_rayleigh_time_sets_the_time_step(
     assert bed_rayleigh_time(study) == steel < ceramic
 
 
-def test_a_class_that_makes_runs_many_times_dearer_gets_a_warning(
-    small: Small, write_study: Write
-) -> None:
+def test_a_class_that_makes_runs_many_times_dearer_gets_a_warning(mixed: Made) -> None:
     powder = MIXTURE["fine"] | {"radius_mean_m": 1e-4, "fraction": 0.001}
     classes = {"coarse": MIXTURE["coarse"] | {"fraction": 0.999}, "powder": powder}
     changes = {"classes": classes, "fractions_of": "volume"}
     for changed, warned in ((changes, True), ({}, False)):
-        (case,) = load_cases(write_study(mixed(small, **changed)))
+        case = mixed(**changed)
         texts = [str(one) for one in filling_cautions(case) if one.code == "class"]
         assert bool(texts) == warned
         assert all(text.startswith("class powder (0.09") for text in texts)
@@ -190,17 +193,12 @@ def test_a_class_that_makes_runs_many_times_dearer_gets_a_warning(
         ({"classes": MIXTURE | {"fine": {"material": "steel", "fraction": 0.3}}}, "is missing"),
         ({"count": 1}, "not one particle"),
         ({"classes": {"bowl": MIXTURE["coarse"] | {"fraction": 1}}}, "must not be called bowl"),
-        (
-            {"classes": MIXTURE | {"fine": MIXTURE["fine"] | {"material": "gold"}}},
-            "no such material",
-        ),
+        ({"classes": MIXTURE | {"fine": GOLD}}, "no such material"),
     ],
 )
-def test_media_that_cannot_be_are_refused(
-    changes: Small, problem: str, small: Small, write_study: Write
-) -> None:
+def test_media_that_cannot_be_are_refused(changes: Small, problem: str, mixed: Made) -> None:
     with pytest.raises(InputError, match=problem):
-        load_cases(write_study(mixed(small, **changes)))
+        mixed(**changes)
 
 
 @pytest.mark.parametrize("in_class", [False, True])
@@ -222,9 +220,9 @@ def test_a_sieve_analysis_is_read_from_a_file_beside_the_study(
 
 @pytest.mark.engine
 def test_a_mixture_of_materials_and_sizes_comes_to_rest_as_asked(
-    small: Small, write_study: Write, project: Project
+    mixed: Made, project: Project
 ) -> None:
-    (case,) = load_cases(write_study(mixed(small, count=100)))
+    case = mixed(count=100)
     folder = rendered(case, project)
     assert run(folder, lambda line: None).state == "complete"
     write_tables(folder)
@@ -251,8 +249,8 @@ def test_alternatives_in_a_study_replace_those_of_the_one_it_extends(
         assert ("count" in case.study.media.plain()) == ("classes" in media)
 
 
-def test_a_changed_study_counts_its_own_particles(small: Small, write_study: Write) -> None:
-    (case,) = load_cases(write_study(small))
+def test_a_changed_study_counts_its_own_particles(made: Made) -> None:
+    case = made()
     study = case.study
     assert study.particle_count == 300
     changed = study.model_copy(update={"media": study.media.model_copy(update={"count": 7})})
@@ -321,14 +319,14 @@ def test_measured_beds_are_within_the_margin_of_what_is_expected() -> None:
 
 
 def test_a_depth_that_fits_the_lowest_expected_bed_is_accepted_and_no_deeper_one(
-    small: Small, write_study: Write
+    made: Made, small: Small
 ) -> None:
-    (case,) = load_cases(write_study(small))
+    case = made()
     bed, largest = expected_bed(case.study), 2 * farthest_point(case.study)
     assert bed.margin_m == pytest.approx(2 * SOLID_FRACTION_STD * bed.surface_m)
     for deeper_m in (-1e-5, 1e-5):
         small["motion"]["immersion_depth_m"] = bed.lowest_m - largest + deeper_m
-        (case,) = load_cases(write_study(small))
+        case = made()
         if deeper_m < 0:
             process_scene(case)
             continue
@@ -339,15 +337,15 @@ def test_a_depth_that_fits_the_lowest_expected_bed_is_accepted_and_no_deeper_one
 
 @pytest.mark.parametrize("shape", [None, {"kind": "cylinder", "aspect": 1.2, "spheres": 4}])
 def test_a_bed_that_may_reach_above_the_rim_is_refused(
-    shape: Any, small: Small, write_study: Write
+    shape: Any, made: Made, small: Small
 ) -> None:
     """Even where the expected surface is below it; the number in the message is accepted."""
     small["media"] |= {"radius_std_m": 0.0, "shape": shape}
-    (case,) = load_cases(write_study(small))
+    case = made()
     bed = expected_bed(case.study)
     for rim in (bed.top_m + bed.margin_m + 1e-5, bed.top_m):
         small["bowl"]["height_m"] = rim
-        (case,) = load_cases(write_study(small))
+        case = made()
         if rim > bed.top_m:
             filling_scene(case)
     with pytest.raises(InputError, match="more particles than fit") as caught:
@@ -355,10 +353,10 @@ def test_a_bed_that_may_reach_above_the_rim_is_refused(
     most = re.match(r"(\d+) particles", caught.value.limit or "")
     assert most
     small["media"]["count"] = int(most[1])
-    filling_scene(load_cases(write_study(small))[0])
+    filling_scene(made())
     small["media"]["count"] = int(most[1]) + 1
     with pytest.raises(InputError, match="more particles than fit"):
-        filling_scene(load_cases(write_study(small))[0])
+        filling_scene(made())
 
 
 @pytest.mark.parametrize(("height_m", "refused"), [(0.1, False), (0.1001, True), (9.0, True)])

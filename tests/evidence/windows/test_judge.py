@@ -15,10 +15,9 @@ from evidence.__main__ import main
 
 
 @pytest.fixture
-def kinds(project: Project, monkeypatch: pytest.MonkeyPatch) -> Project:
-    monkeypatch.chdir(project.root)
+def kinds(inside: Project) -> Project:
     assert main(["write-kinds"]) == 0
-    return project
+    return inside
 
 
 @pytest.mark.parametrize("kind", ["circle", "carousel", "clumps", "waypoints", "submerged"])
