@@ -13,14 +13,13 @@ import numpy as np
 import pytest
 from made_scenes import own_template, rendered
 from made_study import Made
+from placed_spheres import frames_of
 from scipy.optimize import brentq
 
-from dragchain.run.run_parts import iter_frames
 from dragdeck.arrays import Floats
 from dragdeck.cases.case import Case
 from dragdeck.decks import DECK_FILE
-from dragdeck.decks.outputs import load_outputs
-from dragdeck.decks.render import deck_text, of_its_templates, write_run
+from dragdeck.decks.render import deck_text, of_its_templates
 from dragdeck.decks.templates import environment
 from dragdeck.engine.log import engine_errors
 from dragdeck.engine.process import command, execute, find_engine
@@ -47,7 +46,7 @@ from dragdeck.study.contact_law import (
 )
 from dragdeck.study.model import Study
 from dragdeck.study.workpiece import Material
-from evidence.verification.experiment import ExactPlane, PlacedSphere, collide_scene, experiment
+from evidence.verification.experiment import PlacedSphere
 
 OPTIONAL = [name for name, row in coefficients().items() if row.model]
 USED = 0.1
@@ -266,26 +265,17 @@ def test_only_epsd_has_damping_of_rolling_and_needs_it(
     [("epsd2", 0.0, 0.0, 1e-8), ("cdt", 0.0, 1e-8, 1e-5), ("epsd", 0.3, 1e-6, 1e-3)],
 )
 def test_a_rolling_particle_slows_down_by_five_sevenths_of_the_coefficient(
-    model: RollingModel, damping: float, slowest: float, fastest: float, tmp_path: Path,
-    project: Project,
-) -> None:  # fmt: skip
+    model: RollingModel, damping: float, slowest: float, fastest: float, tmp_path: Path
+) -> None:
     """Rolling without sliding under a torque mu_r R m g: 7/5 m a = mu_r m g; then it rests."""
     mu, radius, speed, gravity, step = 0.02, 0.003, 0.02, 9.81, 5e-6
     steel = Material(youngs_modulus_pa=1e8, poissons_ratio=0.3, density_kg_m3=7800)
     pair = Pair(restitution=0.5, friction=0.5, rolling_friction=mu, rolling_damping=damping)
     turning = PlacedSphere(1, radius, (0, 0, radius), (speed, 0, 0), (0, speed / radius, 0))
-    rolling = experiment(
-        "rolling", 1, "A rolling particle", [],
-        types=[("particle", steel), ("plane", steel)], pairs={(1, 2): pair}, bodies=[turning],
-        walls=[ExactPlane("floor", 2, "zplane 0.0")], timestep_s=step, series="", vary="",
-        contacts=[],
-        gravity_m_s2=(0, 0, -gravity), steps_per_contact=1, steps=50_000, period=1000,
-        rolling_model=model,
+    frames = frames_of(
+        tmp_path / "rolling", steel, {(1, 2): pair}, [turning], gravity_m_s2=(0, 0, -gravity),
+        timestep_s=step, steps=50_000, period=1000, rolling_model=model,
     )  # fmt: skip
-    folder = tmp_path / "rolling"
-    write_run(collide_scene(rolling), folder, environment(project.templates))
-    assert run(folder, lambda line: None).state == "complete"
-    frames = iter_frames(folder, load_outputs(folder)["bodies"])
     rows = [(frame.step * step, abs(frame.columns["vx_m_s"][0])) for frame in frames]
     time, moving = np.array(rows).T
     rolls = (time > 0.02) & (moving > 0.1 * speed)
@@ -345,7 +335,7 @@ def test_a_strong_tension_of_any_pair_is_told(
 @pytest.mark.parametrize("wall", [True, False], ids=["wall", "pair"])
 @pytest.mark.parametrize("share", [0.97, 1.03])
 def test_a_cohesive_contact_opens_at_its_tension(
-    share: float, wall: bool, name: str, tmp_path: Path, project: Project
+    share: float, wall: bool, name: str, tmp_path: Path
 ) -> None:
     """A hanging particle, alone or below another one, stays up to the largest tension."""
     radius, density = 0.003, 2500.0
@@ -379,19 +369,11 @@ def test_a_cohesive_contact_opens_at_its_tension(
     place = above + distance - overlap
     places = [place] if wall else [above - radius, place - radius]
     bodies = [PlacedSphere(1, radius, (0, 0, z)) for z in places]
-    scene = collide_scene(
-        experiment(
-            "hanging", 1, "A hanging particle", [], types=[("particle", glass), ("plane", glass)],
-            pairs={(1, 1): weaker, (1, 2): weaker if wall else stronger}, bodies=bodies,
-            walls=[ExactPlane("ceiling", 2, "zplane 0.0")], timestep_s=1e-6, series="", vary="",
-            contacts=[], gravity_m_s2=(0, 0, pull / mass), steps_per_contact=1, steps=60_000,
-            period=20_000,
-        )
+    pairs = {(1, 1): weaker, (1, 2): weaker if wall else stronger}
+    frames = frames_of(
+        tmp_path / "hanging", glass, pairs, bodies, gravity_m_s2=(0, 0, pull / mass),
+        timestep_s=1e-6, steps=60_000, period=20_000,
     )  # fmt: skip
-    folder = tmp_path / "hanging"
-    write_run(scene, folder, environment(project.templates))
-    assert run(folder, lambda line: None).state == "complete"
-    frames = list(iter_frames(folder, load_outputs(folder)["bodies"]))
     moved = frames[-1].columns["z_m"].max() - places[-1]
     assert (moved < 0.01 * radius) == (share < 1), (
         f"{name}: `attraction` in study/contact_law.py differs from the force of LIGGGHTS's model"
