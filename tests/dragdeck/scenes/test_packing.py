@@ -12,18 +12,6 @@ from dragdeck.physics.walls import round_container
 from dragdeck.study.media import quantiles
 
 
-@given(count=st.integers(2, 5000), mean=st.floats(1e-4, 1e-1), spread=st.floats(0.001, 0.3))
-def test_mean_and_spread_are_exact(count: int, mean: float, spread: float) -> None:
-    found = quantiles("normal", mean, spread * mean, count)
-    assert found.mean() == pytest.approx(mean, rel=1e-12)
-    assert found.std() == pytest.approx(spread * mean, rel=1e-9)
-    assert found.min() > 0
-
-
-def test_no_spread_means_equal_particles() -> None:
-    assert set(quantiles("normal", 2e-3, 0.0, 7)) == {2e-3}
-
-
 @settings(max_examples=25)
 @given(
     count=st.integers(1, 600),

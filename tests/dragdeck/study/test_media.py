@@ -10,6 +10,8 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
+from hypothesis import example, given
+from hypothesis import strategies as st
 from made_scenes import rendered
 from made_study import Made
 from paths import ROOT
@@ -46,14 +48,15 @@ SIEVE = [[2e-3, 0.0], [4e-3, 0.3], [5e-3, 0.9], [8e-3, 1.0]]
 
 
 @pytest.mark.parametrize("distribution", ["normal", "log_normal", "uniform"])
-@pytest.mark.parametrize("spread", [0.0, 0.05, 0.3])
-def test_mean_and_spread_come_out_as_asked(distribution: str, spread: float) -> None:
-    grains = Grains.model_validate(
-        {"radius_mean_m": 3e-3, "radius_std_m": spread * 3e-3, "distribution": distribution}
-    )
-    radii = grains.radii(500)
-    assert radii.mean() == pytest.approx(3e-3, rel=1e-12)
-    assert radii.std() == pytest.approx(spread * 3e-3, rel=1e-9, abs=1e-15)
+@given(count=st.integers(2, 5000), mean=st.floats(1e-4, 1e-1), spread=st.floats(0.0, 0.3))
+@example(count=500, mean=3e-3, spread=0.0)
+def test_mean_and_spread_come_out_as_asked(
+    distribution: str, count: int, mean: float, spread: float
+) -> None:
+    sizes = {"radius_mean_m": mean, "radius_std_m": spread * mean, "distribution": distribution}
+    radii = Grains.model_validate(sizes).radii(count)
+    assert radii.mean() == pytest.approx(mean, rel=1e-12)
+    assert radii.std() == pytest.approx(spread * mean, rel=1e-9, abs=1e-12 * mean)
     assert (np.diff(radii) >= 0).all() and radii[0] > 0
 
 
