@@ -20,60 +20,25 @@ from dragdeck.records.run import (
     SteadyCriterion,
 )
 
-COLUMNS = ["a_id", "force_n"]
 PRINT = output_of_run("force", "print", ["step", "force_n"], 1, 0, None)
-LOCAL = output_of_run("contacts", "local", COLUMNS, 1, 0, None)
-CUSTOM = output_of_run("particles", "custom", COLUMNS, 1, 0, None, binary=True)
-
-
-def text_frame(step: int, rows: list[list[float]]) -> bytes:
-    return Raw.text(step, rows, COLUMNS, "local")
-
-
-def binary_frame(step: int, rows: list[list[float]], ranks: int) -> bytes:
-    return Raw.binary(step, rows, len(COLUMNS), ranks)
 
 
 @pytest.mark.parametrize(
-    ("output", "content", "step"),
-    [
-        (PRINT, b"step force_n\n10 1.5\n20 1.6\n", 20),
-        (PRINT, b"step force_n\n10 1.5\n20 1", None),
-        (PRINT, b"step force_n\n10 1.5\n20\n", None),
-        (PRINT, b"step force_n\n", None),
-        (LOCAL, text_frame(5, [[1, 2]]) + text_frame(9, [[1, 2], [3, 4]]), 9),
-        (LOCAL, text_frame(7, []), 7),
-        (LOCAL, text_frame(9, [[1, 2], [3, 4]])[:-4], None),
-        (LOCAL, text_frame(9, [[1, 2], [3, 4]])[:-5], None),
-        (LOCAL, b"", None),
-        (CUSTOM, binary_frame(3, [[1, 2]], 2) + binary_frame(6, [[1, 2], [3, 4]], 1), 6),
-        (CUSTOM, binary_frame(3, [], 1), 3),
-        (CUSTOM, binary_frame(3, [[1, 2]], 1)[:-1], None),
-        (CUSTOM, (binary_frame(3, [[1, 2]], 1) * 2)[:-70], None),
-        (CUSTOM, b"", None),
-    ],
+    ("rows", "step"),
+    [("10 1.5\n20 1.6\n", 20), ("10 1.5\n20 1", None), ("10 1.5\n20\n", None), ("", None)],
 )
-def test_the_last_frame_counts_only_if_whole(
-    tmp_path: Path, output: OutputOfRun, content: bytes, step: int | None
-) -> None:
+def test_the_last_row_counts_only_if_whole(tmp_path: Path, rows: str, step: int | None) -> None:
+    """Frames of dumps are those of the reader: test_completeness."""
     file = tmp_path / "output"
-    file.write_bytes(content)
-    frames = whole_frames(file, output)
+    file.write_text(f"step force_n\n{rows}")
+    frames = whole_frames(file, PRINT)
     assert (frames.steps[-1] if frames.steps and not frames.problem else None) == step
 
 
 INPUTS = CaseFile(
-    study_name="any",
-    title="",
-    scene="process",
-    run="a",
-    timestep_s=1e-6,
-    rayleigh_time_s=1e-5,
-    versions={},
-    fidelity=RanksOfRun(ranks=1),
-    media=CountOfRun(count=2),
-    files={},
-)
+    study_name="any", title="", scene="process", run="a", timestep_s=1e-6, rayleigh_time_s=1e-5,
+    versions={}, fidelity=RanksOfRun(ranks=1), media=CountOfRun(count=2), files={},
+)  # fmt: skip
 HEAD = "step time_s n_particles kinetic_energy_j rotational_energy_j fastest_particle_m_s\n"
 THERMO = output_of_run("thermo", "print", HEAD.split(), 10, 10, 20, pattern="thermo.{part}.txt")
 GRID = "  1 by 1 by 1 MPI processor grid\n"
@@ -81,12 +46,9 @@ GOOD = HEAD + "10 0.1 2 1e-9 0 0.1\n20 0.2 2 1e-9 0 0.1\n"
 
 
 def failed(
-    folder: Path,
-    inputs: CaseFile,
-    status: int = 0,
-    begins: Sequence[int] = (0,),
+    folder: Path, inputs: CaseFile, status: int = 0, begins: Sequence[int] = (0,),
     thermo: OutputOfRun = THERMO,
-) -> set[str]:
+) -> set[str]:  # fmt: skip
     """Codes of the checks that did not pass, of parts that begin at some steps."""
     parts = [RunPart(part=k + 1, checkpoint=None, from_step=step) for k, step in enumerate(begins)]
     checks = check_run(folder, inputs, {"thermo": thermo}, status, parts, ranks=1)
