@@ -20,7 +20,6 @@ from dragdeck.mesh.files import stl_text
 from dragdeck.mesh.surface import open_edges, raised, surface, weld
 from dragdeck.physics import facets
 from dragdeck.physics.contact_network import touching
-from dragdeck.physics.domain_split import FilledBowl, split
 from dragdeck.physics.walls import Container
 from dragdeck.preview.layout import layout
 from dragdeck.project import Project
@@ -143,13 +142,6 @@ def test_contacts_are_with_the_nearest_facet() -> None:
     assert bodies.tolist() == [[0, 1], [3, 3]]
     assert overlap == pytest.approx([1e-4, 2e-4], abs=1e-9)
     assert normal == pytest.approx(np.array([[0, 0, -1], [0, 1, 0]]), abs=1e-9)
-
-
-def test_ranks_share_the_whole_section() -> None:
-    inside = container()
-    x, y = (half + 0.004 for half in inside.half_widths_m)
-    filled = FilledBowl(1000, inside, 0.03, (x, y), -0.003, 0.2, 0.0)
-    assert sum(split(4, filled).particles) == pytest.approx(1000, rel=0.01)
 
 
 def test_particles_start_above_the_rim_within_it(made: Made) -> None:
