@@ -20,14 +20,8 @@ from dragdeck.records.run import RunRecord
 from dragdeck.scenes.filling import FILLING, filling_scene
 from dragdeck.scenes.process import process_scene
 
-COLUMNS = [
-    "step",
-    "time_s",
-    "n_particles",
-    "kinetic_energy_j",
-    "rotational_energy_j",
-    "fastest_particle_m_s",
-]
+COLUMNS = ["step", "time_s", "n_particles"]
+COLUMNS += ["kinetic_energy_j", "rotational_energy_j", "fastest_particle_m_s"]
 LIMITS = run_limits(particles=10, mass_kg=1e-3, gravity_m_s2=10.0, height_m=0.5, speed_m_s=2.0)
 
 
