@@ -474,14 +474,8 @@ run 0
 def engine_reads(mesh: Trimesh, folder: Path) -> tuple[bool, str]:
     (folder / "workpiece.stl").write_text(files.stl_text(mesh))
     (folder / "in.liggghts").write_text(DECK)
-    done = subprocess.run(
-        [find_engine().path, "-in", "in.liggghts"],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        encoding="utf-8",
-        errors="replace",
-    )
+    words = [find_engine().path, "-in", "in.liggghts"]
+    done = subprocess.run(words, cwd=folder, capture_output=True, text=True, errors="replace")
     return done.returncode == 0, done.stdout + done.stderr
 
 
