@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from dragdeck.physics.contact_mechanics import ContactConstants, sphere_mass
-from dragdeck.physics.contact_network import largest_eigenvalue, touching
-from dragdeck.physics.walls import round_container
+from dragdeck.physics.contact_network import largest_eigenvalue
 from dragdeck.records.bed import MediaOfRun
 from dragdeck.records.case import CaseOfRun
 from evidence.stability.network import (
@@ -42,12 +41,8 @@ def one_on_a_plane(partner: int, overlap_m: Sequence[float]) -> float:
     media = MediaOfRun(count=1, radius_mean_m=1e-3, radius_std_m=0.0, density_kg_m3=2500.0)
     case = CaseOfRun.model_construct(contact_moduli=moduli, media=media)
     count = len(overlap_m)
-    plane = Contacts(
-        bodies=np.repeat([[0], [1]], count, axis=1),
-        normal=np.array([[0.0, 0.0, -1.0]] * count).reshape(-1, 3),
-        overlap_m=np.array(overlap_m),
-        partner=np.full(count, partner),
-    )
+    bodies, normal = np.repeat([[0], [1]], count, axis=1), np.tile([0.0, 0.0, -1.0], (count, 1))
+    plane = Contacts(bodies, normal, np.array(overlap_m), np.full(count, partner))
     return network_frequency(case, False, np.array([1e-3]), plane)
 
 
@@ -87,12 +82,3 @@ def test_the_critical_step_of_central_differences_with_lagging_damping() -> None
     limit = critical_step(omega) * damped_fraction(restitution)
     assert not grows(0.99 * limit)
     assert grows(1.01 * limit)
-
-
-def test_particles_that_touch_are_found_with_their_overlaps() -> None:
-    centre = np.array([[0.0, 0.0, 0.9], [1.9, 0.0, 1.0], [1.9, 0.0, 3.1]])
-    bodies, _, overlap = touching(centre, np.ones(3), round_container(2.7).walls)
-    rows = sorted(zip(*bodies.tolist(), overlap.tolist(), strict=True))
-    assert [row[:2] for row in rows] == [(0, 1), (0, 3), (1, 3), (2, 3)]
-    gap = math.hypot(1.9, 0.1)
-    assert [row[2] for row in rows] == pytest.approx([2 - gap, 0.1, 0.2, 0.2])
