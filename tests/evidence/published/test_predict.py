@@ -93,12 +93,9 @@ def test_planted_values_are_predicted(runs: pd.DataFrame, quantity: str, planted
     ],
 )
 def test_verdicts(kind: str, published: float, low: float, high: float, verdict: str) -> None:
-    middle = (low + high) / 2
-    predicted = pd.DataFrame(
-        {"quantity": ["a"], "predicted": [middle], "low": [low], "high": [high]}
-    )
-    known = pd.DataFrame({"quantity": ["a"], "published": [published], "kind": [kind]})
-    assert list(compare(predicted, known).verdict) == [verdict]
+    row = {"quantity": "a", "predicted": (low + high) / 2, "low": low, "high": high}
+    known = pd.DataFrame([{"quantity": "a", "published": published, "kind": kind}])
+    assert list(compare(pd.DataFrame([row]), known).verdict) == [verdict]
 
 
 def test_a_result_has_the_verdicts_of_its_quantities(tmp_path: Path) -> None:
