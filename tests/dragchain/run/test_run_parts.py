@@ -110,25 +110,21 @@ def test_a_part_without_a_whole_frame_does_not_matter_if_covered(tmp_path: Path,
     assert steps_of(iter_frames(tmp_path, PARTICLES)) == [0, 10, 20]
 
 
-def test_a_cut_frame_that_no_later_part_covers_is_an_error(tmp_path: Path, raw) -> None:
-    (tmp_path / "particles.1").write_bytes(binary_file(raw, [0, 10])[:-4])
-    (tmp_path / "particles.2").write_bytes(binary_file(raw, [20]))
+@pytest.mark.parametrize(
+    ("cut", "parts", "whole"), [(1, ([0, 10], [20]), [0]), (2, ([0, 10], [10, 20]), [0, 10])]
+)
+def test_a_cut_frame_that_no_later_part_covers_is_an_error(
+    tmp_path: Path, raw, cut: int, parts, whole
+) -> None:
+    for number, steps in enumerate(parts, 1):
+        content = binary_file(raw, steps)
+        (tmp_path / f"particles.{number}").write_bytes(content[:-1] if number == cut else content)
     frames = iter_frames(tmp_path, PARTICLES)
-    assert next(frames).step == 0
+    assert steps_of([next(frames) for _ in whole]) == whole
     with pytest.raises(TruncatedDumpError) as caught:
         next(frames)
-    assert (caught.value.file.name, caught.value.frame) == ("particles.1", 1)
-
-
-def test_a_cut_frame_in_the_last_part_is_an_error(tmp_path: Path, raw) -> None:
-    (tmp_path / "particles.1").write_bytes(binary_file(raw, [0, 10]))
-    (tmp_path / "particles.2").write_bytes(binary_file(raw, [10, 20])[:-1])
-    frames = iter_frames(tmp_path, PARTICLES)
-    assert steps_of([next(frames), next(frames)]) == [0, 10]
-    with pytest.raises(TruncatedDumpError) as caught:
-        next(frames)
-    assert (caught.value.file.name, caught.value.frame) == ("particles.2", 1)
-    assert caught.value.offset == len(binary_file(raw, [10]))
+    assert (caught.value.file.name, caught.value.frame) == (f"particles.{cut}", 1)
+    assert caught.value.offset == len(binary_file(raw, parts[cut - 1][:1]))
 
 
 @pytest.mark.parametrize(
