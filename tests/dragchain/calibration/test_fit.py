@@ -52,12 +52,8 @@ def test_speeds_and_times_at_the_surface_follow_from_free_flight() -> None:
 
 
 def test_a_window_that_cuts_an_impact_is_refused() -> None:
-    window = {
-        "time_s": np.arange(5.0),
-        "z_m": np.full(5, 0.0029),
-        "vz_m_s": np.zeros(5),
-        "force_n": np.ones(5),
-    }
+    window = {"time_s": np.arange(5.0), "z_m": np.full(5, 0.0029)}
+    window |= {"vz_m_s": np.zeros(5), "force_n": np.ones(5)}
     with pytest.raises(TableError, match="not entirely within"):
         waveform(window, 0.003, G)
 

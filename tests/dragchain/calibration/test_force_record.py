@@ -33,15 +33,9 @@ def half_sines(time_s: Floats, power: float = 1.0, starts_s: Sequence[float] = S
 
 
 def samples(
-    rate_hz: float = 500e3,
-    *,
-    noise_n: float = 0.05,
-    offset_n: float = 0.0,
-    drift_n_per_s: float = 0.0,
-    power: float = 1.0,
-    phase: float = 0.3,
-    seed: int = 1,
-) -> tuple[Floats, Floats]:
+    rate_hz: float = 500e3, *, noise_n: float = 0.05, offset_n: float = 0.0,
+    drift_n_per_s: float = 0.0, power: float = 1.0, phase: float = 0.3, seed: int = 1,
+) -> tuple[Floats, Floats]:  # fmt: skip
     time = (np.arange(int(0.15 * rate_hz)) + phase) / rate_hz
     noise = np.random.default_rng(seed).normal(0.0, noise_n, len(time))
     return time, half_sines(time, power) + offset_n + drift_n_per_s * time + noise

@@ -2,7 +2,7 @@
 
 import math
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
@@ -36,16 +36,13 @@ def run(factor: float, seed: int = 1, relative: float = 0.05, **more: Any) -> Ru
     media = SimpleNamespace(typical_radius_m=1e-3 * factor, fill_height_m=0.05, mass_kg=None)
     inputs = {"media.radius_mean_m": 1e-3 * factor, "seed": seed, "reduction.coarser": factor,
               "bowl.radius_m": 0.05, **more}  # fmt: skip
-    study = SimpleNamespace(
-        reduction=SimpleNamespace(coarser=factor), media=media, inputs=lambda: inputs
-    )
-    fidelity = SimpleNamespace(
-        youngs_modulus_scale=1e-3, timestep_fraction=0.6, speed_factor=1.0, skin_m=1e-4 * factor
-    )
-    made = SimpleNamespace(
-        study=study, run=f"{factor}-{seed}", values_of_run=estimates, fidelity=fidelity
-    )
-    return cast("RunQuantities", made)
+    reduction = SimpleNamespace(coarser=factor)
+    study = SimpleNamespace(reduction=reduction, media=media, inputs=lambda: inputs)
+    fidelity = {"youngs_modulus_scale": 1e-3, "timestep_fraction": 0.6, "speed_factor": 1.0}
+    return RunQuantities.model_construct(
+        study=study, run=f"{factor}-{seed}", values_of_run=estimates,
+        fidelity=SimpleNamespace(**fidelity, skin_m=1e-4 * factor),
+    )  # fmt: skip
 
 
 def by_name(rows: list[Extrapolation]) -> dict[str, Extrapolation]:

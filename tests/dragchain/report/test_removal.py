@@ -206,14 +206,10 @@ def slide_per_m(run: Path) -> float:
 
 
 def report(
-    tmp_path: Path,
-    removal: dict[str, Any],
-    seeds: int = 1,
-    wear: bool = True,
-    corrected: float | None = None,
-    told: dict[str, Any] | None = None,
+    tmp_path: Path, removal: dict[str, Any], seeds: int = 1, wear: bool = True,
+    corrected: float | None = None, told: dict[str, Any] | None = None,
     roughness: dict[str, Any] | None = None,
-) -> Path:
+) -> Path:  # fmt: skip
     """The report on runs whose contacts are those made by hand, 50 % more with each seed."""
     runs = []
     for seed in range(seeds):

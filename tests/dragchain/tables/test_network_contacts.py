@@ -16,14 +16,9 @@ CALM = [0.0] * 6
 
 
 def rows_of(particles, contacts=(), workpiece=None, bowl=None, radius=10.0, friction=10.0):
-    return contact_rows(
-        frame(PARTICLES, particles),
-        frame(CONTACTS, contacts),
-        workpiece or wall(),
-        bowl or wall(),
-        round_container(radius).walls,
-        FrictionLimit(friction, wall=False),
-    )
+    frames = frame(PARTICLES, particles), frame(CONTACTS, contacts)
+    walls, limit = round_container(radius).walls, FrictionLimit(friction, wall=False)
+    return contact_rows(*frames, workpiece or wall(), bowl or wall(), walls, limit)
 
 
 def test_two_unequal_particles_along_x() -> None:

@@ -126,16 +126,9 @@ def test_the_contacts_of_a_frame_are_the_chain_and_the_pile(tables) -> None:
     exact = [force, WEIGHT_N, force, 2 * WEIGHT_N, force]
     np.testing.assert_allclose(frame["normal_force_n"], exact, rtol=1e-8)
     np.testing.assert_allclose(frame["overlap_m"], np.array(exact) / 1e5, rtol=1e-6)
-    np.testing.assert_allclose(
-        frame["point_x_m"],
-        [
-            *(workpiece_x_m(60) + 0.005 + 2 * RADIUS_M - 1.5 * force / 100000.0, -0.01),
-            workpiece_x_m(60) + 0.005,
-            -0.01,
-            0.04 + 0.5 * force / 100000.0,
-        ],
-        rtol=1e-6,
-    )
+    front, overlap = workpiece_x_m(60) + 0.005, force / 1e5
+    points = [front + 2 * RADIUS_M - 1.5 * overlap, -0.01, front, -0.01, 0.04 + 0.5 * overlap]
+    np.testing.assert_allclose(frame["point_x_m"], points, rtol=1e-6)
 
 
 def test_forces_on_every_particle_of_a_frame_balance(tables) -> None:

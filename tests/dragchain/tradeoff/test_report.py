@@ -44,18 +44,9 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     costs = folder / "costs.json"
     costs.write_text(json.dumps({"schema": 2, "costs": COSTS}))
     arguments = ["step", "tradeoff", "--out", folder / "out", "--reference", files[0].parents[1]]
-    arguments += [
-        "--costs",
-        costs,
-        "--plan",
-        "long",
-        "--command",
-        "made",
-        "--drops",
-        *drops(folder / "drops"),
-        "--",
-    ]
-    assert dragchain([str(one) for one in [*arguments, *files]]) == 0
+    arguments += ["--costs", costs, "--plan", "long", "--command", "made"]
+    arguments += ["--drops", *drops(folder / "drops"), "--", *files]
+    assert dragchain([str(word) for word in arguments]) == 0
     return folder / "out"
 
 

@@ -64,12 +64,8 @@ def test_a_round_asks_for_the_windows_that_would_do_but_at_most_twice_as_many() 
 
 def test_the_last_window_is_the_last() -> None:
     found = judge([15.0, 19.0, 11.0], 0.01, most=3)
-    assert (
-        found.last
-        and not found.tolerance.reached
-        and found.wanted == 3
-        and found.tolerance.needed.packings > 1
-    )
+    assert found.last and not found.tolerance.reached
+    assert found.wanted == 3 and found.tolerance.needed.packings > 1
 
 
 def test_each_of_several_packings_may_be_further_off_than_their_mean() -> None:
@@ -146,14 +142,9 @@ def test_a_quantity_that_a_window_lacks_is_never_reached() -> None:
 
 
 def test_an_asked_quantity_that_the_run_lacks_is_never_reached() -> None:
-    every = windows([15.0, 15.0, 15.0])
-    found = judged(
-        SOFT, every, asked(0.5, 3, quantities=("workpiece_contacts", "drag_mean")), RECORD
-    )
-    assert not found.tolerance.reached and found.tolerance.asked == (
-        "workpiece_contacts",
-        "drag_mean",
-    )
+    quantities = ("workpiece_contacts", "drag_mean")
+    found = judged(SOFT, windows([15.0] * 3), asked(0.5, 3, quantities=quantities), RECORD)
+    assert not found.tolerance.reached and found.tolerance.asked == quantities
 
 
 def test_the_drag_fluctuates_between_windows_as_within_them() -> None:
