@@ -9,14 +9,9 @@ from dragdeck.mesh.surface import surface
 
 
 def twisted_blade(
-    chord: float = 0.012,
-    thickness: float = 0.0015,
-    length: float = 0.045,
-    twist_deg: float = 60.0,
-    across: int = 8,
-    rings: int = 20,
-    cell_skew: float = 0.45,
-) -> Trimesh:
+    chord: float = 0.012, thickness: float = 0.0015, length: float = 0.045, twist_deg: float = 60.0,
+    across: int = 8, rings: int = 20, cell_skew: float = 0.45,
+) -> Trimesh:  # fmt: skip
     """A closed blade along z, its lowest point in the origin: two arcs meet in two sharp edges.
 
     Every second column of nodes is shifted along z by `cell_skew` of the distance of two rings,

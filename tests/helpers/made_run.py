@@ -183,11 +183,9 @@ def particles_kept(seen: int) -> dict[str, Any]:
 
 
 def write_documents(
-    folder: Path,
-    case: dict[str, Any],
-    outputs: dict[str, Any] | None = None,
+    folder: Path, case: dict[str, Any], outputs: dict[str, Any] | None = None,
     record: dict[str, Any] | None = None,
-) -> Path:
+) -> Path:  # fmt: skip
     """Write ``case.json``, ``columns.json`` and ``run.json`` of a run, and make its folder."""
     (folder / "tables").mkdir(parents=True, exist_ok=True)
     (folder / "case.json").write_text(json.dumps(case))

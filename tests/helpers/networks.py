@@ -74,11 +74,9 @@ R = 0.003
 
 
 def make_frame(
-    centres: dict[int, tuple[float, float, float]],
-    contacts: list[tuple[int, int, float]],
-    direction_rad: float = 0.0,
-    walls: dict[int, tuple[float, float, float]] | None = None,
-) -> NetworkFrame:
+    centres: dict[int, tuple[float, float, float]], contacts: list[tuple[int, int, float]],
+    direction_rad: float = 0.0, walls: dict[int, tuple[float, float, float]] | None = None,
+) -> NetworkFrame:  # fmt: skip
     """Build a frame of particles of radius R from (particle, other, normal force) rows.
 
     Forces between particles act along the line of centres; those of walls along the direction in

@@ -22,14 +22,9 @@ def rebound(deck: float, bias: float) -> float:
 
 
 def paper_drop(
-    deck: float,
-    *,
-    bias: float = 0.0,
-    height: float = HEIGHT,
-    purpose: DropPurpose = "reference",
-    contact_s: float = 25e-6,
-    jitter: float = 0.0,
-) -> DropRun:
+    deck: float, *, bias: float = 0.0, height: float = HEIGHT, purpose: DropPurpose = "reference",
+    contact_s: float = 25e-6, jitter: float = 0.0,
+) -> DropRun:  # fmt: skip
     """A drop by the laws of free flight; contacts are sin^1.5, peaks go with v^1.2."""
     e = rebound(deck, bias) + jitter
     speeds = math.sqrt(2 * G * height) * e ** np.arange(4)
@@ -55,27 +50,12 @@ def paper_drops(
     runs = []
     for deck in np.round(np.arange(0.4, 1.001, 0.05), 2).tolist():
         runs.append(paper_drop(deck))
-        runs += [
-            paper_drop(
-                deck,
-                bias=bias,
-                purpose="production",
-                contact_s=150e-6,
-                jitter=float(random.normal(0, jitter)),
-            )
-            for _ in range(2)
-        ]
+        for off in random.normal(0, jitter, 2).tolist():
+            soft = {"purpose": "production", "contact_s": 150e-6}
+            runs.append(paper_drop(deck, bias=bias, jitter=off, **soft))
     known = DropTestOfStudy(
-        study="paper",
-        title="on paper",
-        pair="a-b",
-        fidelity="quick",
-        record="record.csv",
-        height_m=HEIGHT,
-        height_std_m=height_std,
-        peaks=peaks,
-        gravity_m_s2=G,
-        limit_force=True,
+        study="paper", title="on paper", pair="a-b", fidelity="quick", record="record.csv",
+        height_m=HEIGHT, height_std_m=height_std, peaks=peaks, gravity_m_s2=G, limit_force=True,
         restitution_now=0.7,
-    )
+    )  # fmt: skip
     return Drops(known, tuple(runs))

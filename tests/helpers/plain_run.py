@@ -373,14 +373,10 @@ def first_touches(run: PlainRun) -> tuple[pd.DataFrame, float]:
             if particle not in current:
                 slip, speed = run.slip(of_particle[int(np.argmax(forces))])
                 current[particle] = {
-                    "frame": number,
-                    "particle_id": particle,
-                    "radius_m": radius[particle],
-                    "touch_normal_m_s": speed,
-                    "touch_tangential_m_s": float(np.linalg.norm(slip)),
-                    "peak_normal_force_n": -math.inf,
-                    "duration_s": 0.0,
-                }
+                    "frame": number, "particle_id": particle, "radius_m": radius[particle],
+                    "touch_normal_m_s": speed, "touch_tangential_m_s": float(np.linalg.norm(slip)),
+                    "peak_normal_force_n": -math.inf, "duration_s": 0.0,
+                }  # fmt: skip
             event = current[particle]
             event["duration_s"] += run.dt
             event["peak_normal_force_n"] = max(event["peak_normal_force_n"], sum(forces))

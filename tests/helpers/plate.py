@@ -83,14 +83,9 @@ run {{ steps }}
 def engine(folder: Path, *, ranks: int = 1, part: int = 1, source: Path | None = None) -> None:
     """Run the input script of a folder as it stands, or go on from a checkpoint."""
     allowed = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
-    done = subprocess.run(
-        command(find_engine(), "in.liggghts", ranks, part, source),
-        cwd=folder,
-        env={**os.environ, **allowed},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    words = command(find_engine(), "in.liggghts", ranks, part, source)
+    environs = {**os.environ, **allowed}
+    done = subprocess.run(words, cwd=folder, env=environs, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr
 
 
@@ -104,17 +99,10 @@ MASS = DENSITY * 4 / 3 * np.pi * RADIUS**3
 
 
 def write_plate(
-    folder: Path,
-    motion: SuperposedMotion | None,
-    drag: Drive,
-    written: Sequence[Output],
-    *,
-    restitution: float = 0.5,
-    friction: float = FRICTION,
-    height_m: float | None = None,
-    velocity: Sequence[float] = (0, 0, 0),
-    gravity: float = GRAVITY,
-) -> dict[str, Any]:
+    folder: Path, motion: SuperposedMotion | None, drag: Drive, written: Sequence[Output], *,
+    restitution: float = 0.5, friction: float = FRICTION, height_m: float | None = None,
+    velocity: Sequence[float] = (0, 0, 0), gravity: float = GRAVITY,
+) -> dict[str, Any]:  # fmt: skip
     """Input script, columns, plate and a particle; content of ``case.json`` without the motion.
 
     The particle rests on the plate, unless its lowest point is at a height.

@@ -43,13 +43,10 @@ def random_scenes(draw: st.DrawFn) -> dict[str, Any]:
     if not circle:
         path = {"kind": "line", "start_m": [-reach * d, 0.0], "length_m": length}
     media, steel = (
-        {
-            "youngs_modulus_pa": draw(_between(1e9, 4e11)),
-            "poissons_ratio": draw(_linear(0.1, 0.4)),
-            "density_kg_m3": draw(_linear(1000, 8000)),
-        }
+        {"youngs_modulus_pa": draw(_between(1e9, 4e11)), "poissons_ratio": draw(_linear(0.1, 0.4)),
+         "density_kg_m3": draw(_linear(1000, 8000))}
         for _ in range(2)
-    )
+    )  # fmt: skip
     pairs = {
         pair: {"restitution": draw(_linear(0.3, 0.95)), "friction": draw(_linear(0.05, 0.8))}
         for pair in ("media-media", "media-steel")
@@ -59,30 +56,18 @@ def random_scenes(draw: st.DrawFn) -> dict[str, Any]:
         "title": "A random scene",
         "materials": {"media": media, "steel": steel},
         "pairs": pairs,
-        "media": {
-            "material": "media",
-            "count": count,
-            "radius_mean_m": d / 2,
-            "radius_std_m": draw(_linear(0, 0.1)) * d / 2,
-        },
+        "media": {"material": "media", "count": count, "radius_mean_m": d / 2,
+                  "radius_std_m": draw(_linear(0, 0.1)) * d / 2},
         "bowl": {"material": "steel", "radius_m": outer * d, "height_m": 1.5 * height * d},
         "workpiece": {
             "material": "steel",
             "shape": {"kind": "cylinder", "radius_m": thick * d / 2, "facet_size_m": thick * d / 4},
         },
-        "motion": {
-            "path": path,
-            "speed_m_s": speeds[0],
-            "immersion_depth_m": depth * d,
-            "plunge_speed_m_s": speeds[1],
-            "approach_speed_m_s": speeds[2],
-            "transient_m": 0.1 * length,
-        },
-        "outputs": {
-            "workpiece_force_hz": force_hz,
-            "workpiece_contacts_hz": force_hz / 5,
-            "network_hz": force_hz / 50,
-        },
+        "motion": {"path": path, "speed_m_s": speeds[0], "immersion_depth_m": depth * d,
+                   "plunge_speed_m_s": speeds[1], "approach_speed_m_s": speeds[2],
+                   "transient_m": 0.1 * length},
+        "outputs": {"workpiece_force_hz": force_hz, "workpiece_contacts_hz": force_hz / 5,
+                    "network_hz": force_hz / 50},
         "fidelity": {
             "tolerance": draw(st.sampled_from([0.03, 0.1, 0.15, 0.2, 0.4, 0.8])),
             "quantity": draw(
@@ -90,4 +75,4 @@ def random_scenes(draw: st.DrawFn) -> dict[str, Any]:
             ),
         },
         "seed": draw(st.integers(0, 2**32 - 1)),
-    }
+    }  # fmt: skip

@@ -32,12 +32,5 @@ def recording(heights: list[list[float]], **facts: Any) -> Recording:
         **facts,
     }  # fmt: skip
     velocity = np.gradient(place, axis=0) if len(z) > 1 else np.zeros_like(place)
-    return Recording(
-        CollideCase.model_validate(case),
-        np.arange(len(z), dtype=float),
-        place,
-        velocity,
-        still,
-        still,
-        {"plane": still},
-    )
+    moving = (np.arange(len(z), dtype=float), place, velocity, still, still)
+    return Recording(CollideCase.model_validate(case), *moving, {"plane": still})

@@ -21,14 +21,9 @@ PER_SOFTNESS = 0.1
 
 
 def made_run(
-    scene: int,
-    scale: float,
-    seed: int,
-    *,
-    per_softness: float = PER_SOFTNESS,
-    packing: float = 0.0,
-    speed: float = 1.0,
-) -> SceneRun:
+    scene: int, scale: float, seed: int, *, per_softness: float = PER_SOFTNESS,
+    packing: float = 0.0, speed: float = 1.0,
+) -> SceneRun:  # fmt: skip
     """A run whose drag is 2 N at the physical modulus, and by the law of softness otherwise."""
     rng = np.random.default_rng([scene, seed, round(1 / scale)])
     kappa = 1e4 * (1 + scene)

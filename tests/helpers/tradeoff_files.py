@@ -18,17 +18,10 @@ from dragdeck.documents import SCHEMA
 
 BLOCK_M = 0.0065
 VALUES = {
-    "drag_mean": -2.6,
-    "drag_std": 0.4,
-    "lateral_mean": 0.1,
-    "vertical_mean": 0.7,
-    "workpiece_contacts": 30.0,
-    "contact_force_mean": 0.12,
-    "contact_force_p90": 0.35,
-    "coordination_number": 4.2,
-    "chain_count": 63.0,
-    "chain_length": 4.4,
-}
+    "drag_mean": -2.6, "drag_std": 0.4, "lateral_mean": 0.1, "vertical_mean": 0.7,
+    "workpiece_contacts": 30.0, "contact_force_mean": 0.12, "contact_force_p90": 0.35,
+    "coordination_number": 4.2, "chain_count": 63.0, "chain_length": 4.4,
+}  # fmt: skip
 """At the reference; the other quantities are 1."""
 
 Point = tuple[float, float, float]
@@ -37,18 +30,11 @@ Effects = Mapping[str, float]
 
 
 def measures(
-    point: Point,
-    seed: int,
-    rng: np.random.Generator,
-    *,
-    effects: Effects | None = None,
-    beds: Mapping[int, float] | None = None,
-    blocks: int = 8,
-    noise: float = 0.03,
-    cpu_time_s: float = 100.0,
-    failure: Sequence[Mapping[str, object]] = (),
+    point: Point, seed: int, rng: np.random.Generator, *, effects: Effects | None = None,
+    beds: Mapping[int, float] | None = None, blocks: int = 8, noise: float = 0.03,
+    cpu_time_s: float = 100.0, failure: Sequence[Mapping[str, object]] = (),
     study: Mapping[str, object] | None = None,
-) -> dict[str, Any]:
+) -> dict[str, Any]:  # fmt: skip
     """Content of ``quantities.json``; `noise` is the relative scatter of a block."""
     modulus, step, speed = point
     content: dict[str, Any] = {
