@@ -98,6 +98,13 @@ def test_a_reader_that_has_seen_enough_is_no_error() -> None:
     assert whole.wait() == 0
 
 
+def python(code: str, *arguments: str, **settings: str) -> subprocess.CompletedProcess[str]:
+    """A program that ended, with these words and environment."""
+    environs = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), **settings}
+    words = [sys.executable, "-c", code, *arguments]
+    return subprocess.run(words, capture_output=True, text=True, env=environs)
+
+
 PROGRAM = """
 import atexit, ctypes, sys
 from dragdeck.command_line import Command, Program
@@ -122,12 +129,8 @@ def test_settings_of_the_user_do_not_reach_figures(tmp_path: Path) -> None:
     (settings / "matplotlibrc").write_text("lines.linewidth: 7\n")
     code = PROGRAM.replace('return "done"', "import matplotlib.pyplot as plt; return plt.rcParams")
     code = code.replace("plt.rcParams", 'f"{plt.rcParams[how]}, {plt.get_backend()}"')
-    ended = subprocess.run(
-        [sys.executable, "-c", code, "command", "lines.linewidth"],
-        capture_output=True, text=True,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path),
-             "MPLBACKEND": "module://of_a_notebook", "MATPLOTLIBRC": str(settings)},
-    )  # fmt: skip
+    given = {"MPLBACKEND": "module://of_a_notebook", "MATPLOTLIBRC": str(settings)}
+    ended = python(code, "command", "lines.linewidth", **given)
     assert ended.stdout == "1.5, agg\nclosed\n", ended.stderr
 
 
@@ -142,9 +145,5 @@ def test_settings_of_the_user_do_not_reach_figures(tmp_path: Path) -> None:
 def test_a_library_that_aborts_at_the_end_costs_no_result(
     arguments: list[str], status: int, printed: str
 ) -> None:
-    ended = subprocess.run(
-        [sys.executable, "-c", PROGRAM, *arguments],
-        capture_output=True, text=True,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
-    )  # fmt: skip
+    ended = python(PROGRAM, *arguments)
     assert (ended.returncode, ended.stdout) == (status, printed), ended.stderr

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 import yaml
 from made_scenes import own_template
+from made_study import Load
 
 from dragchain.cli import PROGRAM as DRAGCHAIN
 from dragdeck.cases.case import Case
@@ -23,7 +24,6 @@ from dragdeck.scenes.drop_test import DROP_TEST
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import PROCESS
 from dragdeck.scenes.scene import SceneType
-from dragdeck.sweep.cases import load_cases
 from evidence.__main__ import PROGRAM as EVIDENCE
 
 pytestmark = pytest.mark.usefixtures("inside")
@@ -73,16 +73,11 @@ def test_bad_input_writes_nothing(
 
 @pytest.mark.parametrize("scene", [DROP_TEST, FILLING])
 def test_nothing_is_run_before_a_process_that_cannot_be(
-    scene: SceneType,
-    project: Project,
-    small: dict[str, Any],
-    write_study: Callable[..., Path],
-    capsys: pytest.CaptureFixture[str],
+    scene: SceneType, project: Project, load: Load, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The other cases of a sweep run, and what they share with one that cannot be."""
-    deep = {"motion.immersion_depth_m": [0.06, 0.07]}
-    for sweep, status in ((deep, 1), ({"motion.immersion_depth_m": [0.02, 0.07]}, 0)):
-        cases = load_cases(write_study({**small, "sweep": sweep}))
+    for depths, status in (([0.06, 0.07], 1), ([0.02, 0.07], 0)):
+        cases = load({"sweep": {"motion.immersion_depth_m": depths}})
         run = scene.run_id(cases[1])
         assert main(["step", "render", "small", scene.name, run]) == status
         assert project.run_folder(cases[1], scene).exists() == (status == 0)

@@ -47,11 +47,8 @@ def test_reads_text_by_its_header(tmp_path: Path, kind) -> None:
     assert as_lists(frames) == expected()
     assert list(frames[0].columns) == list(NAMES)
     assert [frame.opening for frame in frames] == [True, False, False, False]
-    assert {name: values.dtype for name, values in frames[1].columns.items()} == {
-        "id": np.int64,
-        "x": np.float64,
-        "c_f[1]": np.float64,
-    }
+    kinds = [values.dtype for values in frames[1].columns.values()]
+    assert kinds == [np.int64, np.float64, np.float64]
 
 
 @with_buffers

@@ -24,10 +24,8 @@ def measured(results: Path, name: str, particles: int, steps_per_s: float) -> No
 
 
 def test_without_a_measured_run_the_speed_is_assumed(case: Case, tmp_path: Path) -> None:
-    assert (
-        "assumed"
-        in expected_cost(FILLING, filling_scene(case), measured_speeds(tmp_path / "none")).source
-    )
+    speeds = measured_speeds(tmp_path / "none")
+    assert "assumed" in expected_cost(FILLING, filling_scene(case), speeds).source
 
 
 def test_runs_with_as_many_particles_count_alone(case: Case, tmp_path: Path) -> None:

@@ -31,13 +31,9 @@ from dragdeck.study.fidelity import Fidelity
 from dragdeck.sweep.cases import load_cases
 
 TABLE = RestitutionErrors(
-    steps_per_contact=(5.0, 50.0),
-    median=(1e-2, 1e-4),
-    ordinary_worst=(1e-1, 1e-3),
-    worst=(3e-1, 3e-3),
-    peak_force_worst=(1e-1, 1e-3),
-    runs=(9, 9),
-)
+    steps_per_contact=(5.0, 50.0), median=(1e-2, 1e-4), ordinary_worst=(1e-1, 1e-3),
+    worst=(3e-1, 3e-3), peak_force_worst=(1e-1, 1e-3), runs=(9, 9),
+)  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -58,35 +54,30 @@ def test_what_lies_outside_of_the_measured_range_is_said(case: Case) -> None:
 
 def test_unlike_bodies_are_looked_at_too(case: Case) -> None:
     pairs = {pair.bodies: pair for pair in outlook(case, PROCESS, 1e-5)}
-    assert set(pairs) == {"particle on particle", "particle on bowl", "particle on workpiece"}
-    smallest = rayleigh_time(particle_material(case.study), smallest_radius(case.study), 1e-3)
-    assert pairs["particle on workpiece"].limiting == "particle"
-    assert pairs["particle on workpiece"].rayleigh_fraction == pytest.approx(
-        1e-5 / smallest, rel=1e-12
+    assert len(pairs) == 3
+    like, bowl, workpiece = (
+        pairs[f"particle on {name}"] for name in ("particle", "bowl", "workpiece")
     )
+    smallest = rayleigh_time(particle_material(case.study), smallest_radius(case.study), 1e-3)
+    assert workpiece.limiting == "particle"
+    assert workpiece.rayleigh_fraction == pytest.approx(1e-5 / smallest, rel=1e-12)
     # Johnson 1985, eq. 11.24: a plane doubles m and R, and steel is stiffer
     ceramic, steel = (case.study.materials[name] for name in ("ceramic", "steel"))
     stiffer = effective_modulus(ceramic, steel) / effective_modulus(ceramic, ceramic)
-    ratio = (
-        pairs["particle on bowl"].steps_per_contact
-        / pairs["particle on particle"].steps_per_contact
-    )
+    ratio = bowl.steps_per_contact / like.steps_per_contact
     assert ratio == pytest.approx((2**2 / 2 / stiffer**2) ** 0.2, rel=1e-12)
 
 
 def test_the_body_with_the_smaller_rayleigh_time_limits(small: dict[str, Any], made: Made) -> None:
     """A stiff, light and thin workpiece is faster than a particle."""
-    small["workpiece"] = {
-        "material": "light",
-        "shape": {"kind": "cylinder", "radius_m": 0.0005, "facet_size_m": 0.0005},
-    }
+    shape = {"kind": "cylinder", "radius_m": 0.0005, "facet_size_m": 0.0005}
+    small["workpiece"] = {"material": "light", "shape": shape}
     small["materials"]["light"] = {
         "youngs_modulus_pa": 300e9, "poissons_ratio": 0.2, "density_kg_m3": 1000,
     }  # fmt: skip
     case = made({"pairs.ceramic-light": {"restitution": 0.6, "friction": 0.3}})
-    (workpiece,) = [
-        pair for pair in outlook(case, PROCESS, 1e-6) if pair.bodies == "particle on workpiece"
-    ]
+    pairs = {pair.bodies: pair for pair in outlook(case, PROCESS, 1e-6)}
+    workpiece = pairs["particle on workpiece"]
     known = rayleigh_time(case.study.materials["light"], workpiece_radius(case), 1e-3)
     assert workpiece.limiting == "workpiece"
     assert workpiece.rayleigh_fraction == pytest.approx(1e-6 / known, rel=1e-12)
@@ -118,9 +109,8 @@ def test_the_law_gives_the_numbers_of_a_scene_it_was_not_fitted_to(
 ) -> None:
     law = stable_step_law()
     kappa = scale ** (2 / 3) * describe(paper(scale, fraction))["stiffness_number"]
-    assert law.largest_fraction(kappa, 0.86, 0.15 / 3.27, number) == pytest.approx(
-        fraction, rel=0.15
-    )
+    largest = law.largest_fraction(kappa, 0.86, 0.15 / 3.27, number)
+    assert largest == pytest.approx(fraction, rel=0.15)
 
 
 @pytest.mark.parametrize(("scale", "fraction", "number"), MEASURED)
@@ -159,13 +149,10 @@ def test_a_filling_that_may_never_rest_is_told(
 
 def test_damping_softness_and_equal_radii_shorten_the_stable_step() -> None:
     law = StableStepLaw(stiffness=69, damping=46, spread=-1.3, scatter=0.04, largest=0.1, runs=1)
-    fractions = {
-        (kappa, e): law.largest_fraction(kappa, e, 0.05)
-        for kappa in (500, 50_000)
-        for e in (0.4, 0.95)
-    }
-    assert fractions[500, 0.4] < fractions[500, 0.95] < fractions[50_000, 0.95]
-    assert fractions[500, 0.4] < fractions[50_000, 0.4] < fractions[50_000, 0.95]
+    both, damped, softer, neither = (
+        law.largest_fraction(kappa, e, 0.05) for kappa in (500, 50_000) for e in (0.4, 0.95)
+    )
+    assert both < damped < neither and both < softer < neither
     assert law.largest_fraction(500, 0.95, 0.0) < law.largest_fraction(500, 0.95, 0.1)
 
 

@@ -96,13 +96,9 @@ def test_the_default_axis_names_no_new_run(dragged: Dragged) -> None:
         (
             {"file": "a.obj", "edge_facet_size_m": 0.001},
             "edge_facet_size_m",
-            "is a mesh: its sharp edges",
+            "is a mesh: its sharp",
         ),
-        (
-            {"file": "a.stp", "facet_size_m": 0.001, "edge_facet_size_m": 0.002},
-            "edge_facet_size_m",
-            "larger than the others",
-        ),
+        ({"file": "a.stp", "facet_size_m": 0.001, "edge_facet_size_m": 0.002}, "edge_", "larger"),
         ({"file": "a.stp", "facet_size_m": 1.5}, "facet_size_m", "1.5 mm"),
         ({"file": "a.stp", "facet_size_m": 0.002, "edge_facet_size_m": 1.5}, "edge_", "1.5 mm"),
         ({"axis": "z"}, "axis", "'+x', '-x'"),

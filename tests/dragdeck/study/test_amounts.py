@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import math
 import multiprocessing
 import os
 import resource
@@ -19,7 +20,7 @@ from dragdeck.checking import check_study
 from dragdeck.errors import DragdeckError, InputError
 from dragdeck.mesh.shapes import cylinder
 from dragdeck.project import Project
-from dragdeck.sweep.cases import settle_case
+from dragdeck.sweep.cases import load_cases, settle_case
 from dragdeck.sweep.plan import Plan, plan_points
 
 Small = dict[str, Any]
@@ -110,8 +111,7 @@ def _said(folder: Path, answer: Connection) -> None:
 def test_what_would_be_huge_is_refused_by_name(
     changes: Mapping[str, Any], field: str, said: str, small: Small, project: Project
 ) -> None:
-    media = changes.get("media", {})
-    if "classes" in media or "sieve" in media or "mass_kg" in media or "fill_height_m" in media:
+    if changes.get("media", {}).keys() & {"classes", "sieve", "mass_kg", "fill_height_m"}:
         small.pop("media")
     put(small, changes)
     (project.root / "studies/huge").mkdir()
@@ -132,9 +132,7 @@ def test_as_many_as_count_may_have_are_accepted_by_mass_and_height(
     small: Small, write_study: Write
 ) -> None:
     """The limit is that of `count`, whatever gives the number."""
-    from dragdeck.sweep.cases import load_cases
-
-    volume = 4 / 3 * 3.141592653589793 * 1e-9
+    volume = 4 / 3 * math.pi * 1e-9
     small["media"] = {"material": "ceramic", "radius_mean_m": 1e-3}
     small["bowl"] = {"material": "steel", "radius_m": 1.0, "height_m": 2.0}
     for number, accepted in ((3_990_000, True), (4_010_000, False)):
