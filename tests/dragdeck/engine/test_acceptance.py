@@ -21,17 +21,25 @@ from dragdeck.records.run import (
 )
 
 PRINT = output_of_run("force", "print", ["step", "force_n"], 1, 0, None)
+LOCAL = output_of_run("contacts", "local", ["a_id", "force_n"], 1, 0, None)
+TWO = b"".join(Raw.text(step, [[1, 2], [3, 4]], LOCAL.columns, "local") for step in (5, 9))
 
 
 @pytest.mark.parametrize(
-    ("rows", "step"),
-    [("10 1.5\n20 1.6\n", 20), ("10 1.5\n20 1", None), ("10 1.5\n20\n", None), ("", None)],
+    ("output", "content", "step"),
+    [
+        (PRINT, b"step force_n\n10 1.5\n20 1.6\n", 20),
+        *((PRINT, b"step force_n\n" + rows, None) for rows in (b"", b"10 1.5\n20 1", b"9 1\n10\n")),
+        *((LOCAL, TWO, 9), (LOCAL, TWO[:-4], None), (LOCAL, TWO[:-5], None), (LOCAL, b"", None)),
+    ],
 )
-def test_the_last_row_counts_only_if_whole(tmp_path: Path, rows: str, step: int | None) -> None:
-    """Frames of dumps are those of the reader: test_completeness."""
+def test_the_last_frame_counts_only_if_whole(
+    tmp_path: Path, output: OutputOfRun, content: bytes, step: int | None
+) -> None:
+    """Of binary dumps, too, as the reader has it: test_completeness."""
     file = tmp_path / "output"
-    file.write_text(f"step force_n\n{rows}")
-    frames = whole_frames(file, PRINT)
+    file.write_bytes(content)
+    frames = whole_frames(file, output)
     assert (frames.steps[-1] if frames.steps and not frames.problem else None) == step
 
 
