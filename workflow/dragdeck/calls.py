@@ -1,11 +1,13 @@
 """A call of Snakemake: its settings, the records of its rules, and errors that stop it."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 from uuid import uuid4
 
 from jsonschema import Draft202012Validator
+from snakemake.exceptions import IncompleteCheckpointException
 from snakemake_interface_common.exceptions import WorkflowError
 
 from dragdeck.errors import DragdeckError, choices
@@ -14,10 +16,10 @@ from dragdeck.files import file_checksum, write_text
 V = TypeVar("V")
 
 
-def or_stop(function: Callable[..., V], *arguments: object) -> V:
+def or_stop(function: Callable[..., V], *arguments: object, **options: object) -> V:
     """The value of a function; what is wrong with its input stops the workflow."""
     try:
-        return function(*arguments)
+        return function(*arguments, **options)
     except DragdeckError as error:
         _stop(error)
 
@@ -77,15 +79,17 @@ def add_records(rules: Iterable[Any], environment_file: str = "../envs/python.ya
         rule.set_log(f"{folder}/logs/{name}.log")
         rule.benchmark = f"{folder}/benchmarks/{name}.tsv"
         rule.conda_env = environment_file
-        rule.set_params(content=_content_of(list(rule.input), bool(rule.wildcard_names)))
+        rule.set_params(content=_content_of(list(rule.input)))
 
 
-def _content_of(inputs: Sequence[Any], of_runs: bool) -> Callable[[Any], str]:
+def _content_of(inputs: Sequence[Any]) -> Callable[[Any], str]:
     """Checksum of the project's own files among a rule's inputs: a restored file may be older."""
 
     def content(wildcards: Any) -> str:
-        given = [input_(wildcards) if callable(input_) else input_ for input_ in inputs
-                 if not (of_runs and callable(input_))]  # fmt: skip
+        given = []
+        for input_ in inputs:
+            with suppress(IncompleteCheckpointException):
+                given.append(input_(wildcards) if callable(input_) else input_)
         names = [name for item in given for name in ([item] if isinstance(item, str) else item)]
         paths = (Path(name) for name in names if not name.startswith(("results/", _HOMES)))
         return " ".join(file_checksum(file)[:12] for file in paths if file.is_file())

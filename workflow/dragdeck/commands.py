@@ -216,7 +216,7 @@ def render(
     project = projects.find_project(Path.cwd())
     kind = _scene_type(scene)
     points = project.points(study, plan) if plan else None
-    every = points.of(kind) if points else project.cases(study, fidelity)
+    every = points.of(kind) if points else project.cases(study, fidelity, failed=True)
     runs = projects.by_folder(with_leads(every) if kind.needs_bed else every, kind)
     if run not in runs:
         raise InputError(

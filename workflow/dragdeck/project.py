@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import TypeVar
 
 from dragdeck.advice.advise import resolve
 from dragdeck.cases.case import Case, digest, mesh_file, of_each_workpiece
@@ -17,12 +18,14 @@ from dragdeck.scenes.workpiece import workpiece_length
 from dragdeck.shipped import SHIPPED, own_or_shipped
 from dragdeck.study.base import NAME, NAME_LIMIT
 from dragdeck.study.check import validate
-from dragdeck.study.model import Scaling
+from dragdeck.study.model import Scaling, Study
 from dragdeck.study.search import RECORD as SEARCHED
 from dragdeck.study.workpiece import MeshShape
 from dragdeck.study.yaml import located, read_study, study_folders
 from dragdeck.sweep.cases import load_cases, searched_bounds, study_file
 from dragdeck.sweep.plan import Plan, Points, plan_points
+
+V = TypeVar("V")
 
 POINTS = "points"
 """Folder of the process runs of a plan."""
@@ -47,6 +50,13 @@ def run_path(study: str, place: str, run: str) -> str:
 
 RECORD = {place: "outcome.json" if place in OUTCOMES else "run.json" for place in PLACES}
 """How a run in each folder of runs ended."""
+
+ENDED = "ended.json"
+"""How a process run of a search ended, which goes on without those that fail."""
+
+RUNNERS = {f"run_{place}": (place, file) for place, file in RECORD.items()}
+RUNNERS["try_process"] = ("process", ENDED)
+"""The rules that call LIGGGHTS: the folder of its runs, and their record."""
 
 ENGINE_RUN = "[A-Za-z0-9._-]+-[0-9a-f]{8}"
 """A run of LIGGGHTS, as a pattern."""
@@ -87,9 +97,13 @@ class Project:
         return self.root / "studies"
 
     def cases(
-        self, study: str, fidelity: str | None = None, tradeoff: TradeoffRecord | None = None
+        self,
+        study: str,
+        fidelity: str | None = None,
+        tradeoff: TradeoffRecord | None = None,
+        failed: bool = False,
     ) -> list[Case]:
-        """The cases of a study, by its name.
+        """The cases of a study, by its name; if asked, with those of a search that failed.
 
         Raises
         ------
@@ -99,13 +113,27 @@ class Project:
         file = study_file(self.studies, study)
         try:
             found_by = partial(resolve, tradeoff=tradeoff)
-            cases = load_cases(file, fidelity, found_by, self.results(study) / SEARCHED)
+            cases = load_cases(file, fidelity, found_by, self.results(study) / SEARCHED, failed)
             check_search(file)
             for case in cases:
                 _check_timesteps(case)
         except InputError as error:
             raise located(error) from None
         return cases
+
+    def searched(self, study: str) -> Study:
+        """A study with a search.
+
+        Raises
+        ------
+        InputError
+            It has none, or cannot be used.
+        """
+        self.cases(study)
+        file = study_file(self.studies, study)
+        study_ = validate(read_study(file), file, whole=True)
+        _needed(study_.search, "search", file)
+        return study_
 
     def plan_file(self, plan: str) -> Path:
         """The file of a plan, which is known by its name or its path.
@@ -239,14 +267,18 @@ def scaling_of(case: Case) -> Scaling:
     InputError
         It asks for none.
     """
-    if case.study.scaling is None:
+    return _needed(case.study.scaling, "scaling", case.file)
+
+
+def _needed(block: V | None, field: str, file: Path) -> V:
+    if block is None:
         raise InputError(
             "a required key is missing",
-            file=case.file,
-            field="scaling",
-            remedy="name the field to fit a power law over, see docs/howto/sweep.md",
+            file=file,
+            field=field,
+            remedy="add this block: docs/howto/sweep.md",
         )
-    return case.study.scaling
+    return block
 
 
 def find_project(start: Path) -> Project:

@@ -4,14 +4,14 @@ Rules name patterns of paths by `of_run` and `tables_of`, and ask a `Workflow` f
 they pass as wildcards is anything with the attributes of `Wildcards`.
 """
 
-import json
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from functools import cache, partial
 from importlib.util import find_spec
+from itertools import chain
 from pathlib import Path
 from shlex import quote
-from typing import Any, Protocol
+from typing import Any, Protocol, Self
 
 from snakemake_interface_common.exceptions import WorkflowError
 
@@ -23,17 +23,11 @@ from dragdeck.decks.templates import environment, template_files
 from dragdeck.engine.status import other_engines
 from dragdeck.errors import InputError
 from dragdeck.outlook.runs import StudyRun, expected_runs
-from dragdeck.scenes.lead import (
-    FIRST_WINDOWS,
-    whole_drag,
-    whole_lengths,
-    windows_of,
-    with_lead,
-    with_leads,
-)
-from dragdeck.scenes.process import SCENES
+from dragdeck.scenes.lead import whole_drag, windows_of, with_lead, with_leads
+from dragdeck.scenes.process import PROCESS, SCENES
 from dragdeck.study.calibration import measurements
 from dragdeck.study.recorded import recorded_file
+from dragdeck.study.search import RECORD
 
 
 class Wildcards(Protocol):
@@ -41,12 +35,6 @@ class Wildcards(Protocol):
 
     study: str
     run: str
-
-
-class RoundOfRun(Wildcards, Protocol):
-    """What a rule knows of a round of windows of a run."""
-
-    round: str
 
 
 def _folder_of(package: str) -> Path:
@@ -75,8 +63,8 @@ class Workflow:
     project : Project
     study, fidelity, plan, validation : str
         Names; that of the fidelity is empty for the study's own.
-    judged : callable
-        The file of a round of windows of a run, once the round was judged.
+    made : callable
+        The file that a checkpoint makes, by its name and wildcards, once it was made.
 
     Raises
     ------
@@ -91,18 +79,35 @@ class Workflow:
         fidelity: str,
         plan: str,
         validation: str,
-        judged: Callable[[str, str, int], str],
+        made: Callable[..., str],
     ) -> None:
         or_stop(project.plan_file, plan)
         self.project, self.study, self.fidelity = project, study, fidelity
-        self.plan, self.validation, self.judged = plan, validation, judged
-        self.cases: list[Case] = or_stop(project.cases, study, fidelity or None)
+        self.plan, self.validation, self.made = plan, validation, made
+        self.read_cases()
         self.points_of = cache(partial(or_stop, project.points, study))
         self.points_by_run = cache(self._points_by_run)
+        self.templates_of = cache(self._templates_of)
+        self._others: dict[str, Self] = {}
+
+    def read_cases(self) -> None:
+        """Read the cases of the study; those of a search become more."""
+        read = partial(or_stop, self.project.cases, self.study, self.fidelity or None)
+        self.cases: list[Case] = read()
+        searched = (self.project.results(self.study) / RECORD).is_file()
+        self.tried: list[Case] = read(failed=True) if searched else self.cases
         self.runs_of = cache(self._runs_of)
         self.digest = cache(self._digest)
         self.packings_of = cache(self._packings_of)
-        self.templates_of = cache(self._templates_of)
+
+    def of(self, study: str) -> Self:
+        """The same with another study."""
+        if study == self.study:
+            return self
+        if study not in self._others:
+            others = (self.fidelity, self.plan, self.validation, self.made)
+            self._others[study] = type(self)(self.project, study, *others)
+        return self._others[study]
 
     # --- paths -----------------------------------------------------------------------------
 
@@ -134,6 +139,24 @@ class Workflow:
         """The tables of every run of the study's cases."""
         return self.every(place, *(f"tables/{name}" for name in projects.PLACES[place].tables))
 
+    @property
+    def report(self) -> list[str]:
+        """Paths of the report of the study; the last one marks that it is complete."""
+        names = ("report.html", "summary.csv", "summary.parquet", "summary.xlsx", "complete")
+        return [self.of_study("report", name) for name in names]
+
+    def of_report(self) -> list[str]:
+        """What the report of the study is made of."""
+        runs = [[*self.every(name, "run.json", "tables/findings.json"), *self.every_table(name)]
+                for name in SCENES]  # fmt: skip
+        tables = ("loading", "quantities", "extrapolated")
+        of_process = ("network.html", *(f"tables/{name}.json" for name in tables))
+        return [
+            *chain.from_iterable(runs),
+            *self.every("process", *of_process),
+            *self.needed_advice,
+        ]
+
     def every_point(self, place: str, file: str, plan: str = "") -> list[str]:
         """One file of every run of a plan, that of the trade-off if no other is named."""
         runs = self.points_by_run(projects.PLACES[place].name, plan or self.plan)
@@ -151,6 +174,10 @@ class Workflow:
         folders = projects.study_templates(self.cases[0])
         templates = or_stop(environment, self.project.templates, folders)
         return [self.relative(file) for file in or_stop(template_files, templates, scene)]
+
+    def templates_of_study(self, scene: str) -> Callable[[Wildcards], list[str]]:
+        """The same of the study of a run."""
+        return lambda wildcards: self.of(wildcards.study).templates_of(scene)
 
     def files(self, pattern: str) -> list[str]:
         """The project's files of this pattern."""
@@ -197,7 +224,7 @@ class Workflow:
         name = reference.signal.file
         return [self.relative(or_stop(recorded_file, name, study, "reference.signal.file"))]
 
-    def signal_option(self, _: object = None) -> str:
+    def signal_option(self) -> str:
         """How to name that signal on the command line."""
         return " ".join(f"--signal {quote(file)}" for file in self.signal_file())
 
@@ -216,7 +243,7 @@ class Workflow:
 
     def _runs_of(self, place: str) -> dict[str, Case]:
         """A case of the study for each folder of runs; of those that lead to others too."""
-        scene, cases = projects.PLACES[place], self.cases
+        scene, cases = projects.PLACES[place], self.tried
         if place == projects.WINDOWS:
             cases = [part for case in cases for part in (*windows_of(case), *whole_drag(case))]
         elif scene.needs_bed:
@@ -245,9 +272,9 @@ class Workflow:
         problem, remedy = "the study as it stands has no such run", "ask for a target of the study"
         _stop(InputError(problem, file=self.cases[0].file, value=f"{place}/{run}", remedy=remedy))
 
-    def case_of(self, place: str, run: str) -> Case:
+    def case_of(self, place: str, of: Wildcards) -> Case:
         """A case that a run belongs to."""
-        return self._origin(place, run)[1]
+        return self.of(of.study)._origin(place, of.run)[1]
 
     def other_engines(self) -> Iterator[str]:
         """What to say of runs that another version of LIGGGHTS made than would now be called."""
@@ -256,12 +283,12 @@ class Workflow:
 
     def planned_runs(self, jobs: Iterable[Any]) -> list[StudyRun]:
         """The engine runs of Snakemake's jobs: what is expected of each, and how far it is."""
-        places = {f"run_{place}": place for place in projects.PLACES}
         cases: dict[str, dict[Path, Case]] = {}
         for job in jobs:
-            if place := places.get(job.rule.name):
+            if job.rule.name in projects.RUNNERS:
+                place, _ = projects.RUNNERS[job.rule.name]
                 folder = self.project.root / Path(job.output[0]).parent
-                cases.setdefault(place, {})[folder] = self.case_of(place, job.wildcards.run)
+                cases.setdefault(place, {})[folder] = self.case_of(place, job.wildcards)
         several = (
             expected_runs(projects.PLACES[place], folders) for place, folders in cases.items()
         )
@@ -276,26 +303,26 @@ class Workflow:
 
     def digest_of(self, place: str) -> FromRun[str]:
         """Hash of what a run's files say."""
-        return lambda wildcards: self.digest(place, wildcards.run)
+        return lambda wildcards: self.of(wildcards.study).digest(place, wildcards.run)
 
     def _digest(self, place: str, run: str) -> str:
-        return projects.PLACES[place].digest(self.case_of(place, run))
+        return projects.PLACES[place].digest(self._origin(place, run)[1])
 
     def ranks_of(self, place: str) -> int | FromRun[int]:
         """Number of LIGGGHTS processes of a run."""
         if projects.PLACES[place].single_particle:
             return 1
-        return lambda wildcards: self.case_of(place, wildcards.run).ranks
+        return lambda wildcards: self.case_of(place, wildcards).ranks
 
     def cases_option(self, place: str) -> FromRun[str]:
         """How to name the cases among which a run is on the command line."""
-        return lambda wildcards: self._origin(place, wildcards.run)[0]
+        return lambda wildcards: self.of(wildcards.study)._origin(place, wildcards.run)[0]
 
     def of_its_bed(self, place: str, file: str) -> FromRun[str] | list[str]:
         """A file of the filling that a run starts from; none for a run that starts from none."""
 
         def name(wildcards: Wildcards) -> str:
-            filling = SCENES["filling"].run_id(self.case_of(place, wildcards.run))
+            filling = SCENES["filling"].run_id(self.case_of(place, wildcards))
             return f"{projects.run_path(wildcards.study, 'filling', filling)}/{file}"
 
         return name if projects.PLACES[place].needs_bed else []
@@ -304,10 +331,10 @@ class Workflow:
         """The record of the run from which a run goes on, if there is one."""
 
         def names(wildcards: Wildcards) -> list[str]:
-            lead = with_lead(self.case_of(place, wildcards.run)).lead
+            lead = with_lead(self.case_of(place, wildcards)).lead
             if lead is None:
                 return []
-            run = SCENES["process"].run_id(lead)
+            run = PROCESS.run_id(lead)
             return [f"{projects.run_path(wildcards.study, 'process', run)}/run.json"]
 
         return names if projects.PLACES[place].needs_bed else []
@@ -322,75 +349,14 @@ class Workflow:
         licence = self.cases[0].study.licence
         return quote(f"--licence={licence}") if licence else ""
 
-    # --- windows ---------------------------------------------------------------------------
-
-    def windows_of_run(self, wildcards: Wildcards) -> list[Case]:
-        """All windows that a run may have."""
-        return windows_of(self.case_of("process", wildcards.run))
-
-    def round_before(self, wildcards: RoundOfRun) -> list[str]:
-        """The file of the round before, if there is one; it is judged first."""
-        number = int(wildcards.round)
-        return [self.judged(wildcards.study, wildcards.run, number - 1)] if number > 1 else []
-
-    def windows_of_round(self, wildcards: RoundOfRun) -> list[str]:
-        """The folders of the windows that a round judges: of those that the one before wanted."""
-        wanted = self._said_before(wildcards).get("wanted", FIRST_WINDOWS)
-        return self._window_folders(wildcards, self.windows_of_run(wildcards)[:wanted])
-
-    def drag_of_round(self, wildcards: RoundOfRun) -> list[str]:
-        """The folder of the whole drag, if the round before wanted it instead of more windows."""
-        if not self._said_before(wildcards).get("whole"):
-            return []
-        return self._window_folders(wildcards, whole_drag(self.case_of("process", wildcards.run)))
-
-    def _said_before(self, wildcards: RoundOfRun) -> dict[str, Any]:
-        """The content of the round before; nothing before the first."""
-        said: dict[str, Any] = {}
-        for before in self.round_before(wildcards):
-            said = json.loads(Path(before).read_text())
-        return said
-
-    def _window_folders(self, wildcards: RoundOfRun, windows: list[Case]) -> list[str]:
-        runs = [SCENES["process"].run_id(window) for window in windows]
-        return [projects.run_path(wildcards.study, projects.WINDOWS, run) for run in runs]
-
-    def measured_of_round(self, wildcards: RoundOfRun) -> list[str]:
-        """The quantities of the runs that a round judges."""
-        folders = [*self.windows_of_round(wildcards), *self.drag_of_round(wildcards)]
-        return [f"{folder}/tables/quantities.json" for folder in folders]
-
-    def last_round(self, wildcards: Wildcards) -> str | list[str]:
-        """The last round of windows of a run, if it has any."""
-        if not self.windows_of_run(wildcards):
-            return []
-        number, file = 1, self.judged(wildcards.study, wildcards.run, 1)
-        while not json.loads(Path(file).read_text())["last"]:
-            number += 1
-            file = self.judged(wildcards.study, wildcards.run, number)
-        return file
-
     def packings_option(self, wildcards: Wildcards) -> str:
         """How many of the cases differ from that of a process run in their packing alone."""
-        (scene,) = _scene_texts([self.case_of("process", wildcards.run)])
-        return f"--packings {max(1, self.packings_of()[scene])}"
+        (scene,) = _scene_texts([self.case_of("process", wildcards)])
+        return f"--packings {max(1, self.of(wildcards.study).packings_of()[scene])}"
 
     def _packings_of(self) -> Counter[str]:
         """Number of packings by all that a study says but its seed."""
         return Counter(_scene_texts(self.cases))
-
-    def windows_options(self, wildcards: RoundOfRun) -> str:
-        """What the windows of a run are asked for, as options of the command line."""
-        study = self.case_of("process", wildcards.run).study
-        asked = study.chosen_fidelity().windows
-        assert asked is not None
-        quantities = " ".join(map(quote, asked.quantities))
-        drag = "".join(f" --drag {quote(folder)}" for folder in self.drag_of_round(wildcards))
-        return (
-            f"--tolerance {asked.tolerance} --quantities {quantities}"
-            f" --most {len(self.windows_of_run(wildcards))}"
-            f" --lengths {whole_lengths(study):.6g} {self.packings_option(wildcards)}{drag}"
-        )
 
 
 def _scene_texts(cases: Iterable[Case]) -> Iterator[str]:

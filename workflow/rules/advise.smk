@@ -4,15 +4,17 @@
 # No run waits for it, so that a new forecast makes no run anew: it goes before all others.
 rule advise:
     input:
-        HOME,
+        home,
     output:
-        WORK.advice,
+        "results/{study}/advice.json",
     priority: 2
     localrule: True
     params:
-        study=STUDY,
-        cases=[SCENES["process"].digest(case) for case in by_run(CASES, SCENES["process"]).values()],
+        cases=lambda wildcards: [
+            SCENES["process"].digest(case)
+            for case in by_run(WORK.of(wildcards.study).cases, SCENES["process"]).values()
+        ],
         fidelity=WORK.fidelity_option,
         source=source_hash("dragdeck.advice.forecast"),
     shell:
-        "dragdeck advise {params.study} {params.fidelity} > {log} 2>&1"
+        "dragdeck advise {wildcards.study} {params.fidelity} > {log} 2>&1"

@@ -2,6 +2,7 @@
 import os
 import signal
 import sys
+from functools import cache, partial
 from pathlib import Path
 from shlex import join, quote
 
@@ -25,12 +26,13 @@ from dragdeck.project import (
     ENGINE_RUN,
     FURTHER_WORKPIECE,
     RECORD,
+    RUNNERS,
     of_run,
     deck_files,
     tables_of,
 )
 from dragdeck.records.figures import figures_of
-from dragdeck.rules import Workflow, of_whole_run
+from dragdeck.rules import of_whole_run
 from dragdeck.calls import add_records, or_stop, checked_settings, home_of
 from dragdeck.scenes.process import SCENES
 from dragdeck.shipped import own_or_shipped
@@ -39,6 +41,7 @@ from dragdeck.snakemake_timers import look_again_once
 from dragdeck.source_hash import source_hash
 from dragdeck.study.check import warnings
 from dragdeck.study.yaml import read_yaml
+from dragdeck.workflow_rounds import WorkflowInRounds
 
 
 def locking_call():
@@ -69,11 +72,13 @@ STUDY, FIDELITY, PLAN, COLOURS = (
     config.get(key, "") for key in ("study", "fidelity", "plan", "colours")
 )
 PLAN, VALIDATION = PLAN or "default", PLAN or "paper"
+STUDIES = list(filter(None, config.get("studies", "").split(","))) or [STUDY]
+STUDY = STUDIES[0]
 
 
-def judged(study, run, number):
-    """The file of a round of windows of a run; the round is judged first."""
-    return checkpoints.judge_windows.get(study=study, run=run, round=number).output[0]
+def made(checkpoint, **wildcards):
+    """The file that a checkpoint makes; it is made first."""
+    return getattr(checkpoints, checkpoint).get(**wildcards).output[0]
 
 
 def shown(file, caption, category, figure="report", run="all"):
@@ -82,18 +87,27 @@ def shown(file, caption, category, figure="report", run="all"):
     return report(file, caption=f"../report/{caption}.rst", category=category, labels=labels)
 
 
-WORK = Workflow(PROJECT, STUDY, FIDELITY, PLAN, VALIDATION, judged)
+WORK = WorkflowInRounds(PROJECT, STUDY, FIDELITY, PLAN, VALIDATION, made)
 CASES = WORK.cases
-HOME = home_of(STUDY, idle=not locking_call())
+home_of_study = cache(partial(home_of, idle=not locking_call()))
+HOME = home_of_study(STUDY)
 
-MESSAGES = [text for case in CASES for text in map(str, warnings(case.study))]
-for WARNING in dict.fromkeys([*MESSAGES, *or_stop(list, WORK.other_engines())]):
-    logger.warning(f"warning: {STUDY}: {WARNING}")
+for NAME in STUDIES:
+    MESSAGES = [text for case in WORK.of(NAME).cases for text in map(str, warnings(case.study))]
+    for WARNING in dict.fromkeys([*MESSAGES, *or_stop(list, WORK.of(NAME).other_engines())]):
+        logger.warning(f"warning: {NAME}: {WARNING}")
 
 
 wildcard_constraints:
     study="[A-Za-z0-9._-]+",
+    studies="[A-Za-z0-9._+-]+",
     run="[A-Za-z0-9._-]+",
+    round="[1-9][0-9]*",
+
+
+def home(wildcards):
+    """A file that is newer than what was copied here of a study."""
+    return home_of_study(wildcards.study)
 
 
 INTERRUPTED = []
@@ -105,8 +119,8 @@ def interrupted(number, frame):
     signal.default_int_handler(number, frame)
 
 
-def tell_numbers():
+def tell_numbers(study):
     """Say where the report is, with its main numbers; nothing if there is none."""
-    said = shell("dragchain step numbers results/{STUDY}/report 2> /dev/null || true", read=True)
+    said = shell("dragchain step numbers results/{study}/report 2> /dev/null || true", read=True)
     if said.strip():
         logger.info(said.rstrip(), extra={"shown": True})

@@ -6,7 +6,7 @@ rule write_crate:
         [WORK.every(name, "run.json", "tables/findings.json") for name in SCENES],
         # A brace would start a wildcard.
         lambda wildcards: [file for file in WORK.crate_inputs() if "{" not in file],
-        report=rules.write_report.output,
+        report=WORK.report,
     output:
         WORK.of_study("crate", "ro-crate-metadata.json"),
     params:

@@ -8,8 +8,8 @@ for PLACE, SCENE in PLACES.items():
         name:
             f"render_{PLACE}"
         input:
-            WORK.templates_of(SCENE.name),
-            home=HOME,
+            WORK.templates_of_study(SCENE.name),
+            home=home,
             packing=WORK.of_its_bed(PLACE, "tables/packing.json"),
             lead=WORK.of_its_lead(PLACE),
         output:
@@ -28,26 +28,28 @@ for PLACE, SCENE in PLACES.items():
             "dragdeck step render {wildcards.study} {params.scene} {wildcards.run} {params.cases}"
             " {params.packing} {input.packing} > {log} 2>&1"
 
+
+for NAME, (PLACE, FILE) in RUNNERS.items():
+
     rule:
         name:
-            f"run_{PLACE}"
+            NAME
         input:
-            deck_files(PLACE, SCENE.inputs),
+            deck_files(PLACE, PLACES[PLACE].inputs),
             filling=WORK.of_its_bed(PLACE, "run.json"),
         output:
-            of_run(PLACE, RECORD[PLACE]),
+            of_run(PLACE, FILE),
         wildcard_constraints:
             run=ENGINE_RUN,
-        priority: 0 if SCENE.single_particle else 1
+        priority: 0 if PLACES[PLACE].single_particle else 1
         threads: WORK.ranks_of(PLACE)
         resources:
             engine=1,
         params:
-            outcome="--outcome" if PLACE in OUTCOMES else "",
-            file=of_run(PLACE, RECORD[PLACE]) if PLACE in OUTCOMES else "",
+            outcome="" if FILE == "run.json" else f"--outcome {of_run(PLACE, FILE)}",
             source=source_hash("dragdeck.engine.run_folder"),
         shell:
-            "dragdeck run $(dirname {output}) {params.outcome} {params.file} > {log} 2>&1"
+            "dragdeck run $(dirname {output}) {params.outcome} > {log} 2>&1"
 
 
 for PLACE in ("process", WINDOWS):
@@ -57,8 +59,8 @@ for PLACE in ("process", WINDOWS):
         name:
             f"share_{PLACE}"
         input:
-            WORK.templates_of("process"),
-            home=HOME,
+            WORK.templates_of_study("process"),
+            home=home,
             run=of_whole_run(PLACE, RECORD[PLACE]),
             packing=WORK.of_its_bed(PLACE, "tables/packing.json"),
         output:
@@ -181,8 +183,6 @@ checkpoint judge_windows:
         record=WORK.windows_record,
     output:
         of_run("process", "windows/round-{round}.json"),
-    wildcard_constraints:
-        round="[1-9][0-9]*",
     localrule: True
     params:
         asked=WORK.windows_options,

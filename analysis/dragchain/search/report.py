@@ -20,7 +20,7 @@ from dragchain.statistics.estimate import Estimate, EstimateColumns, Verdict, fl
 from dragdeck.engine.reports import say
 from dragdeck.errors import InputError
 from dragdeck.project import find_project
-from dragdeck.study.search import SearchPoint, SearchRecord
+from dragdeck.study.search import SearchPoint, SearchRecord, SearchRound
 
 NAME = "search"
 _AT_BOUND = 0.02
@@ -29,39 +29,41 @@ _AT_BOUND = 0.02
 _COLOURS = {"start": GREY, "model": BLUE, "confirmation": RED}
 
 
-def write_round(study: str) -> None:
-    """Choose the next settings of a search, write its page, and print how far it is.
-
-    Prints ``unfinished`` where runs of the last round are missing, ``round N``, or ``complete``.
+def choose_settings(study: str, number: int, out: Path) -> None:
+    """Choose the settings of a round of a search, and write the page on those before.
 
     Raises
     ------
     InputError
-        The study has no search or cannot be used, or it has changed since the search began.
+        The study has no search or cannot be used, or it has changed since the search began; or a
+        run of the settings before has not ended.
     """
-    print(advance(SearchedStudy(find_project(Path.cwd()), study)))
+    advance(SearchedStudy(find_project(Path.cwd()), study), number).write(out)
 
 
-def advance(studied: SearchedStudy, measure: PointMeasure = read_point) -> str:
-    """One step of a search; see `write_round`. `measure` reads the runs of a setting."""
+def advance(studied: SearchedStudy, number: int, measure: PointMeasure = read_point) -> SearchRound:
+    """A round of a search; see `choose_settings`. `measure` reads the runs of a setting."""
     file, asked = studied.record, studied.asked()
     record = SearchRecord.read(file) if file.is_file() else SearchRecord(asked=asked)
     if record.asked != asked:
         raise InputError("the study has changed since this search began", file=file, field="asked",
-                         remedy="remove the file to search anew (runs of the same settings are "
+                         remedy="remove its folder to search anew (runs of the same settings are "
                          "not repeated), or undo the change")  # fmt: skip
-    findings = read_findings(studied, record.points, measure)
-    if findings is None:
-        return "unfinished"
-    more = next_points(findings)
+    before = [point for point in record.points if point.round < number]
+    findings = read_findings(studied, before, measure)
+    more = record.points[len(before) :] or next_points(findings)
     if np.isfinite(findings.means[:, 0]).sum() >= 2:
         write_search(file.parent, findings)
     record.model_copy(update={"points": (*findings.points, *more)}).write(file)
-    if not more:
-        return "complete"
-    runs = sum(not point.refused for point in more)
-    say(f"search: round {more[0].round}: {runs} settings to run, {len(more) - runs} refused")
-    return f"round {more[0].round}"
+    chosen = [point for point in more if point.round == number]
+    tried = [point for point in chosen if point.ran or not point.refused]
+    if chosen:
+        gone = len(chosen) - len(tried)
+        say(f"search: round {number}: {len(tried)} settings to run, {gone} refused")
+    else:
+        say(f"search: complete: {file.with_name('search.html')}")
+    runs = [folder.name for point in tried for folder in studied.folders(point.values)]
+    return SearchRound(runs=tuple(runs), last=not chosen)
 
 
 # --- the page ------------------------------------------------------------------------------------

@@ -1,6 +1,6 @@
 """The rounds of a search: read the runs of its settings, choose the next ones, confirm the best.
 
-`write_round` is called before each round. What it chooses follows from the study, the record and
+`report.advance` is called for each round. What it chooses follows from the study, the record and
 the runs alone, so that an interrupted search goes on as if it had not been interrupted.
 """
 
@@ -166,14 +166,12 @@ def loss(objective: Objective, value: Any) -> Any:
 
 def read_findings(
     studied: SearchedStudy, points: Sequence[SearchPoint], measure: PointMeasure
-) -> SearchFindings | None:
-    """Read all points; those whose runs were rejected say so then. None if a run has not ended."""
+) -> SearchFindings:
+    """Read all points; those whose runs were rejected say so then."""
     rows, known = list[Floats](), list[SearchPoint]()
     shape = len(studied.study.sweep["seed"]), len(studied.measures)
     for point in points:
         measured = point.refused if point.refused else measure(studied, point)
-        if measured is None:
-            return None
         if isinstance(measured, str):
             ran = point.ran or not point.refused
             point = point.model_copy(update={"refused": measured, "ran": ran})

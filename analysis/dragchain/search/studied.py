@@ -21,7 +21,6 @@ from dragdeck.errors import InputError
 from dragdeck.project import Project, check_buildable
 from dragdeck.scenes.process import PROCESS
 from dragdeck.study.base import Json
-from dragdeck.study.check import validate
 from dragdeck.study.model import Study
 from dragdeck.study.search import RECORD, Search, SearchedMeasure, SearchPoint
 from dragdeck.study.yaml import read_study
@@ -92,16 +91,7 @@ class SearchedStudy:
     @cached_property
     def study(self) -> Study:
         """The study with its search; its bounds are checked."""
-        self.project.cases(self.name)
-        valid = validate(read_study(self.file), self.file, whole=True)
-        if valid.search is None:
-            raise InputError(
-                "a required key is missing",
-                file=self.file,
-                field="search",
-                remedy="say what may vary and what is wanted: docs/howto/sweep.md",
-            )
-        return valid
+        return self.project.searched(self.name)
 
     @property
     def search(self) -> Search:
@@ -164,21 +154,28 @@ class SearchedStudy:
         return {field: self.search.value(field, float(part)) for field, part in parts}
 
 
-PointValues = Floats | str | None
-"""Of a setting: its (P, Q) quantities in each packing; why its runs were rejected; or not yet."""
+PointValues = Floats | str
+"""Of a setting: its (P, Q) quantities in each packing; or why its runs were rejected."""
 
 PointMeasure = Callable[[SearchedStudy, SearchPoint], PointValues]
 
 
 def read_point(studied: SearchedStudy, point: SearchPoint) -> PointValues:
-    """What the runs of a setting say."""
+    """What the runs of a setting say.
+
+    Raises
+    ------
+    InputError
+        A run has not ended.
+    """
     folders = studied.folders(point.values)
-    states = [run_status(folder) for folder in folders]
-    failed = next((state for state in states if state.state == "failed" and state.final), None)
-    if failed:
-        return failed.problem.partition("\n")[0]
-    if any(state.state != "complete" for state in states):
-        return None
+    for folder in folders:
+        status = run_status(folder)
+        if not status.final:
+            raise InputError("a run of a search has not ended", file=folder, value=status.state,
+                             remedy=f"./run search --config study={studied.name}")  # fmt: skip
+        if status.state == "failed":
+            return status.problem.partition("\n")[0]
     values = np.array(
         [[quantity_of(measure, folder) for measure in studied.measures] for folder in folders]
     )

@@ -142,7 +142,7 @@ def _rest(
 
 def _last_words(folder: Path) -> str:
     """The message with which the writing of the input script, or the run, ended."""
-    for name in ("render", "run"):
+    for name in ("render", "run", "try"):
         log = folder / "logs" / f"{name}.log"
         if log.is_file() and (said := re.search(r"^dragdeck: (.*)", _tail(log), re.M | re.S)):
             return printable(said.group(1).strip())

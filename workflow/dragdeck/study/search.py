@@ -16,7 +16,7 @@ from dragdeck.parts import Part
 from dragdeck.study.base import Model, Name, Number, Whole
 from dragdeck.study.quantities import QUANTITIES
 
-RECORD = Path("search") / "points.json"
+RECORD = Path("search/points.json")
 """The record of a search in the results of its study."""
 
 _OF_TARGET = ("minutes", "minutes_slowest")
@@ -219,7 +219,24 @@ class SearchRecord(Document):
         In the order in which they were chosen.
     """
 
-    remedy = "remove it, and search again: runs that are there are not repeated"
+    remedy = "remove its folder, and search again: runs that are there are not repeated"
 
     asked: str
     points: tuple[SearchPoint, ...] = ()
+
+
+class SearchRound(Document):
+    """The content of ``round-N.json``.
+
+    Attributes
+    ----------
+    runs : tuple of str
+        The process runs of its settings.
+    last : bool
+        Whether the search was complete before it: it has no settings.
+    """
+
+    remedy = SearchRecord.remedy
+
+    runs: tuple[str, ...]
+    last: bool

@@ -46,6 +46,7 @@ def load_cases(
     fidelity: str | None = None,
     resolve: Resolve | None = None,
     searched: Path | None = None,
+    failed: bool = False,
 ) -> list[Case]:
     """All cases of a study file.
 
@@ -59,6 +60,8 @@ def load_cases(
         Finds the settings where a case asks for a tolerance.
     searched : Path, optional
         The record of the study's search: its points are cases, too.
+    failed : bool
+        Whether points of which a run failed are among them.
 
     Raises
     ------
@@ -76,7 +79,7 @@ def load_cases(
         if searched and searched.is_file():
             known = SearchRecord.read(searched).points
             points = [
-                searched_point.values for searched_point in known if not searched_point.refused
+                point.values for point in known if not point.refused or (failed and point.ran)
             ] or points
     for point, settings in itertools.product(points, combinations(study.sweep)):
         settings = {**point, **settings}
