@@ -18,7 +18,6 @@ import pytest
 from entry import write_entry
 from packaging.requirements import Requirement
 from paths import ROOT
-from snakemake.cli import get_argument_parser
 
 SYSTEM_TOOLS = """
     bash cat cksum df dirname env false find flock grep id readlink rm sed sh sleep tr true
@@ -34,7 +33,8 @@ printf ' in %s with %s\\n' "$PWD" "${DRAGDECK_ENGINE:-no engine}"
 """
 """A program that says how it was called."""
 
-PACKAGES = ["snakemake", "dragdeck", "dragchain", "pytest", "ruff", "mypy", "lint-imports"]
+PACKAGES = ["snakemake", "dragdeck", "dragchain", "pytest", "ruff", "mypy", "lint-imports",
+            "snakefmt"]  # fmt: skip
 
 SNAKEMAKE = "snakemake [--logger] [dragdeck] [--show-failed-logs]"
 
@@ -123,6 +123,10 @@ def test_usage_needs_nothing(clone: Clone, arguments: list[str]) -> None:
         (["all", "--config", "study=two words"], f"{SNAKEMAKE} [all] [--config] [study=two words]"),
         (["tradeoff"], f"{SNAKEMAKE} [tradeoff] {EVIDENCE}"),
         (
+            ["compare", "--config", "studies=a,b"],
+            f"{SNAKEMAKE} [compared] [--config] [studies=a,b]",
+        ),
+        (
             ["-n", "results/a/validation/report.html"],
             f"{SNAKEMAKE} [-n] [results/a/validation/report.html] {EVIDENCE}",
         ),
@@ -148,8 +152,8 @@ def test_arguments_arrive_whole_from_anywhere(
         (["--quick", "-x"], r"ruff .*\npytest .*\[-m\] \[not engine and not slow\] \[-x\]"),
         (["--attacks", "-k", "kill"], r"pytest .*\[--attacks\] \[-m\] \[attack\] \[-k\] \[kill\]"),
         (["-k", "mesh or run"], r"pytest \[-k\] \[mesh or run\]"),
-        (["--checks"], r"ruff \[check\] .*\n(.*\n)*lint-imports .*"),
-        ([], r"pytest \[-n\] [^k]* in .*\nrun: ruff check .*\n(.*\n)*lint-imports .*"),
+        (["--checks"], r"ruff \[check\] .*\n(.*\n)*snakemake .*"),
+        ([], r"pytest \[-n\] [^k]* in .*\nrun: ruff check .*\n(.*\n)*snakemake .*"),
     ],
 )
 def test_tests_bring_their_packages(clone: Clone, arguments: list[str], called: str) -> None:
@@ -165,109 +169,6 @@ def test_a_failed_check_fails_the_whole_and_still_tests(clone: Clone, tmp_path: 
     assert "quality check failed" in ended.stderr
     assert ended.stdout.startswith("pytest ")
     assert clone.run(script=".ci/run", cwd=tmp_path, FAILS="pytest").returncode == 5
-
-
-def test_studies_are_run_one_by_one_and_then_compared(clone: Clone) -> None:
-    ended = clone.run("compare", "--config", "studies=a,b", "fidelity=draft", "--cores", "1")
-    each = f"{SNAKEMAKE} [all] [--config] [study={{}}] [fidelity=draft] [--cores] [1]"
-    last = "dragchain [compare] [--out] [results/compare/a+b] [results/a] [results/b]"
-    called = [line.partition(" in ")[0] for line in ended.stdout.splitlines()]
-    assert called == [each.format("a"), each.format("b"), last]
-    failed = clone.run("compare", "--config", "studies=a,b", FAILS="snakemake")
-    assert failed.returncode != 0 and len(failed.stdout.splitlines()) == 1
-
-
-@pytest.mark.parametrize("option", ["-n", "-np", "-pn", "--dry-run", "--dryrun"])
-@pytest.mark.parametrize("command", ["compare", "search"])
-def test_a_dry_run_ends_after_what_it_can_tell(clone: Clone, command: str, option: str) -> None:
-    (clone.root / "rounds").write_text("round")
-    write_program(clone.packages / "dragchain", STEPS)
-    clone.stamp.write_text(clone.stamp.read_text() + "search\n")
-    config = "studies=a,b" if command == "compare" else "study=a"
-    ended = clone.run(command, "--config", config, "--cores", "1", option)
-    assert ended.returncode == 0
-    called = [line for line in ended.stdout.splitlines() if line.startswith("snakemake")]
-    assert len(called) == (2 if command == "compare" else 1)
-    assert len(called) == len(ended.stdout.splitlines())
-
-
-NOTHING = """
-    allowed_rules archive batch cleanup_metadata cleanup_shadow conda_cleanup_envs
-    conda_create_envs_only container_cleanup_images containerize d3dag dag delete_all_output
-    delete_temp_output detailed_summary draft_notebook edit_notebook export_cwl filegraph
-    generate_unit_tests help immediate_submit lint list_changes list_conda_envs list_input_changes
-    list_params_changes list_rules list_target_rules list_untracked mode omit_from
-    print_compilation report rulegraph summary target_jobs touch unlock until version
-"""
-"""What Snakemake calls its options with which it runs nothing, or not all."""
-
-
-def test_every_option_of_snakemake_is_passed_on_or_refused(clone: Clone) -> None:
-    """Those that keep a study from its end, by all their names; no other one."""
-    options = get_argument_parser()._actions
-    refusals = [
-        (word, action.dest in NOTHING.split())
-        for action in options
-        for word in action.option_strings
-    ]
-    assert {*NOTHING.split()} <= {action.dest for action in options}
-    script = """
-set -eu; . "$1"; shift
-for word in "$@"; do (refuse_partial "$word" 2>/dev/null) || echo "$word"; done
-"""
-    words = [word for word, _ in refusals]
-    asked = [clone.root / "workflow/run.sh", *words]
-    shown = subprocess.run(["sh", "-c", script, "sh", *asked], cwd=clone.root, text=True,
-                           capture_output=True, check=True)  # fmt: skip
-    assert shown.stdout.split() == [word for word, refused_ in refusals if refused_]
-
-
-@pytest.mark.parametrize(
-    ("word", "refusal"),
-    [
-        *((word, "runs nothing") for word in ("--unt", "--touc", "--until=a", "-kt", "-pU")),
-        *((word, "the folder of this script") for word in ("-d", "-pd", "--directory=a", "--dir")),
-    ],
-)  # fmt: skip
-def test_an_option_is_seen_in_any_form(clone: Clone, word: str, refusal: str) -> None:
-    assert refused(clone.run("compare", "--config", "studies=a", word, "a"), refusal)
-
-
-@pytest.mark.parametrize("word", ["-j4", "-c1", "-k", "-Rtouch", "--jobs=2", "--keep-going", "-T2"])
-def test_an_option_that_keeps_all_jobs_is_passed_on(clone: Clone, word: str) -> None:
-    ended = clone.run("compare", "--config", "studies=a", word)
-    assert f"[{word}]" in ended.stdout and "dragchain [compare]" in ended.stdout
-
-
-STEPS = """\
-#!/bin/sh
-state=$(cat rounds)
-printf '%s\\n' "${state%% *}"
-[ "$state" = "${state#* }" ] || printf '%s' "${state#* }" > rounds
-"""
-"""A search whose steps say one word after the other of a file; the last one again and again."""
-
-
-@pytest.mark.parametrize(
-    ("rounds", "fails", "calls", "status"),
-    [
-        ("round round complete", "", 2, 0),
-        ("unfinished round complete", "", 2, 0),
-        ("round round complete", "snakemake", 2, 0),  # a run that failed is a finding
-        ("round unfinished", "snakemake", 1, 5),  # nothing can go on
-        ("unfinished unfinished", "", 1, 1),  # a round that changes nothing
-    ],
-)
-def test_a_search_goes_on_round_by_round(
-    clone: Clone, rounds: str, fails: str, calls: int, status: int
-) -> None:
-    (clone.root / "rounds").write_text(rounds)
-    write_program(clone.packages / "dragchain", STEPS)
-    clone.stamp.write_text(clone.stamp.read_text() + "search\n")
-    ended = clone.run("search", "--config", "study=a", FAILS=fails)
-    called = [line.partition(" in ")[0] for line in ended.stdout.splitlines()]
-    assert called == [f"{SNAKEMAKE} [searched] [--config] [study=a]"] * calls
-    assert ended.returncode == status
 
 
 # --- what is missing -----------------------------------------------------------------------
@@ -296,11 +197,6 @@ chmod +x ../bin/df"""
         (FULL_DISK, ["all"], {}, ["the disk is full", "42 kB free"]),
         ("", ["web"], {}, ["npm is missing"]),
         ("", ["all", "--profile", "profiles/slurm"], {}, ["--workflow-profile"]),
-        ("", ["compare", "--config", "study=a"], {}, ["no studies to compare", "studies=A,B"]),
-        ("", ["compare", "--config", "studies=a b;c"], {}, ["not names of studies", "a b;c"]),
-        ("", ["search", "--config", "study=a", "fidelity=full"], {}, ["fidelity=full"]),
-        ("", ["search", "--config", "study=a", "--summary"], {}, ["runs nothing", "--summary"]),
-        ("", ["compare", "--config", "studies=a,b", "-t"], {}, ["runs nothing", "-t"]),
         ("", ["setup", "crates"], {}, ["crates", "cad, crate, docs"]),
     ],
 )
@@ -355,6 +251,8 @@ STEP = "workpiece: {shape: {kind: mesh, file: part.STP}}\n"
     [
         (["all", "--config", "study=cut"], "cad"),
         (["dragdeck", "check", "child"], "cad"),
+        (["compare", "--config", "studies=plain,child"], "cad"),
+        (["search", "--config", "study=plain"], "search"),
         (["crate", "--config", "study=plain"], "crate"),
         (["all", "--workflow-profile", "profiles/slurm"], "slurm"),
         (["setup", "docs"], "docs"),

@@ -15,10 +15,6 @@ if [ -n "${DRAGDECK_ENGINE:-}" ]; then
     export DRAGDECK_ENGINE
 fi
 
-usage_of_studies() {
-    cat "$shipped/workflow/usage.txt"
-}
-
 say() { printf '%s\n' "run: $*" >&2; }
 
 fail() {
@@ -46,17 +42,6 @@ check_profile() {
     esac
 }
 
-# Results would be written elsewhere, where this script does not look for them.
-refuse_elsewhere() {
-    for word in "$@"; do
-        # Letters behind one that takes a value belong to the value.
-        case $word:${word%%[sjcCePRqwT]*} in
-            --dir*:* | -[!-]*:*d*) fail "results are written to the folder of this script" "value:  $word" \
-                "remedy: copy the project, or make one there with: dragdeck init FOLDER" ;;
-        esac
-    done
-}
-
 # Run a command of a study.
 call() {
     case $1 in
@@ -65,7 +50,6 @@ call() {
         dragdeck | dragchain) exec "$@" ;;
         status | open) exec dragdeck "$@" ;;
         *)
-            refuse_elsewhere "$@"
             ensure_writable
             # Snakemake finds a logger plugin in folders of Python's path only, and a clone that is
             # installed has its packages in none of them.

@@ -10,6 +10,8 @@ import yaml
 from paths import ROOT, SMALL_STUDY
 from snakemake_calls import copy_of_project, snakemake, succeed
 
+from dragdeck.project import RUNNERS
+
 pytestmark = pytest.mark.slow
 
 PROFILE: dict[str, Any] = yaml.safe_load((ROOT / "profiles/slurm/config.yaml").read_text())
@@ -46,6 +48,7 @@ def waits(project: Path, *arguments: str) -> set[tuple[str, str]]:
     [
         (("all",), {"run_windows", "judge_windows", "write_report"}),
         (("calibrate",), {"fit_coefficients"}),
+        (("results/compare/small/comparison.html",), {"write_report", "write_comparison"}),
         (("tradeoff", *EVIDENCE), {"run_points", "measure_costs"}),
         (("validate", *EVIDENCE), {"run_points"}),
     ],
@@ -65,11 +68,10 @@ def test_no_group_waits_for_a_rule_that_waits_for_it(
 def test_every_rule_that_starts_the_engine_has_time_and_memory() -> None:
     text = "".join(file.read_text() for file in ROOT.glob("*/rules/*.smk"))
     assert all(re.search(rf"^rule {rule}:", text, re.MULTILINE) for rule in BATCHES)
-    places = {"drop_test", "filling", "process", "points", "windows"}
     resources = PROFILE["set-resources"]
-    assert {*resources} == BATCHES | {f"run_{place}" for place in places}
-    for rule in places:
-        of_rule = resources[f"run_{rule}"]
+    assert {*resources} == BATCHES | {*RUNNERS}
+    for rule in RUNNERS:
+        of_rule = resources[rule]
         assert {"runtime", "mem_mb", "mpi", "tasks", "cpus_per_task"} == {*of_rule}
         assert "attempt" in of_rule["mem_mb"]
     assert all(resources[rule]["runtime"] > 60 for rule in BATCHES)

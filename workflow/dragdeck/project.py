@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from dragdeck.advice.advise import resolve
-from dragdeck.cases.case import Case, digest, mesh_file, of_each_workpiece
+from dragdeck.cases.case import Case, digest, of_each_workpiece
 from dragdeck.errors import InputError, choices
 from dragdeck.outlook.timestep import check_timestep
 from dragdeck.records.tradeoff import TradeoffRecord
@@ -21,7 +21,7 @@ from dragdeck.study.check import validate
 from dragdeck.study.model import Scaling, Study
 from dragdeck.study.search import RECORD as SEARCHED
 from dragdeck.study.workpiece import MeshShape
-from dragdeck.study.yaml import located, read_study, study_folders
+from dragdeck.study.yaml import located, mesh_beside, read_study, study_folders
 from dragdeck.sweep.cases import load_cases, searched_bounds, study_file
 from dragdeck.sweep.plan import Plan, Points, plan_points
 
@@ -336,7 +336,9 @@ def study_files(cases: Iterable[Case]) -> list[Path]:
             inside = (file for file in folder.rglob("[!.]*") if file.is_file())
             files |= {file for file in inside if "/." not in f"/{file.relative_to(folder)}"}
         shapes = [workpiece.study.workpiece.shape for workpiece in of_each_workpiece(case)]
-        files |= {mesh_file(case, shape) for shape in shapes if isinstance(shape, MeshShape)}
+        files |= {
+            mesh_beside(case.file, shape.file) for shape in shapes if isinstance(shape, MeshShape)
+        }
     return sorted(files)
 
 

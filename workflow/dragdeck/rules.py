@@ -31,10 +31,11 @@ from dragdeck.study.search import RECORD
 
 
 class Wildcards(Protocol):
-    """What a rule knows of a run."""
+    """What a rule knows of a run or of a round, as far as its paths have it."""
 
     study: str
     run: str
+    round: str
 
 
 def _folder_of(package: str) -> Path:
@@ -178,10 +179,6 @@ class Workflow:
     def templates_of_study(self, scene: str) -> Callable[[Wildcards], list[str]]:
         """The same of the study of a run."""
         return lambda wildcards: self.of(wildcards.study).templates_of(scene)
-
-    def files(self, pattern: str) -> list[str]:
-        """The project's files of this pattern."""
-        return sorted(map(self.relative, self.project.root.glob(pattern)))
 
     def page_templates(self, *names: str, package: str = "dragchain") -> list[str]:
         """The templates of a page, with those that all pages are made of."""

@@ -9,7 +9,7 @@ from functools import partial
 from itertools import count
 from pathlib import Path
 from shlex import quote
-from typing import Any, Protocol
+from typing import Any
 
 from dragdeck import project as projects
 from dragdeck.calls import _stop, or_stop
@@ -21,18 +21,6 @@ from dragdeck.scenes.lead import FIRST_WINDOWS, whole_drag, whole_lengths, windo
 from dragdeck.scenes.process import PROCESS, SCENES
 from dragdeck.study.search import RECORD, SearchRecord, SearchRound
 from dragdeck.study.yaml import read_study
-
-
-class Round(Protocol):
-    """What a rule knows of a round of a search."""
-
-    study: str
-    round: str
-
-
-class RoundOfRun(Wildcards, Round, Protocol):
-    """What a rule knows of a round of windows of a run."""
-
 
 _READ_OF_RUN = ("findings", "quantities", "extrapolated")
 """Documents that a search reads of a run."""
@@ -53,34 +41,34 @@ class WorkflowInRounds(Workflow):
         """The file of a round of windows, which is judged first."""
         return self.made("judge_windows", study=wildcards.study, run=wildcards.run, round=number)
 
-    def round_before(self, wildcards: RoundOfRun) -> list[str]:
+    def round_before(self, wildcards: Wildcards) -> list[str]:
         """The file of the round before, if there is one; it is judged first."""
         number = int(wildcards.round)
         return [self._judged(wildcards, number - 1)] if number > 1 else []
 
-    def windows_of_round(self, wildcards: RoundOfRun) -> list[str]:
+    def windows_of_round(self, wildcards: Wildcards) -> list[str]:
         """The folders of the windows that a round judges: of those that the one before wanted."""
         wanted = self._said_before(wildcards).get("wanted", FIRST_WINDOWS)
         return self._window_folders(wildcards, self.windows_of_run(wildcards)[:wanted])
 
-    def drag_of_round(self, wildcards: RoundOfRun) -> list[str]:
+    def drag_of_round(self, wildcards: Wildcards) -> list[str]:
         """The folder of the whole drag, if the round before wanted it instead of more windows."""
         if not self._said_before(wildcards).get("whole"):
             return []
         return self._window_folders(wildcards, whole_drag(self.case_of("process", wildcards)))
 
-    def _said_before(self, wildcards: RoundOfRun) -> dict[str, Any]:
+    def _said_before(self, wildcards: Wildcards) -> dict[str, Any]:
         """The content of the round before; nothing before the first."""
         said: dict[str, Any] = {}
         for before in self.round_before(wildcards):
             said = json.loads(Path(before).read_text())
         return said
 
-    def _window_folders(self, wildcards: RoundOfRun, windows: list[Case]) -> list[str]:
+    def _window_folders(self, wildcards: Wildcards, windows: list[Case]) -> list[str]:
         runs = map(PROCESS.run_id, windows)
         return [projects.run_path(wildcards.study, projects.WINDOWS, run) for run in runs]
 
-    def measured_of_round(self, wildcards: RoundOfRun) -> list[str]:
+    def measured_of_round(self, wildcards: Wildcards) -> list[str]:
         """The quantities of the runs that a round judges."""
         folders = [*self.windows_of_round(wildcards), *self.drag_of_round(wildcards)]
         return [f"{folder}/tables/quantities.json" for folder in folders]
@@ -91,7 +79,7 @@ class WorkflowInRounds(Workflow):
             return []
         return _last(partial(self._judged, wildcards))
 
-    def windows_options(self, wildcards: RoundOfRun) -> str:
+    def windows_options(self, wildcards: Wildcards) -> str:
         """What the windows of a run are asked for, as options of the command line."""
         study = self.case_of("process", wildcards).study
         asked = study.chosen_fidelity().windows
@@ -125,12 +113,12 @@ class WorkflowInRounds(Workflow):
         runs = SearchRound.read(Path(self._chosen(study, number))).runs
         return [projects.run_path(study, "process", run) for run in runs]
 
-    def ended_of_round(self, wildcards: Round) -> list[str]:
+    def ended_of_round(self, wildcards: Wildcards) -> list[str]:
         """How the runs of the settings of a round have ended."""
         folders = self._runs_of_settings(wildcards.study, int(wildcards.round))
         return [f"{folder}/{projects.ENDED}" for folder in folders]
 
-    def known_of_search(self, wildcards: Round) -> list[str]:
+    def known_of_search(self, wildcards: Wildcards) -> list[str]:
         """What is read of the runs before a round, which end first: of those that are complete."""
         study, files = wildcards.study, list(self.of(wildcards.study).needed_advice)
         for number in range(1, int(wildcards.round)):

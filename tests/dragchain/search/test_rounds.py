@@ -19,7 +19,7 @@ from dragchain.search.studied import SearchedStudy
 from dragdeck.cli import main
 from dragdeck.errors import InputError
 from dragdeck.project import Project
-from dragdeck.study.search import SearchPoint, SearchRecord
+from dragdeck.study.search import SearchPoint, SearchRecord, SearchRound
 
 SD, LIMIT = np.array([0.05, 0.02]), 0.7
 BEST = np.array([0.6333, 0.0667])
@@ -85,15 +85,12 @@ CHANGES = {"search": SEARCH, "sweep": {"seed": [1, 2, 3]}}
 
 
 class StandIn:
-    """Runs that are a formula; `missing`: how many settings still have none."""
+    """Runs that are a formula."""
 
     def __init__(self) -> None:
         self.runs: list[str] = []
-        self.missing = 0
 
     def __call__(self, studied: SearchedStudy, point: SearchPoint) -> Any:
-        if self.missing:
-            return None
         names = [folder.name for folder in studied.folders(point.values)]
         self.runs += [name for name in names if name not in self.runs]
         noise = [np.random.default_rng(int(name[-8:], 16)).normal(size=2) for name in names]
@@ -105,10 +102,11 @@ def points_of(studied: SearchedStudy) -> tuple[SearchPoint, ...]:
     return SearchRecord.read(studied.record).points
 
 
-def search(studied: SearchedStudy, engine: StandIn) -> list[str]:
-    said = []
-    while not said or said[-1] != "complete":
-        said.append(advance(studied, engine))
+def search(studied: SearchedStudy, engine: StandIn) -> list[SearchRound]:
+    """The rounds of a search, to the last one."""
+    said = list[SearchRound]()
+    while not said or not said[-1].last:
+        said.append(advance(studied, len(said) + 1, engine))
         assert len(said) < 20
     return said
 
@@ -120,8 +118,12 @@ def test_a_search_finds_the_best_setting_and_resumes_as_if_never_stopped(
     load(CHANGES)
     engine = StandIn()
     studied = SearchedStudy(project, "small")
-    assert search(studied, engine) == ["round 1", "round 2", "round 3", "round 4", "complete"]
+    made = search(studied, engine)
     points = points_of(studied)
+    assert [len(part.runs) for part in made] == [18, 6, 3, 6, 0]
+    assert [run for part in made for run in part.runs] == [
+        folder.name for point in points for folder in studied.folders(point.values)
+    ]
     purposes = ["start"] * 6 + ["model"] * 3
     assert [one.purpose for one in points[:9]] == purposes
     full = points[-1]
@@ -134,16 +136,13 @@ def test_a_search_finds_the_best_setting_and_resumes_as_if_never_stopped(
     assert {(case.settings["seed"], case.fidelity_name) for case in cases[-3:]} == {
         (seed, "full") for seed in (1, 2, 3)
     }
-    # the search again, stopped in each round before its runs had ended
+    # each round made again is the same, and so is the search again
+    assert search(SearchedStudy(project, "small"), engine) == made
+    assert points_of(studied) == points
     studied.record.unlink()
-    again, stopped = StandIn(), SearchedStudy(project, "small")
-    while advance(stopped, again) != "complete":
-        again.missing = 1
-        before = stopped.record.read_bytes()
-        assert advance(SearchedStudy(project, "small"), again) == "unfinished"
-        assert stopped.record.read_bytes() == before
-        again.missing = 0
-    assert points_of(stopped) == points and again.runs == engine.runs
+    again = StandIn()
+    assert search(SearchedStudy(project, "small"), again) == made
+    assert points_of(studied) == points and again.runs == engine.runs
     # the page
     out = studied.record.parent
     page = (out / "search.html").read_text(encoding="utf-8")
@@ -160,7 +159,7 @@ def test_a_search_finds_the_best_setting_and_resumes_as_if_never_stopped(
     assert ("lies on a bound" in page) == bool(on)
     # more runs continue it; another wish does not
     load(CHANGES | {"search": SEARCH | {"runs": 10}})
-    assert advance(SearchedStudy(project, "small"), engine) == "round 5"
+    assert len(advance(SearchedStudy(project, "small"), 5, engine).runs) == 3
     assert [one.purpose for one in points_of(studied)[len(points) :]] == ["model"]
     load(CHANGES | {"search": SEARCH | {"runs": 10}, "title": "Another title", "reference": None})
     assert SearchedStudy(project, "small").asked() == SearchRecord.read(studied.record).asked
@@ -168,13 +167,11 @@ def test_a_search_finds_the_best_setting_and_resumes_as_if_never_stopped(
     for change in ({"search": SEARCH | {"start": 5}}, {"removal": removal}, {"gravity_m_s2": 9.8}):
         load(CHANGES | {"search": SEARCH | {"runs": 10}} | change)
         with pytest.raises(InputError, match="the study has changed since this search began"):
-            advance(SearchedStudy(project, "small"), engine)
+            advance(SearchedStudy(project, "small"), 6, engine)
 
 
 def found_of(studied: SearchedStudy, engine: StandIn) -> rounds.SearchFindings:
-    found = read_findings(studied, points_of(studied), engine)
-    assert found is not None
-    return found
+    return read_findings(studied, points_of(studied), engine)
 
 
 def test_settings_that_are_refused_or_fail_are_infeasible(
@@ -184,10 +181,11 @@ def test_settings_that_are_refused_or_fail_are_infeasible(
     deep = {**SEARCH["vary"], "motion.immersion_depth_m": [0.005, 0.08]}
     load(CHANGES | {"search": SEARCH | {"vary": deep}})
     studied, engine = SearchedStudy(project, "small"), StandIn()
-    assert advance(studied, engine) == "round 1"
+    tried = advance(studied, 1, engine).runs
     points = points_of(studied)
     refused = [one for one in points if one.refused]
     assert 0 < len(refused) < len(points)
+    assert len(tried) == 3 * (len(points) - len(refused))
     assert all(one.values["motion.immersion_depth_m"] > 0.02 for one in refused)
     assert len(project.cases("small")) == 3 * (len(points) - len(refused))
 
@@ -197,7 +195,6 @@ def test_settings_that_are_refused_or_fail_are_infeasible(
     found = read_findings(
         studied, [*points[:-1], points[-1].model_copy(update={"refused": ""})], fails
     )
-    assert found is not None
     known = [k for k, one in enumerate(found.points) if not one.refused]
     assert np.isfinite(found.means[known]).all() and math.isnan(found.errors[-1, 0])
 
@@ -271,7 +268,7 @@ def test_the_confirmation_at_the_searchs_own_fidelity_is_one_run(
 ) -> None:
     load(CHANGES | {"fidelity": "full", "search": SEARCH | {"runs": 6}})
     studied = SearchedStudy(project, "small")
-    assert search(studied, StandIn())[-1] == "complete"
+    search(studied, StandIn())
     assert [one.values.get("fidelity") for one in points_of(studied)[6:]] == [None]
     assert project.cases("small")
 
@@ -406,4 +403,4 @@ def test_a_study_without_search_says_how_to_ask(
     load()
     monkeypatch.setattr(report, "find_project", lambda _: project)
     with pytest.raises(InputError, match="search: a required key is missing"):
-        report.write_round("small")
+        report.choose_settings("small", 1, tmp_path / "round-1.json")

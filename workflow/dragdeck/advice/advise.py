@@ -25,7 +25,6 @@ from dragdeck.scenes.fit import JAMMING_GAP, may_jam
 from dragdeck.scenes.lead import FIRST_WINDOWS
 from dragdeck.scenes.numbers import describe
 from dragdeck.scenes.process_cautions import process_cautions
-from dragdeck.study import model as models
 from dragdeck.study.fidelity import (
     BUILT_IN_FIDELITIES,
     LARGEST_TIMESTEP_FRACTION,
@@ -35,6 +34,7 @@ from dragdeck.study.fidelity import (
     Tolerance,
     Windows,
 )
+from dragdeck.study.model import Study
 
 _PROCESS_OF_DROP = "standard"
 """Fidelity of the process in a study whose tolerance is about the drop test."""
@@ -97,7 +97,7 @@ class Option:
         return text
 
 
-def with_option(study: models.Study, option: Option) -> models.Study:
+def with_option(study: Study, option: Option) -> Study:
     """A study with the settings of an option."""
     update: dict[str, object] = {"fidelity": option.fidelity}
     if (fraction := option.drop_timestep_fraction) is not None:

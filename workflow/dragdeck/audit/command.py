@@ -115,9 +115,10 @@ class Report:
 
     def add(self, results: Iterable[Finding], *ids: str) -> None:
         """Add what rules say whose ids begin so."""
-        added = [each for each in results if each.rule in self.wanted and each.file != self.after]
+        added = [finding for finding in results
+                 if finding.rule in self.wanted and finding.file != self.after]  # fmt: skip
         self.every += added
-        skipped = {each.rule for each in added if each.severity == NOT_APPLIED}
+        skipped = {finding.rule for finding in added if finding.severity == NOT_APPLIED}
         self.applied |= {id for id in self.wanted if id.startswith(ids)} - skipped
 
     def add_log(self, file: Path) -> None:
@@ -128,7 +129,7 @@ class Report:
         if log.last is not None:
             self.known |= {"inserted or there": log.expected, "at the end": log.last}
         hits = {"DK208": log.warnings(), "DK206": log.rest(), "DK203": log.balance()}
-        self.add((each for rule in hits for each in as_findings(rule, hits[rule], str(file))),
+        self.add((finding for rule in hits for finding in as_findings(rule, hits[rule], str(file))),
                  "DK203", "DK208")  # fmt: skip
 
     def add_dumps(self, dump: Sequence[str], contacts: Sequence[str]) -> None:

@@ -13,8 +13,6 @@ from dragdeck.records.advised import AdvisedSettings
 from dragdeck.study.base import Json
 from dragdeck.study.fidelity import Tolerance
 from dragdeck.study.model import Study
-from dragdeck.study.workpiece import MeshShape
-from dragdeck.study.yaml import mesh_beside
 
 SAID_BY_NAME = ("youngs_modulus_scale", "timestep_fraction", "speed_factor")
 """The settings that the name of a fidelity without a name says."""
@@ -159,19 +157,6 @@ def of_each_workpiece(case: Case) -> list[Case]:
         replace(case, study=study, whole=case, number=number if studies[1:] else 0)
         for number, study in enumerate(studies, 1)
     ]
-
-
-def mesh_file(case: Case, shape: MeshShape) -> Path:
-    """The file of a mesh: beside the study, in its meshes/, or in the project's meshes/.
-
-    A study that extends another finds its meshes, too.
-
-    Raises
-    ------
-    InputError
-        No such file in any of these places.
-    """
-    return mesh_beside(case.file, shape.file)
 
 
 def digest(content: Json) -> str:

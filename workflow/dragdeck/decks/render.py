@@ -114,8 +114,8 @@ def overriding(scene: AnyScene, templates: jinja2.Environment) -> set[str]:
 
 def _added_forces(text: str) -> list[str]:
     """What the contact laws of a deck add to the force that limits friction."""
-    forces = (contact_law.added_forces(law) for law in contact_laws(text))
-    return list(dict.fromkeys(force for each in forces for force in each))
+    laws = contact_laws(text)
+    return list(dict.fromkeys(force for law in laws for force in contact_law.added_forces(law)))
 
 
 def of_its_templates(
@@ -201,7 +201,7 @@ def write_workpiece(
     templates : Environment
         Those of the run.
     """
-    outputs = {each.name: each.as_part() for each in scene.deck.outputs}
+    outputs = {output.name: output.as_part() for output in scene.deck.outputs}
     forces = [outputs.pop(name) for name in list(outputs) if name.startswith(WORKPIECE_FORCE)]
     columns = ColumnsFile(outputs={**outputs, WORKPIECE_FORCE: forces[number - 1]})
     changed = of_its_templates(deck_text(scene, templates), scene, templates)
@@ -230,7 +230,7 @@ def write_run(scene: AnyScene, folder: Path, templates: jinja2.Environment) -> l
     list of Path
         The files.
     """
-    columns = ColumnsFile(outputs={each.name: each.as_part() for each in scene.deck.outputs})
+    columns = ColumnsFile(outputs={output.name: output.as_part() for output in scene.deck.outputs})
     texts = {
         DECK_FILE: deck_text(scene, templates),
         COLUMNS_FILE: columns.as_text(),

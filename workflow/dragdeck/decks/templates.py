@@ -348,7 +348,7 @@ def _check_own(templates: jinja2.Environment, study: Path, project: Path) -> Non
 
 def _idle_parts(templates: jinja2.Environment, name: str) -> Iterator[InputError]:
     """What an extending template has that no script contains, whatever the values."""
-    tree, *others = (_parsed(templates, each) for each in used(templates, name))
+    tree, *others = (_parsed(templates, file) for file in used(templates, name))
     blocks = {block.name for other in others for block in other.find_all(nodes.Block)}
     macros = {macro.name for other in others for macro in other.find_all(nodes.Macro)}
     file, see = file_of(templates, name), "docs/reference/templates.md lists the blocks"
@@ -377,5 +377,5 @@ def _writes(node: nodes.Node) -> bool:
 
 def _is_text(part: nodes.Node) -> bool:
     return isinstance(part, nodes.Output) and any(
-        not isinstance(each, nodes.TemplateData) or each.data.strip() for each in part.nodes
+        not isinstance(node, nodes.TemplateData) or node.data.strip() for node in part.nodes
     )

@@ -22,7 +22,13 @@ from dragdeck.errors import InputError, together
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import round_to, rounded
 from dragdeck.scenes import motion as motions
-from dragdeck.scenes import workpiece as workpieces
+from dragdeck.scenes.workpiece import (
+    dip,
+    outline_in_bed,
+    workpiece_length,
+    workpiece_radius,
+    workpiece_reach,
+)
 from dragdeck.study.paths.path import as_rows
 from dragdeck.study.workpiece import MeshShape
 
@@ -73,7 +79,7 @@ def clearances(case: Case, surface_m: float) -> Clearances:
     across, along, up = motion.bowl.reach_m if motion.bowl else (0.0, 0.0, 0.0)
     tip = surface_m - motion.immersion_depth_m - up
     wall = wall_gap(case, surface_m) - math.hypot(across, along)
-    return Clearances(wall, tip, tip + motion.vertical_range_m[0] - workpieces.dip(case))
+    return Clearances(wall, tip, tip + motion.vertical_range_m[0] - dip(case))
 
 
 def in_diameters(case: Case, gap_m: float) -> float:
@@ -94,7 +100,7 @@ def wall_gap(case: Case, surface_m: float | None = None) -> float:
     begin, plunge = motion.path.start_point, motion.plunge_point
     one_side = motion.tilt_deg and motion.path.one_side_inwards(motion.orientation)
     if one_side and bowl.round and not bowl.rim:
-        angle, outline = motion.path.direction_rad, workpieces.outline_in_bed(case).T
+        angle, outline = motion.path.direction_rad, outline_in_bed(case).T
         turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
         around = np.concatenate([outline @ turn + place for place in (begin, plunge)])
         return float(bowl.side_distance(around).min())
@@ -102,7 +108,7 @@ def wall_gap(case: Case, surface_m: float | None = None) -> float:
     entry = np.linspace(plunge, begin, count)
     drag = np.atleast_2d(as_rows(motion.path.place(np.linspace(0.0, 1.0, count))))
     places = np.concatenate([entry, motion.path.corners[:, :2], drag[:, :2]])
-    reach, surface = workpieces.workpiece_reach(case), surface_m or expected_surface(case.study)
+    reach, surface = workpiece_reach(case), surface_m or expected_surface(case.study)
     if not bowl.rim:
         return float(bowl.side_distance(places).min()) - reach
     ring = np.linspace(0.0, math.tau, _SIDES, endpoint=False)
@@ -175,7 +181,7 @@ def closest(each: Sequence[Case], bed: Bed) -> tuple[float, int, int] | None:
     """
     if len(each) < 2:
         return None
-    reaches = [workpieces.workpiece_reach(workpiece) for workpiece in each]
+    reaches = [workpiece_reach(workpiece) for workpiece in each]
     ways = [_way(workpiece, bed) for workpiece in each]
     return min(
         (float(np.hypot(*(ways[a] - ways[b]).T).min()) - reaches[a] - reaches[b], a + 1, b + 1)
@@ -212,7 +218,7 @@ def _beside(case: Case, gap: float) -> Iterator[InputError]:
 
 
 def _below(case: Case, tip_m: float) -> Iterator[InputError]:
-    depth, length = case.study.motion.immersion_depth_m, workpieces.workpiece_length(case)
+    depth, length = case.study.motion.immersion_depth_m, workpiece_length(case)
     if length < depth:
         yield InputError(
             "the workpiece is shorter than its immersion depth: particles would cover it",
@@ -246,8 +252,8 @@ def _up_and_down(case: Case, tip_m: float) -> Iterator[InputError]:
     """Refuse a path or superposed motions that take a workpiece to the floor or out of the bed."""
     motion = case.study.motion
     depth, (low, high) = motion.immersion_depth_m, motion.vertical_range_m
-    low -= workpieces.dip(case)
-    deepest = min(depth + tip_m - _largest_particle(case), workpieces.workpiece_length(case))
+    low -= dip(case)
+    deepest = min(depth + tip_m - _largest_particle(case), workpiece_length(case))
     moving = ["path"] if any(motion.path_heights_m) or motion.path.inclined else []
     moving += [
         name
@@ -288,7 +294,7 @@ def _per_step(case: Case, timestep_s: float) -> Iterator[InputError]:
         what, most = "the surface of the workpiece moves by more than the neighbour skin", has
         remedy += f", or a fidelity.skin_m of at least {rounded(moved, up=True):g}"
         if superposed:
-            reach = workpieces.workpiece_radius(case)
+            reach = workpiece_radius(case)
             field = max(superposed, key=lambda name: superposed[name].surface_speed_m_s(reach))
     yield InputError(
         f"{what} per step: contacts would be missed",
@@ -331,7 +337,7 @@ def _fastest_in_drag(case: Case) -> float:
 
 def driven_surface(case: Case) -> float:
     """Highest speed of the workpiece's surface in the drag as it is driven, m/s."""
-    radius = workpieces.workpiece_radius(case) if case.study.motion.superposed() else 0.0
+    radius = workpiece_radius(case) if case.study.motion.superposed() else 0.0
     return motions.driven_surface_speed(case.study, radius)
 
 
@@ -344,12 +350,12 @@ def check_headroom(case: Case, tip_m: float, top_m: float) -> None:
         The workpiece is too long.
     """
     longest = top_m - tip_m - 0.001
-    if workpieces.workpiece_length(case) > longest:
+    if workpiece_length(case) > longest:
         raise InputError(
             "the workpiece is longer than the simulation box above the packing",
             file=case.file,
             field="workpiece.shape",
-            value=f"length {workpieces.workpiece_length(case):.4g} m",
+            value=f"length {workpiece_length(case):.4g} m",
             limit=f"at most {longest:.4g} m",
             remedy="shorten the mesh at its upper end, or use a higher bowl (bowl.height_m)",
         )

@@ -329,7 +329,7 @@ def spread_out(count: int) -> list[int]:
     """
     places, parts = list[int](), 3
     while len(dict.fromkeys(places)) < count:
-        ends = (each for first in range((parts + 1) // 2) for each in (first, parts - 1 - first))
+        ends = (end for first in range((parts + 1) // 2) for end in (first, parts - 1 - first))
         places += [(2 * part + 1) * count // (2 * parts) for part in ends]
         parts *= 3
     return [*dict.fromkeys(places)]

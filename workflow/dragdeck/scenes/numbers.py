@@ -4,8 +4,13 @@ from dragdeck.cases import bed as beds
 from dragdeck.cases.case import Case, of_each_workpiece
 from dragdeck.mesh.surface import volume_below
 from dragdeck.physics.contact_mechanics import inertial_number
-from dragdeck.scenes import workpiece as workpieces
 from dragdeck.scenes.moving_bowl import path_tilt_deg
+from dragdeck.scenes.workpiece import (
+    fastest_surface,
+    reference_height,
+    workpiece_mesh,
+    workpiece_radius,
+)
 from dragdeck.study.contact_law import compared_numbers
 
 
@@ -22,8 +27,8 @@ def workpiece_buoyancy(case: Case, surface_m: float) -> float:
     if compound is None:
         return 0.0
     lowest = surface_m - motion.immersion_depth_m + motion.path.start_height_m
-    level = study.liquid_level_m - lowest - workpieces.reference_height(case)
-    volume = volume_below(workpieces.workpiece_mesh(case), level)
+    level = study.liquid_level_m - lowest - reference_height(case)
+    volume = volume_below(workpiece_mesh(case), level)
     return compound.density_kg_m3 * study.gravity_m_s2 * volume
 
 
@@ -42,7 +47,7 @@ def describe(case: Case) -> dict[str, float]:
     study = case.study
     particle, diameter = beds.particle_material(study), 2 * study.media.typical_radius_m
     motion = study.motion
-    speed = workpieces.fastest_surface(case)
+    speed = fastest_surface(case)
     rate = speed / diameter
     added = speed / motion.nominal_speed_m_s - 1
     superposed = {"superposed_speed": added} if motion.superposed() or added > 1e-9 else {}
@@ -60,7 +65,7 @@ def describe(case: Case) -> dict[str, float]:
         "inertial_number": inertial_number(
             rate, diameter, particle.density_kg_m3, beds.tip_pressure(study)
         ),
-        "workpiece_to_particle": 2 * workpieces.workpiece_radius(case) / diameter,
+        "workpiece_to_particle": 2 * workpiece_radius(case) / diameter,
         "depth_to_particle": motion.immersion_depth_m / diameter,
         "bowl_to_particle": 2 * study.bowl.container.clear_m / diameter,
         **compared_numbers(

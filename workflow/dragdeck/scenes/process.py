@@ -6,7 +6,7 @@ from dataclasses import asdict, replace
 from functools import partial
 
 from dragdeck.cases.bed import bed_rayleigh_time, bed_timestep, buoyancy_density
-from dragdeck.cases.case import Case, Stretch, mesh_file, of_each_workpiece
+from dragdeck.cases.case import Case, Stretch, of_each_workpiece
 from dragdeck.decks import PACKING_FILE, WORKPIECE_MESH, outputs
 from dragdeck.decks.deck import NOT_OF_LIQUID, Scene
 from dragdeck.decks.outputs import Output
@@ -25,18 +25,28 @@ from dragdeck.scenes import fit as fits
 from dragdeck.scenes import liquid as liquids
 from dragdeck.scenes import motion as motions
 from dragdeck.scenes import scene as scenes
-from dragdeck.scenes import workpiece as workpieces
 from dragdeck.scenes.drop_test import DROP_TEST
 from dragdeck.scenes.lead import Covered, covered, mark_file, stops, with_lead
 from dragdeck.scenes.numbers import describe, workpiece_buoyancy
 from dragdeck.scenes.process_cautions import process_cautions
 from dragdeck.scenes.process_deck import ProcessDeck, moved_workpiece
 from dragdeck.scenes.process_texts import process_leaves_out, process_models
+from dragdeck.scenes.workpiece import (
+    PARTICLE_STEPS_PER_S,
+    reference_height,
+    remeshing,
+    simulated_mesh,
+    workpiece_facets,
+    workpiece_length,
+    workpiece_radius,
+    workpiece_reach,
+)
 from dragdeck.study.base import Json, without_fields
 from dragdeck.study.bowls.bowl import LID
 from dragdeck.study.drive import Drive, EngineMotion
 from dragdeck.study.model import Study
 from dragdeck.study.workpiece import MeshShape, Shape
+from dragdeck.study.yaml import mesh_beside
 
 _ENERGY_DRIFT = 0.1
 """Largest change of the mean kinetic energy while it is counted: 5 % in the bed's speed."""
@@ -60,7 +70,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
     """
     whole = with_lead(case.all_workpieces)
     each = of_each_workpiece(whole)
-    study, counts = whole.study, [workpieces.workpiece_facets(workpiece) for workpiece in each]
+    study, counts = whole.study, [workpiece_facets(workpiece) for workpiece in each]
     facets = study.bowl_facet_size_m is not None
     settled = bed or bed_space.expected_bed(study)
     dt, top = bed_timestep(study, "timestep_fraction"), bed_space.box_top(study)
@@ -72,7 +82,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
     liquids.check_submerged(whole, bed)
     deepest = max(workpiece.study.motion.immersion_depth_m for workpiece in each)
     courses = [
-        motions.course(workpiece.study, bed, workpieces.reference_height(workpiece), deepest)
+        motions.course(workpiece.study, bed, reference_height(workpiece), deepest)
         for workpiece in each
     ]
     moved = []
@@ -84,7 +94,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
             moved_workpiece(workpiece, way, meshes[workpiece.study.workpiece.shape], steps.entry)
         )
         fits.check_headroom(
-            workpiece, way.start_m[2] + bed.margin_m - workpieces.reference_height(workpiece), top
+            workpiece, way.start_m[2] + bed.margin_m - reference_height(workpiece), top
         )
     skin = max(map(fits.process_skin, each))
     gravity, down = moving_bowl.driven_gravity(study, liquids.acting_gravity(study))
@@ -181,7 +191,7 @@ def _mesh_files(each: Sequence[Case]) -> Mapping[Shape, str]:
 
 
 def _stl(case: Case) -> str:
-    return stl_text(workpieces.simulated_mesh(case))
+    return stl_text(simulated_mesh(case))
 
 
 def _source(case: Case) -> str:
@@ -264,14 +274,14 @@ def _process_case(
         surface_m=surface_m,
         workpiece=WorkpieceOfRun(
             kind="mesh" if motion.inclined else study.workpiece.shape.kind,
-            radius_m=workpieces.workpiece_reach(case),
-            length_m=workpieces.workpiece_length(case),
+            radius_m=workpiece_reach(case),
+            length_m=workpiece_length(case),
             mesh=WORKPIECE_MESH,
             immersion_depth_m=motion.immersion_depth_m,
             number=case.number,
             count=len(each),
             wake_from_m=_wake_from(each, number),
-            remeshed=workpieces.remeshing(case),
+            remeshed=remeshing(case),
         ),
         output_of=PROCESS.run_id(case.all_workpieces) if case.number > 1 else None,
         motion=way.driven.path_entry(),
@@ -329,7 +339,7 @@ def _fastest(case: Case, way: motions.Course) -> float:
 
 
 def _partners(case: Case) -> list[tuple[str, str, float]]:
-    workpiece = ("workpiece", case.study.workpiece.material, workpieces.workpiece_radius(case))
+    workpiece = ("workpiece", case.study.workpiece.material, workpiece_radius(case))
     return [*fillings.partners_in_bed(case), workpiece]
 
 
@@ -351,7 +361,7 @@ def _content(case: Case) -> Json:
         study.of_runs(study.bowl.material, study.workpiece.material), *_NOT_READ
     )
     shapes = [workpiece.study.workpiece.shape for workpiece in of_each_workpiece(case)]
-    files = [mesh_file(case, shape) for shape in shapes if isinstance(shape, MeshShape)]
+    files = [mesh_beside(case.file, shape.file) for shape in shapes if isinstance(shape, MeshShape)]
     checksums = [file_checksum(file) for file in dict.fromkeys(files)]
     mesh = {"mesh": " ".join(checksums)} if checksums else {}
     return {**content, "filling": fillings.FILLING.run_id(case), **mesh, **_stretches(case)}
@@ -376,7 +386,7 @@ PROCESS = scenes.SceneType(
     regime="drag",
     impact_speed=fits.fastest_motion,
     partners=_partners,
-    particle_steps_per_s=workpieces.PARTICLE_STEPS_PER_S,
+    particle_steps_per_s=PARTICLE_STEPS_PER_S,
     needs_bed=True,
 )
 

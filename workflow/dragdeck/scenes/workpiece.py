@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dragdeck.cases.bed import bed_timestep
-from dragdeck.cases.case import Case, mesh_file
+from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
 from dragdeck.mesh import surface as surfaces
 from dragdeck.mesh.checks import MeshDefect, Surroundings, check
@@ -20,6 +20,7 @@ from dragdeck.physics.rounding import round_to
 from dragdeck.study.driven import DrivenMotion
 from dragdeck.study.rotations import by_vector
 from dragdeck.study.workpiece import CylinderShape, MeshShape
+from dragdeck.study.yaml import mesh_beside
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
@@ -111,7 +112,7 @@ def mesh_of_case(case: Case, shape: MeshShape) -> "tuple[Trimesh, list[MeshDefec
     study = case.study
     sizes = study.bowl.container.clear_m, study.media.typical_radius_m, study.motion.deepest_m
     surroundings = Surroundings(*sizes)
-    return _from_file(mesh_file(case, shape), shape, surroundings)
+    return _from_file(mesh_beside(case.file, shape.file), shape, surroundings)
 
 
 def simulated_mesh(case: Case) -> "Trimesh":

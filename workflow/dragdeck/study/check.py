@@ -13,17 +13,17 @@ from pydantic_core import ErrorDetails
 
 from dragdeck.errors import Caution, InputError, near, together
 from dragdeck.files import table_rows
-from dragdeck.study import model as models
 from dragdeck.study.base import Json, Model
 from dragdeck.study.contradictions import contradictions, decimal_commas, signal_problems
 from dragdeck.study.fidelity import BUILT_IN_FIDELITIES, Fidelity
+from dragdeck.study.model import Study
 from dragdeck.study.plausible import implausible
 from dragdeck.study.recorded import Places, mesh_errors, with_recording
 from dragdeck.study.removal import disagreements
 from dragdeck.study.yaml import located, shown
 
 
-def validate(data: Json, file: Path | str, *, whole: bool = False) -> models.Study:
+def validate(data: Json, file: Path | str, *, whole: bool = False) -> Study:
     """Check plain data against the study model, and its values against each other.
 
     Parameters
@@ -42,7 +42,7 @@ def validate(data: Json, file: Path | str, *, whole: bool = False) -> models.Stu
     data, places, unread = with_recording(data, Path(file))
     problems, study = list(unread.values()), None
     try:
-        study = models.Study.model_validate(data)
+        study = Study.model_validate(data)
     except ValidationError as error:
         problems += [problem for problem in _problems(error) if problem.field not in _named(unread)]
     wrong = {error.field for error in problems}
@@ -64,7 +64,7 @@ def _named(unread: Iterable[str]) -> set[str]:
     return {name for field in unread for name in (field, f"{field}.points")}
 
 
-def warnings(study: models.Study) -> list[Caution]:
+def warnings(study: Study) -> list[Caution]:
     """What a valid study hardly means, one line each."""
     cautions = [
         Caution(
@@ -148,7 +148,7 @@ def _problem(issue: ErrorDetails) -> InputError:
 
 def _hint(word: str, known: set[str]) -> str:
     """A question about the blocks that have a key, or about the key that it resembles."""
-    elsewhere = sorted({word} & set(models.Study.model_fields))
+    elsewhere = sorted({word} & set(Study.model_fields))
     elsewhere += sorted(name for name in known if name.endswith(f".{word}"))[:3]
     return f"did you mean {' or '.join(map(repr, elsewhere))}? " if elsewhere else near(word, known)
 

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import get_args
 
 from dragdeck.errors import InputError, RecordError, choices, near
-from dragdeck.study import model as models
 from dragdeck.study.base import flat
 from dragdeck.study.driven import directions
 from dragdeck.study.fidelity import BUILT_IN_FIDELITIES, Tolerance
+from dragdeck.study.model import OF_NO_RUN, AnyBowl, Scaling, Study
 from dragdeck.study.motion import AnyPath
 from dragdeck.study.plausible import plausible_range
 from dragdeck.study.recorded import recorded_file
@@ -31,7 +31,7 @@ _Found = Iterator[tuple[str, str, str]]
 """Field, what is wrong with it, and what would be accepted."""
 
 
-def contradictions(study: models.Study, whole: bool) -> Iterator[InputError]:
+def contradictions(study: Study, whole: bool) -> Iterator[InputError]:
     """Every contradiction within a whole study, or one of its cases; the errors name no file."""
     values = flat(study.plain())
     for check in (
@@ -50,7 +50,7 @@ def contradictions(study: models.Study, whole: bool) -> Iterator[InputError]:
             yield InputError(problem, field=field, value=values.get(field), limit=limit)
 
 
-def _names(study: models.Study) -> _Found:
+def _names(study: Study) -> _Found:
     owners = {"bowl": study.bowl.material, "workpiece": study.workpiece.material}
     for name, part in study.media.parts.items():
         owners[f"media.classes.{name}" if name else "media"] = str(part.material)
@@ -66,7 +66,7 @@ def _known(field: str, name: str, known: Iterable[str], problem: str) -> _Found:
         yield field, f"{problem} {name!r}", choices(name, known)
 
 
-def _pairs(study: models.Study) -> _Found:
+def _pairs(study: Study) -> _Found:
     every = ["-".join(both) for both in product(study.materials, repeat=2)]
     for key, pair in study.pairs.items():
         back = "-".join(key.split("-")[::-1])
@@ -93,7 +93,7 @@ def _pairs(study: models.Study) -> _Found:
             )
 
 
-def _media(study: models.Study) -> _Found:
+def _media(study: Study) -> _Found:
     media = study.media
     for name in {"particle", "bowl", "workpiece"} & set(media.classes):
         yield "media.classes", f"a class must not be called {name}", "another name"
@@ -110,7 +110,7 @@ def _media(study: models.Study) -> _Found:
         yield "media.fill_height_m", problem, f"at most {study.bowl.height_m:g} m"
 
 
-def _crowd(study: models.Study) -> _Found:
+def _crowd(study: Study) -> _Found:
     """More spheres than a run can have, and the class and sieves that make most of them."""
     media, known = study.media, plausible_range("media.count")
     assert known is not None
@@ -133,7 +133,7 @@ def _crowd(study: models.Study) -> _Found:
     )
 
 
-def _compound(study: models.Study) -> _Found:
+def _compound(study: Study) -> _Found:
     compound, rim = study.compound, study.bowl.height_m
     if compound is None:
         return
@@ -152,7 +152,7 @@ def _compound(study: models.Study) -> _Found:
             yield "compound.density_kg_m3", problem, f"below {lightest:g} kg/m3"
 
 
-def _angles(study: models.Study) -> _Found:
+def _angles(study: Study) -> _Found:
     angles, media = study.calibration and study.calibration.angles, study.media
     if angles and media.classes:
         yield "calibration.angles", "the media have several classes", "media of one class"
@@ -161,7 +161,7 @@ def _angles(study: models.Study) -> _Found:
         yield from ((f"calibration.angles.{field}", what, limit) for field, what, limit in problems)
 
 
-def _shape(study: models.Study) -> _Found:
+def _shape(study: Study) -> _Found:
     shape, field = study.workpiece.shape, "workpiece.shape"
     if isinstance(shape, CylinderShape):
         return
@@ -181,7 +181,7 @@ def _shape(study: models.Study) -> _Found:
         yield f"{field}.edge_facet_size_m", problem, "a STEP file (.step, .stp); or no such field"
 
 
-def _motion(study: models.Study) -> _Found:
+def _motion(study: Study) -> _Found:
     """Statistics need a frame of the contact network after all that they leave out."""
     motion, problem = study.motion, "no path is left for the statistics"
     if motion.bowl_rad_s and not study.bowl.container.round:
@@ -221,7 +221,7 @@ _OF_OTHER_KINDS = [
     for block, kinds in {
         "motion.path": get_args(AnyPath),
         "workpiece.shape": get_args(get_args(Shape)[0]),
-        "bowl": [get_args(kind)[0] for kind in get_args(models.AnyBowl)],
+        "bowl": [get_args(kind)[0] for kind in get_args(AnyBowl)],
     }.items()
     for kind in kinds
     for name in kind.model_fields
@@ -229,7 +229,7 @@ _OF_OTHER_KINDS = [
 """Fields of all kinds of path, shape and bowl: a study may extend or sweep to another kind."""
 
 
-def _assumptions(study: models.Study) -> _Found:
+def _assumptions(study: Study) -> _Found:
     values = flat(study.model_dump(mode="json"))
     parts = (name.split(".") for name in (*values, *_OF_OTHER_KINDS))
     known = {".".join(words[:count]) for words in parts for count in range(1, len(words) + 1)}
@@ -245,7 +245,7 @@ def _assumptions(study: models.Study) -> _Found:
             yield f"assumptions.{number}.std", f"{entry.field} is no number", limit
 
 
-def _removal(study: models.Study) -> _Found:
+def _removal(study: Study) -> _Found:
     removal = study.removal
     if removal is None:
         if study.roughness:
@@ -264,13 +264,13 @@ def _removal(study: models.Study) -> _Found:
         yield "removal.calibrate", problem, "one workpiece, and a sweep over seed at most"
 
 
-def _sweep(study: models.Study) -> _Found:
+def _sweep(study: Study) -> _Found:
     for field, values in study.sweep.items():
         if not all(field.split(".")):
             yield "sweep", f"{field!r} is not a field", "a dotted name, such as motion.speed_m_s"
         if not values:
             yield f"sweep.{field}", "no values", "one value or more"
-        if field.split(".")[0] in models.OF_NO_RUN:
+        if field.split(".")[0] in OF_NO_RUN:
             yield f"sweep.{field}", "no run depends on it", "a field that the runs depend on"
     count, most = math.prod(map(len, study.sweep.values())), study.accepted.cases
     if count > most:
@@ -282,7 +282,7 @@ def _sweep(study: models.Study) -> _Found:
         yield from _search(study.search, study)
 
 
-def _search(search: Search, study: models.Study) -> _Found:
+def _search(search: Search, study: Study) -> _Found:
     """Why no run of the study could answer the search."""
     if {*study.sweep} != {"seed"} or len(study.sweep["seed"]) < 2:
         problem = "a search knows the scatter of its runs from several packings at each setting"
@@ -303,7 +303,7 @@ def _search(search: Search, study: models.Study) -> _Found:
             limit = "another quantity, or the machine without reduction.cut_out"
             yield f"search.{name}.quantity", "a straight cut-out does not give it", limit
     for field in search.vary:
-        if field.split(".")[0] in (*models.OF_NO_RUN, "fidelity", "fidelities", "seed", "outputs"):
+        if field.split(".")[0] in (*OF_NO_RUN, "fidelity", "fidelities", "seed", "outputs"):
             yield f"search.vary.{field}", "it is no setting of the machine", "another field"
     for name, problem in search.excluded():
         yield f"search.{name}", problem, "limits that one setting can meet together"
@@ -323,7 +323,7 @@ def _search(search: Search, study: models.Study) -> _Found:
             yield "search.confirm", problem, limit
 
 
-def _scaling(scaling: models.Scaling, study: models.Study) -> _Found:
+def _scaling(scaling: Scaling, study: Study) -> _Found:
     """Why the sweep cannot tell the power law."""
     field, others = scaling.field, [name for name in study.sweep if name != "seed"]
     if field not in others:
@@ -341,7 +341,7 @@ def _scaling(scaling: models.Scaling, study: models.Study) -> _Found:
         yield f"sweep.{field}", problem, f"{_LEAST_LEVELS} levels or more"
 
 
-def signal_problems(study: models.Study, file: Path) -> Iterator[InputError]:
+def signal_problems(study: Study, file: Path) -> Iterator[InputError]:
     """What keeps the measured force signal from being compared with that of a run."""
     signal = study.reference.signal if study.reference else None
     if signal is None:
@@ -369,7 +369,7 @@ def signal_problems(study: models.Study, file: Path) -> Iterator[InputError]:
         yield error
 
 
-def decimal_commas(study: models.Study, file: Path) -> Iterator[InputError]:
+def decimal_commas(study: Study, file: Path) -> Iterator[InputError]:
     """Lists of a sweep that may be one number, ``[1,5]``; whole numbers have no fraction."""
     values, written = flat(study.plain()), comma_lists(file) if study.sweep else {}
     for name in study.sweep:
