@@ -33,14 +33,12 @@ ensure_writable() {
         "limit:  10000 kB" "remedy: free disk space, then give the same command again"
 }
 
-check_profile() {
-    case " $* " in
-        *" --profile profiles/slurm"* | *" --profile=profiles/slurm"*) fail \
-            "this profile would be combined with profiles/default" \
-            "value:  --profile profiles/slurm" "limit:  the cores of profiles/default would limit the MPI ranks of a run" \
-            "remedy: --workflow-profile profiles/slurm" ;;
-    esac
-}
+case " $* " in
+    *" --profile profiles/slurm"* | *" --profile=profiles/slurm"*) fail \
+        "this profile would be combined with profiles/default" \
+        "value:  --profile profiles/slurm" "limit:  the cores of profiles/default would limit the MPI ranks of a run" \
+        "remedy: --workflow-profile profiles/slurm" ;;
+esac
 
 # Run a command of a study.
 call() {

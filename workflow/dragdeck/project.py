@@ -131,9 +131,9 @@ class Project:
         """
         self.cases(study)
         file = study_file(self.studies, study)
-        study_ = validate(read_study(file), file, whole=True)
-        _needed(study_.search, "search", file)
-        return study_
+        valid = validate(read_study(file), file, whole=True)
+        _needed(valid.search, "search", file)
+        return valid
 
     def plan_file(self, plan: str) -> Path:
         """The file of a plan, which is known by its name or its path.
@@ -272,12 +272,8 @@ def scaling_of(case: Case) -> Scaling:
 
 def _needed(block: V | None, field: str, file: Path) -> V:
     if block is None:
-        raise InputError(
-            "a required key is missing",
-            file=file,
-            field=field,
-            remedy="add this block: docs/howto/sweep.md",
-        )
+        problem, remedy = "a required key is missing", "add this block: docs/howto/sweep.md"
+        raise InputError(problem, file=file, field=field, remedy=remedy)
     return block
 
 

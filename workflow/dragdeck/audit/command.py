@@ -113,12 +113,11 @@ class Report:
         self.applied: set[str] = set()
         self.known: dict[str, float | str] = {}
 
-    def add(self, results: Iterable[Finding], *ids: str) -> None:
+    def add(self, hits: Iterable[Finding], *ids: str) -> None:
         """Add what rules say whose ids begin so."""
-        added = [finding for finding in results
-                 if finding.rule in self.wanted and finding.file != self.after]  # fmt: skip
+        added = [hit for hit in hits if hit.rule in self.wanted and hit.file != self.after]
         self.every += added
-        skipped = {finding.rule for finding in added if finding.severity == NOT_APPLIED}
+        skipped = {hit.rule for hit in added if hit.severity == NOT_APPLIED}
         self.applied |= {id for id in self.wanted if id.startswith(ids)} - skipped
 
     def add_log(self, file: Path) -> None:

@@ -38,9 +38,7 @@ _NEEDS = {
 def script_findings(script: Script) -> list[Finding]:
     """What the rules DK101 to DK112 say of a script, in the order of its lines."""
     facts = Facts(script)
-    results = [
-        finding for rule, hits in _RULES.items() for finding in as_findings(rule, hits(facts))
-    ]
+    results = [hit for rule, hits in _RULES.items() for hit in as_findings(rule, hits(facts))]
     order = {file: place for place, file in enumerate([*script.texts, ""])}
     return sorted(results, key=lambda result: (order[result.file], result.line))
 
