@@ -119,6 +119,11 @@ def interrupted(number, frame):
     signal.default_int_handler(number, frame)
 
 
+def reported(jobs):
+    """The studies whose report is among jobs."""
+    return [job.wildcards.study for job in jobs if job.rule.name == "write_report"]
+
+
 def tell_numbers(study):
     """Say where the report is, with its main numbers; nothing if there is none."""
     said = shell("dragchain step numbers results/{study}/report 2> /dev/null || true", read=True)

@@ -8,9 +8,10 @@ rule write_comparison:
         ],
         templates=WORK.page_templates("compare/compare.html.j2", "compare/networks.html.j2"),
     output:
-        multiext("results/compare/{studies}/", "comparison.html", "differences.csv"),
+        page="results/compare/{studies}/comparison.html",
+        table="results/compare/{studies}/differences.csv",
     params:
         source=source_hash("dragchain.compare.report"),
     shell:
-        "dragchain compare --out $(dirname {output[0]}) $(dirname $(dirname {input.reports}))"
+        "dragchain compare --out $(dirname {output.page}) $(dirname $(dirname {input.reports}))"
         " > {log} 2>&1"

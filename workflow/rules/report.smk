@@ -53,11 +53,6 @@ onstart:
     logger.info(text, extra={"shown": True, "plan": runs, "cores": cores})
 
 
-def reported(jobs):
-    """The studies whose report is among jobs."""
-    return [job.wildcards.study for job in jobs if job.rule.name == "write_report"]
-
-
 onsuccess:
     for study in reported(workflow.dag.jobs):
         tell_numbers(study)
