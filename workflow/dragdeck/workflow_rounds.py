@@ -59,9 +59,8 @@ class WorkflowInRounds(Workflow):
 
     def _said_before(self, wildcards: Wildcards) -> dict[str, Any]:
         """The content of the round before; nothing before the first."""
-        said: dict[str, Any] = {}
-        for before in self.round_before(wildcards):
-            said = json.loads(Path(before).read_text())
+        before = self.round_before(wildcards)
+        said: dict[str, Any] = json.loads(Path(before[0]).read_text()) if before else {}
         return said
 
     def _window_folders(self, wildcards: Wildcards, windows: list[Case]) -> list[str]:

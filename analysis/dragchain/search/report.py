@@ -57,11 +57,8 @@ def advance(studied: SearchedStudy, number: int, measure: PointMeasure = read_po
     record.model_copy(update={"points": (*findings.points, *more)}).write(file)
     chosen = [point for point in more if point.round == number]
     tried = [point for point in chosen if point.ran or not point.refused]
-    if chosen:
-        gone = len(chosen) - len(tried)
-        say(f"search: round {number}: {len(tried)} settings to run, {gone} refused")
-    else:
-        say(f"search: complete: {file.with_name('search.html')}")
+    said = f"round {number}: {len(tried)} settings to run, {len(chosen) - len(tried)} refused"
+    say(f"search: {said if chosen else file.with_name('search.html')}")
     runs = [folder.name for point in tried for folder in studied.folders(point.values)]
     return SearchRound(runs=tuple(runs), last=not chosen)
 
