@@ -374,12 +374,8 @@ PROCESS = scenes.SceneType(
     build=process_scene,
     inputs=(WORKPIECE_MESH,),
     tables=(
-        "thermo.parquet",
-        "workpiece_force.parquet",
-        "workpiece_contacts.parquet",
-        "particles.parquet",
-        "contacts.parquet",
-        "closure.json",
+        *("thermo.parquet", "workpiece_force.parquet", "workpiece_contacts.parquet"),
+        *("particles.parquet", "contacts.parquet", "closure.json"),
     ),
     network=("network.parquet", "chains.parquet", "clusters.parquet"),
     loading=("facets.parquet", "contact_events.parquet", "loading.json", "workpiece.vtp"),
@@ -391,7 +387,6 @@ PROCESS = scenes.SceneType(
 )
 
 
-SCENES: dict[str, scenes.SceneType] = {
-    scene.name: scene for scene in (DROP_TEST, fillings.FILLING, PROCESS)
-}
+_IN_ORDER = (DROP_TEST, fillings.FILLING, PROCESS)
+SCENES: dict[str, scenes.SceneType] = {scene.name: scene for scene in _IN_ORDER}
 """The scenes of a study's case, by name: a new one is its module and an entry here."""
