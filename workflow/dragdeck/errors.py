@@ -82,7 +82,10 @@ def together(errors: Iterable[InputError]) -> InputError:
 
 def near(word: str, known: Iterable[str]) -> str:
     """A question about the known word that a wrong one resembles; empty where none does."""
-    return "".join(f"did you mean {name!r}? " for name in get_close_matches(word, list(known), 1))
+    names = sorted(known, key=len)
+    longer = [name for name in names if name.startswith(f"{word}_")]
+    likely = longer or get_close_matches(word, names, 1)
+    return "".join(f"did you mean {name!r}? " for name in likely[:1])
 
 
 def choices(word: str, known: Iterable[str]) -> str:
@@ -172,21 +175,10 @@ class TruncatedDumpError(DumpError):
 
 
 CautionCode = Literal[
-    "class",
-    "cohesion",
-    "facets",
-    "fidelity",
-    "gap",
-    "implausible",
-    "mesh",
-    "overlap",
-    "ranks",
-    "size_ratio",
-    "stable_timestep",
-    "steps_per_contact",
-    "tilt",
-    "trials",
-]
+    "class", "cohesion", "facets", "fidelity", "gap", "implausible", "mesh", "overlap", "ranks",
+    "roughness", "size_ratio", "stable_timestep", "steps_per_contact", "thrown", "tilt", "trials",
+    "with_bowl",
+]  # fmt: skip
 """What a `Caution` is about."""
 
 

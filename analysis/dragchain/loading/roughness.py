@@ -21,10 +21,7 @@ from scipy.optimize import least_squares
 
 from dragchain.arrays import Floats
 from dragchain.statistics.estimate import Estimate, student_quantile
-from dragdeck.study.roughness import SAMPLING_LENGTHS, Form, Roughness, Turned
-
-_PHASES = (np.arange(4000) + 0.5) / 4000
-"""Places in half a period of a form, from 0 to 1."""
+from dragdeck.study.roughness import SAMPLING_LENGTHS, Roughness
 
 
 @dataclass(frozen=True)
@@ -104,25 +101,7 @@ class RoughnessProfile:
 
 def profile_of(roughness: Roughness) -> RoughnessProfile:
     """The profile before the process."""
-    if roughness.profile:
-        return RoughnessProfile(
-            np.array([height.z_m for height in roughness.profile]), SAMPLING_LENGTHS
-        )
-    start = roughness.turned or roughness.form
-    assert start is not None
-    return RoughnessProfile(_turned(start) if isinstance(start, Turned) else _form(start))
-
-
-def _turned(turned: Turned) -> Floats:
-    radius = turned.nose_radius_m
-    x = _PHASES * turned.feed_m / 2
-    return np.asarray(radius - np.sqrt(radius**2 - x**2))
-
-
-def _form(form: Form) -> Floats:
-    if form.shape == "triangle":
-        return np.asarray(4.0 * form.ra_m * _PHASES)
-    return np.asarray(-math.pi / 2 * form.ra_m * np.cos(np.pi * _PHASES))
+    return RoughnessProfile(roughness.heights_m, SAMPLING_LENGTHS if roughness.profile else 1)
 
 
 @dataclass(frozen=True)

@@ -121,8 +121,10 @@ def test_workpieces_at_different_depths_reach_them_at_the_same_step(carousel: Ca
     depths = [process_scene(member, BED).case.workpiece.immersion_depth_m for member in each]
     assert depths == [case.study.motion.immersion_depth_m, 0.004]
     assert PROCESS.run_id(case) != PROCESS.run_id(carousel([{"angle_deg": 0}, {"angle_deg": 180}]))
-    with pytest.raises(InputError, match="immersion_depth_m"):
+    with pytest.raises(InputError, match=r"workpieces.each.0.immersion_depth_m"):
         process_scene(carousel([{"angle_deg": 0, "immersion_depth_m": 0.5}]), BED)
+    with pytest.raises(InputError, match=r"workpieces.each.1.immersion_depth_m"):
+        process_scene(carousel([stations[0], {"angle_deg": 180, "immersion_depth_m": 0.037}]), BED)
 
 
 def test_no_two_workpieces_share_a_name(carousel: Carousel, project: Project) -> None:

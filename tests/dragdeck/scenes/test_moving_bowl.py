@@ -14,11 +14,12 @@ from dragdeck.outlook.process import dimensionless, workpiece_notes
 from dragdeck.physics.turning_bed import surface_rise, surface_tilt
 from dragdeck.project import Project
 from dragdeck.scenes.fit import clearances, fastest_motion
-from dragdeck.scenes.moving_bowl import bed_in_motion
+from dragdeck.scenes.moving_bowl import bed_in_motion, bowl_cautions
 from dragdeck.scenes.process import process_scene
 from dragdeck.scenes.workpiece import fastest_surface
 from dragdeck.script.formula import value_of
 from dragdeck.study.bowl_motions.vibration import Vibration
+from dragdeck.study.fidelity import Tolerance
 
 RATE = 30 * math.tau / 60
 TURNING = {"kind": "rotation", "rpm": 30}
@@ -207,3 +208,49 @@ def test_a_bed_in_a_bowl_at_rest_is_what_it_was(moved: Made) -> None:
     bed = replace(BED, margin_m=0.001)
     for motion in ({}, {"bowl": ELLIPSE}, {"bowl": TURNING}):
         assert bed_in_motion(moved(**motion).study, bed) is bed
+
+
+@pytest.mark.parametrize("block", ["fidelity.soft_start", "fidelity.tolerance"])
+def test_a_remedy_names_what_the_study_has(block: str, moved: Made) -> None:
+    case = moved(
+        {"youngs_modulus_scale": 1e-3, "soft_start": {"youngs_modulus_scale": 1e-4}}, bowl=ELLIPSE
+    )
+    if block.endswith("tolerance"):
+        case = replace(case, requested=Tolerance(tolerance=0.1))
+    with pytest.raises(InputError) as caught:
+        process_scene(case, BED)
+    assert caught.value.field == block
+
+
+# --- what is warned of ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("motion", "code"),
+    [
+        ({"amplitude_m": [0, 0, 0.003], "frequency_hz": 80}, "thrown"),
+        ({"amplitude_m": [0.003, 0, 0], "frequency_hz": 80}, None),
+        ({"amplitude_m": [0, 0, 0.0005], "frequency_hz": 25}, None),
+        ({"kind": "rotation", "rpm": 0.02 / 0.01 * 30 / math.pi}, "with_bowl"),
+        ({"kind": "rotation", "rpm": -0.02 / 0.01 * 30 / math.pi}, None),
+    ],
+)
+def test_a_motion_that_does_little_or_too_much_is_warned_of(
+    motion: dict[str, Any], code: str | None, moved: Made
+) -> None:
+    bowl = motion if "kind" in motion else {**ELLIPSE, **motion}
+    codes = {caution.code for caution in bowl_cautions(moved(bowl=bowl))}
+    assert codes & {"thrown", "with_bowl"} == ({code} if code else set())
+
+
+def test_amplitudes_that_rise_are_not_counted(moved: Made) -> None:
+    """They begin to rise before the plunge."""
+    motion = moved(bowl=ELLIPSE).study.motion
+    entry_s = motion.immersion_depth_m / motion.plunge_speed_m_s
+    entry_s += math.dist(motion.plunge_point, motion.path.start_point) / motion.approach_speed_m_s
+    assert motion.uncounted_m == moved().study.motion.uncounted_m
+    later = 1.5 * motion.transient_m / motion.nominal_speed_m_s
+    slow = moved(bowl=ELLIPSE | {"ramp_s": entry_s + later}).study.motion
+    assert slow.uncounted_m == pytest.approx(1.5 * motion.transient_m)
+    with pytest.raises(InputError, match=r"motion.bowl.ramp_s: no path is left"):
+        moved(bowl=ELLIPSE | {"ramp_s": 1e3})

@@ -12,7 +12,7 @@ import pytest
 import yaml
 from bowls import OWN_BOWL
 from made_scenes import BED
-from made_study import put
+from made_study import Made, put
 from paths import ROOT
 
 from dragdeck.cases import bed
@@ -390,6 +390,20 @@ def test_a_run_has_another_name_if_its_script_differs(
         for block, kept in UNCHANGED.items():
             if f"{field}.".startswith(f"{block}."):
                 assert not renamed & kept, f"{field} renames {renamed}"
+
+
+@pytest.mark.parametrize("block", ["removal", "roughness"])
+def test_what_the_report_reads_concerns_no_other_scene(made: Made, block: str) -> None:
+    blocks = {
+        "removal": {"coefficient_m2_n": 2e-11, "target_depth_m": 1e-6},
+        "roughness": {"turned": {"feed_m": 1e-4, "nose_radius_m": 8e-4}, "target_ra_m": 2e-7},
+    }
+    plain = made(copy.deepcopy(blocks))
+    blocks[block][[*blocks[block]][-1]] = 2.5e-7
+    other = made(blocks)
+    for name, kind in SCENES.items():
+        assert kind.run_id(other) == kind.run_id(plain)
+        assert (kind.digest(other) != kind.digest(plain)) is (name == "process")
 
 
 def fields_of(schema: Any, name: str = "", kind: str = "") -> Iterator[tuple[str, str]]:

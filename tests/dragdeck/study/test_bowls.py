@@ -27,6 +27,16 @@ def bowl(name: str) -> Bowl:
     return Study.model_validate({**plain_study({}), "bowl": shape}).bowl
 
 
+UNUSABLE = [
+    ([[0, 0], [0, 0.02], [0.032, 0.05]], "only the first point"),
+    ([[0, 0], [0.03, 0.04], [0.03, 0], [0.01, 0.03], [0.032, 0.05]], "crosses itself"),
+    ([[0, 0], [0.032, 0], [0.032, 0.04], [0.032, 0.02], [0.032, 0.05]], "crosses itself"),
+    ([[0, 0], [1e-4, 0], [0.032, 0], [0.032, 0.05]], "too sharp for LIGGGHTS"),
+    ([[0, 0], [0.032, 0], [0.03201, 1e-6], [0.0321, 0.05]], "too sharp for LIGGGHTS"),
+]
+"""Profiles of a bowl, and what is wrong with them."""
+
+
 def test_a_cylinder_is_what_a_bowl_was() -> None:
     assert set(plain_study({})["bowl"]) == {"material", "radius_m", "height_m"}
 
@@ -132,6 +142,9 @@ def test_distances_from_a_revolved_bowl_are_those_from_its_facets(name: str) -> 
         ("lid", {"bowl.lid_m": 0.02}, "lid is not above"),
         ("revolved", {"bowl.profile_m": [[0.01, 0], [0.032, 0.05]]}, "not closed at the bottom"),
         ("revolved", {"bowl.profile_m": [[0, 0], [0.032, 0.04]]}, "must end at the rim"),
+        *(("revolved", {"bowl.profile_m": profile}, problem) for profile, problem in UNUSABLE),
+        ("revolved", {"bowl.facet_size_m": 0.5}, r"bowl\.facet_size_m: .*too coarse"),
+        ("revolved", {"bowl.facet_size_m": 1e-5}, r"bowl\.facet_size_m: .*would need"),
         ("revolved", {"motion.path.radius_m": 0.022}, "no particle fits|does not fit"),
         ("ring", {"motion.path.radius_m": 0.022}, "no particle fits|does not fit"),
         ("lid", {"bowl.lid_m": 0.2}, "above the rim"),

@@ -18,6 +18,7 @@ from dragdeck.errors import InputError
 from dragdeck.mesh.bowl_file import bowl_facets
 from dragdeck.mesh.files import stl_text
 from dragdeck.mesh.surface import open_edges, raised, surface, weld
+from dragdeck.outlook.process import workpiece_notes
 from dragdeck.physics import facets
 from dragdeck.physics.contact_network import touching
 from dragdeck.physics.walls import Container
@@ -240,6 +241,20 @@ def test_bad_bowls_are_refused(
 ) -> None:
     with pytest.raises(InputError, match=says):
         with_file(made, project, in_mm(corners), **bowl)
+
+
+def test_a_solid_is_no_inner_surface(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="STEP") as caught:
+        bowl_facets(tmp_path / "bowl.STEP", "mm")
+    assert caught.value.field == "bowl.file" and "STL" in str(caught.value.remedy)
+
+
+def test_a_slope_counts_as_wall(made: Made) -> None:
+    """Below a workpiece in such a bowl, the floor is not where the lowest point is."""
+    assert "gap between workpiece and floor" in dict(workpiece_notes(made({})))
+    names = dict(workpiece_notes(made(deepcopy(OWN_BOWL))))
+    assert "gap between workpiece and wall or floor" in names
+    assert "gap between workpiece and floor" not in names
 
 
 def test_a_closed_body_is_no_bowl(tmp_path: Path) -> None:

@@ -86,14 +86,18 @@ def test_a_wrong_value_is_named_and_explained(
     [
         (b"a: 1\na: 2\n", "key 'a' is given twice"),
         (b"a: [1\n", "not YAML"),
-        (b"- 1\n", "the file must be a mapping"),
-        (b"", "the file must be a mapping"),
+        (b"- 1\n", "the file has no fields"),
+        (b"", "the file has no fields"),
         ("title: A bowl\n".encode("utf-16"), "not UTF-8 text"),
         ("title: Sch\u00fcssel\n".encode("latin-1"), "not UTF-8 text"),
         (b"title: a\x00b\n", "not YAML"),
         (b"title: !!binary aGVsbG8=\n", "a binary is not a plain value"),
         (b"sweep: !!set {a, b}\n", "a set is not a plain value"),
-        (b"? [a, b]\n: 1\n", "not YAML"),
+        (b"? [a, b]\n: 1\n", "a key is text"),
+        (b"a: 1\n? [a, b]\n: 1\n", "a key is text"),
+        *((f"{key}: 1\n".encode(), "a key is text") for key in ("true", "1", "null", ".inf")),
+        (b"a: {<<: {b: 1}}\n", "a key is text.*<<"),
+        (b"a:\n\tb: 1\n", "(?s)not YAML.*no tabs"),
         (b"a: " + 5000 * b"[", "nested too deeply"),
         (5000 * b"{a: ", "nested too deeply"),
         (b"title: !!python/object/apply:os.system ['touch pwned']\n", "not YAML"),
@@ -108,6 +112,23 @@ def test_a_file_that_is_no_study_is_refused(tmp_path: Path, content: bytes, word
     with pytest.raises(InputError, match=words) as caught:
         read_study(file)
     assert caught.value.file == file
+
+
+@pytest.mark.parametrize(
+    ("field", "words"),
+    [
+        ("motion.speed", "did you mean 'speed_m_s'"),
+        ("motion.path.length_m", "another kind of this block"),
+        ("bowl.core_radius_m", "another kind of this block"),
+        ("density_kg_m3", "did you mean 'compound.density_kg_m3'"),
+    ],
+)
+def test_an_unknown_key_has_a_remedy(small: dict[str, Any], field: str, words: str) -> None:
+    put(small, {field: 1})
+    with pytest.raises(InputError) as caught:
+        validate(small, FILE)
+    errors = {error.field: error.remedy for error in (caught.value, *caught.value.more)}
+    assert words in str(errors[field])
 
 
 def test_a_missing_key_is_named(small: dict[str, Any]) -> None:

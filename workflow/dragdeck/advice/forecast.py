@@ -159,14 +159,15 @@ def ways_in_words(case: Case, tradeoff: TradeoffRecord) -> str:
     requested = case.requested
     if requested is None or case.part or RESTITUTION in requested.quantities:
         return ""
-    shown = [
-        f"{way.name} ({_half_width(way.half_width)}, {way.relative_cost:.2g})"
-        for way in _ways(advised_settings(case, requested, tradeoff))
-    ]
+    ways = list(_ways(advised_settings(case, requested, tradeoff)))
+    shown = [f"{way.name} ({_half_width(way.half_width)}, {way.relative_cost:.2g})" for way in ways]
+    known = [way.half_width for way in ways if way.half_width is not None]
+    packings = math.ceil((min(known, default=0.0) / requested.tolerance) ** 2)
+    short = f"; none is expected to reach it: about {packings:,} packings (sweep: seed) would"
     what = f"{', '.join(requested.quantities)} within {shown_share(requested.tolerance)}"
     return (
         f"ways to {what}, with the expected half-width and the cost relative to a plain run: "
-        f"{', '.join(shown)}"
+        f"{', '.join(shown) or 'none is cheaper than that'}{short if packings > 1 else ''}"
     )
 
 

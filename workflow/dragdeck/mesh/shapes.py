@@ -232,11 +232,9 @@ def _require_facet_size(
     if facet_size_m > radius_m:
         raise InputError(
             "the mesh elements are too coarse for the curvature of the surface",
-            field="facet_size_m",
-            value=facet_size_m,
-            limit=f"at most the radius, {radius_m:g} m",
+            field="facet_size_m", value=facet_size_m, limit=f"at most the radius, {radius_m:g} m",
             remedy="use a smaller facet size",
-        )
+        )  # fmt: skip
     along_m = along_m or facet_size_m
     lengthwise, across = length_m / along_m, radius_m / facet_size_m
     facets = 2.0 * math.tau * radius_m / facet_size_m * (lengthwise + across)
@@ -245,10 +243,9 @@ def _require_facet_size(
         raise InputError(
             f"the mesh would need about {facets:.3g} facets",
             field="facet_length_m" if short else "facet_size_m",
-            value=along_m if short else facet_size_m,
-            limit=f"at most {_MAX_FACETS} facets",
+            value=along_m if short else facet_size_m, limit=f"at most {_MAX_FACETS} facets",
             remedy="use a larger facet size, in metres",
-        )
+        )  # fmt: skip
 
 
 def _ring(count: int, radius_m: float, start_rad: float = 0.0, z_m: float = 0.0) -> Floats:

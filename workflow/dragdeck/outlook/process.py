@@ -23,7 +23,7 @@ from dragdeck.study.contact_law import compared_labels
 _RATIOS = {
     "workpiece_to_particle": "diameter of the workpiece / mean particle diameter",
     "depth_to_particle": "immersion depth / mean particle diameter",
-    "bowl_to_particle": "diameter of the bowl / mean particle diameter",
+    "bowl_to_particle": "width between the walls of the bowl / mean particle diameter",
     "superposed_speed": "(highest surface speed - speed along the path) / speed along the path",
     "bowl_froude_number": "Froude number of the bowl's rotation",
     "submerged_weight_ratio": "weight of the particles minus buoyancy / weight",
@@ -36,9 +36,11 @@ def workpiece_notes(case: Case) -> list[tuple[str, str]]:
     """What ``check`` says of a process: a heading and a text each."""
     bed = bed_in_motion(case.study, expected_bed(case.study))
     gaps = clearances(case, bed.surface_m)
+    named = {"wall": gaps.wall_m, "floor": gaps.floor_m}
+    if case.study.bowl.container.rim:
+        named = {"wall or floor": gaps.wall_m}
     return [
-        ("gap between workpiece and wall", _gap(case, gaps.wall_m)),
-        ("gap between workpiece and floor", _gap(case, gaps.floor_m)),
+        *((f"gap between workpiece and {what}", _gap(case, gap)) for what, gap in named.items()),
         *_between(case),
         ("highest surface speed of the workpiece", _speed(case)),
         ("overlap of impacts", _impact(case)),

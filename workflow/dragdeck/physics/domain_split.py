@@ -92,7 +92,7 @@ class Split:
     def __str__(self) -> str:
         shown = " x ".join(str(count) for count in self.grid)
         if len(self.particles) == 1:
-            return f"{shown}: one rank, {self.mean:,.0f} particles"
+            return f"{shown}: one rank"
         return (
             f"{shown}: {min(self.particles):,.0f} to {max(self.particles):,.0f} particles per "
             f"rank, {self.largest:,.0f} with those of its neighbours"

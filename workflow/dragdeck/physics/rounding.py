@@ -9,12 +9,19 @@ def round_to(value: float, digits: int) -> float:
     return float(f"{value:.{digits}g}")
 
 
-def rounded(value: float, *, up: bool) -> float:
-    """Round a positive number up or down to two significant digits."""
-    unit = 10.0 ** (math.floor(math.log10(value)) - 1)
-    digits = value / unit
-    whole = math.ceil(digits * (1 - 1e-9)) if up else math.floor(digits * (1 + 1e-9))
-    return round_to(whole * unit, 2)
+def rounded(value: float, *, up: bool, digits: int = 2) -> float:
+    """Round a number up or down to significant digits; one that is not positive to the nearest."""
+    if value <= 0:
+        return round_to(value, digits)
+    unit = 10.0 ** (math.floor(math.log10(value)) - digits + 1)
+    units = value / unit
+    whole = math.ceil(units * (1 - 1e-9)) if up else math.floor(units * (1 + 1e-9))
+    return round_to(whole * unit, digits)
+
+
+def limit_of(value: float, *, up: bool = False) -> str:
+    """A limit with four significant digits, which is itself accepted: a lower one is rounded up."""
+    return f"{rounded(value, up=up, digits=4):g}"
 
 
 def timestep(rayleigh_s: float, fraction: float) -> float:

@@ -9,6 +9,8 @@ import numpy as np
 
 from dragdeck.cases import bed as beds
 from dragdeck.cases.case import Case
+from dragdeck.errors import InputError
+from dragdeck.mesh.checks import check
 from dragdeck.mesh.files import stl_text
 from dragdeck.mesh.shapes import polygon_sides
 from dragdeck.physics import contact_mechanics as mechanics
@@ -103,7 +105,12 @@ def bowl_files(study: Study, top_m: float) -> dict[str, Callable[[], str]]:
         return {}
     highest = beds.MESHED_PART * top_m
     height = highest if study.bowl.container.rim else min(study.bowl.height_m, highest)
-    mesh = study.bowl.mesh(height, size)
+    try:
+        check(mesh := study.bowl.mesh(height, size), field="facet_size_m", workpiece=False)
+    except InputError as error:
+        error.field = f"bowl.{error.field}"
+        error.remedy = "use another facet_size_m, or a bowl without very short parts"
+        raise
     return {"bowl.stl": lambda: stl_text(mesh)}
 
 

@@ -20,7 +20,7 @@ from dragdeck.cases.bed import (
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError, together
 from dragdeck.physics.packing import Bed
-from dragdeck.physics.rounding import round_to, rounded
+from dragdeck.physics.rounding import limit_of, round_to, rounded
 from dragdeck.scenes import motion as motions
 from dragdeck.scenes.workpiece import (
     dip,
@@ -165,13 +165,11 @@ def check_apart(each: Sequence[Case], bed: Bed) -> None:
         gap, first, second = pair
         problem = "collide" if gap <= 0 else "come so close that a particle touches both"
         raise InputError(
-            f"workpieces {first} and {second} {problem}",
-            file=each[0].file,
-            field="workpieces",
+            f"workpieces {first} and {second} {problem}", file=each[0].file, field="workpieces",
             value=f"a gap of {gap:.4g} m between them",
             limit=f"at least {diameter:.4g} m, the diameter of the largest particle",
             remedy="use fewer or smaller workpieces, other angles, or a larger radius of the path",
-        )
+        )  # fmt: skip
 
 
 def closest(each: Sequence[Case], bed: Bed) -> tuple[float, int, int] | None:
@@ -204,17 +202,21 @@ def _beside(case: Case, gap: float) -> Iterator[InputError]:
         remedy = "use another path or motion.plunge_at_m, a smaller workpiece, or a wider bowl"
         if isinstance(shape, MeshShape) and shape.offset_m:
             remedy = f"leave workpiece.shape.offset_m out: the part is centred then; or {remedy}"
+        problem = "no particle fits between the workpiece and the bowl"
+        if gap <= 0:
+            problem = "the workpiece does not fit between its path and the bowl"
         yield InputError(
-            "the workpiece does not fit between its path and the bowl"
-            if gap <= 0
-            else "no particle fits between the workpiece and the bowl",
-            file=case.file,
-            field="motion.path",
+            problem, file=case.file, field="motion.path",
             value=f"{gap:.4g} m between workpiece and wall, at its axis "
             f"{study.motion.farthest_m:.4g} m from that of the bowl or nearer",
-            limit=f"at least {diameter:.4g} m, a particle diameter",
-            remedy=remedy,
-        )
+            limit=f"at least {diameter:.4g} m, a particle diameter", remedy=remedy,
+        )  # fmt: skip
+
+
+def _depth_field(case: Case) -> str:
+    several, at = (case.whole or case).study.workpieces, max(case.number - 1, 0)
+    own = several and several.stations[at].immersion_depth_m
+    return f"workpieces.each.{at}.immersion_depth_m" if own else "motion.immersion_depth_m"
 
 
 def _below(case: Case, tip_m: float) -> Iterator[InputError]:
@@ -222,25 +224,21 @@ def _below(case: Case, tip_m: float) -> Iterator[InputError]:
     if length < depth:
         yield InputError(
             "the workpiece is shorter than its immersion depth: particles would cover it",
-            file=case.file,
-            field="motion.immersion_depth_m",
-            value=depth,
-            limit=f"at most the length of the workpiece, {length:.4g} m",
+            file=case.file, field=_depth_field(case), value=depth,
+            limit=f"at most the length of the workpiece, {limit_of(length)} m",
             remedy="reduce the immersion depth, or include the shaft of the workpiece in its mesh",
-        )
+        )  # fmt: skip
     largest = _largest_particle(case)
     if tip_m < largest:
+        problem = "the workpiece would crush particles between its tip and the floor"
+        if tip_m < 0:
+            problem = "the workpiece would reach below the floor"
         yield InputError(
-            "the workpiece would reach below the floor"
-            if tip_m < 0
-            else "the workpiece would crush particles between its tip and the floor",
-            file=case.file,
-            field="motion.immersion_depth_m",
-            value=depth,
-            limit=f"at most {depth + tip_m - largest:.4g} m: a packing at least "
+            problem, file=case.file, field=_depth_field(case), value=depth,
+            limit=f"at most {limit_of(depth + tip_m - largest)} m: a packing at least "
             f"{depth + tip_m:.4g} m high minus the diameter of the largest particle",
             remedy="reduce the immersion depth, or use more particles",
-        )
+        )  # fmt: skip
 
 
 def _largest_particle(case: Case) -> float:
@@ -267,14 +265,12 @@ def _up_and_down(case: Case, tip_m: float) -> Iterator[InputError]:
     for wrong, problem, limit in problems:
         if moving and wrong:
             yield InputError(
-                problem,
-                file=case.file,
-                field=" and ".join(f"motion.{name}" for name in moving),
+                problem, file=case.file, field=" and ".join(f"motion.{name}" for name in moving),
                 value=f"{-low:.4g} m below and {high:.4g} m above an immersion of {depth:.4g} m",
                 limit=f"below {limit:.4g} m: the tip stays at a depth between 0 and {deepest:.4g} "
                 "m, one largest particle above the floor and no deeper than the workpiece is long",
                 remedy="reduce the vertical motion, or change motion.immersion_depth_m",
-            )
+            )  # fmt: skip
 
 
 def _per_step(case: Case, timestep_s: float) -> Iterator[InputError]:
@@ -297,13 +293,10 @@ def _per_step(case: Case, timestep_s: float) -> Iterator[InputError]:
             reach = workpiece_radius(case)
             field = max(superposed, key=lambda name: superposed[name].surface_speed_m_s(reach))
     yield InputError(
-        f"{what} per step: contacts would be missed",
-        file=case.file,
-        field=f"motion.{field}",
-        value=f"{moved:.3g} m in a step of {timestep_s:.3g} s",
-        limit=f"at most {most:.3g} m",
+        f"{what} per step: contacts would be missed", file=case.file, field=f"motion.{field}",
+        value=f"{moved:.3g} m in a step of {timestep_s:.3g} s", limit=f"at most {limit_of(most)} m",
         remedy=remedy,
-    )
+    )  # fmt: skip
 
 
 def fastest_motion(case: Case) -> float:
@@ -349,16 +342,13 @@ def check_headroom(case: Case, tip_m: float, top_m: float) -> None:
     InputError
         The workpiece is too long.
     """
-    longest = top_m - tip_m - 0.001
-    if workpiece_length(case) > longest:
-        raise InputError(
-            "the workpiece is longer than the simulation box above the packing",
-            file=case.file,
-            field="workpiece.shape",
-            value=f"length {workpiece_length(case):.4g} m",
-            limit=f"at most {longest:.4g} m",
-            remedy="shorten the mesh at its upper end, or use a higher bowl (bowl.height_m)",
-        )
+    longest, length = top_m - tip_m - 0.001, workpiece_length(case)
+    if length > longest:
+        problem = "the workpiece is longer than the simulation box above the packing"
+        limit, field = f"at most {limit_of(longest)} m", "workpiece.shape"
+        remedy = "shorten the mesh at its upper end, or use a higher bowl (bowl.height_m)"
+        value, file = f"length {length:.4g} m", case.file
+        raise InputError(problem, file=file, field=field, value=value, limit=limit, remedy=remedy)
 
 
 def check_lid(case: Case, bed: Bed) -> None:
@@ -369,13 +359,10 @@ def check_lid(case: Case, bed: Bed) -> None:
     InputError
         The lid is too low.
     """
-    lid, least = case.study.bowl.lid_m, bed.top_m + bed.margin_m
+    bowl, motion = case.study.bowl, case.study.motion.bowl
+    lid, least = bowl.lid_m, bed.top_m + bed.margin_m + (motion.reach_m[2] if motion else 0.0)
     if lid is not None and lid < least:
-        raise InputError(
-            "the lid is not above the packing",
-            file=case.file,
-            field="bowl.lid_m",
-            value=lid,
-            limit=f"at least {least:.4g} m, the highest point of a particle",
-            remedy="use a higher lid, or fewer particles",
-        )
+        limit = f"at least {limit_of(least, up=True)} m, the highest point of a particle"
+        problem, remedy = "the lid is not above the packing", "use a higher lid, or fewer particles"
+        field, file = "bowl.lid_m", case.file
+        raise InputError(problem, file=file, field=field, value=lid, limit=limit, remedy=remedy)

@@ -5,7 +5,7 @@ from dragdeck.cases.case import Case
 from dragdeck.decks.deck import NOT_OF_LIQUID, LeftOut, Liquid
 from dragdeck.errors import InputError
 from dragdeck.physics.packing import Bed
-from dragdeck.physics.rounding import round_to
+from dragdeck.physics.rounding import limit_of, round_to
 from dragdeck.study.model import Study
 
 
@@ -38,13 +38,11 @@ def check_submerged(case: Case, bed: Bed) -> None:
     study, highest = case.study, bed.top_m + bed.margin_m
     if study.compound and study.media.clumped and study.liquid_level_m < highest:
         raise InputError(
-            "shaped media are not wholly submerged",
-            file=case.file,
-            field="compound.level_m",
+            "shaped media are not wholly submerged", file=case.file, field="compound.level_m",
             value=study.liquid_level_m,
-            limit=f"at least {highest:.4g} m, the highest point of a particle",
+            limit=f"at least {limit_of(highest, up=True)} m, the highest point of a particle",
             remedy="use a higher level, fewer particles, or spheres",
-        )
+        )  # fmt: skip
 
 
 def liquid_models(study: Study) -> dict[str, str]:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dragdeck.arrays import Floats
-from dragdeck.cases.bed import MESHED_PART
+from dragdeck.cases.bed import MESHED_PART, expected_surface
 from dragdeck.cases.case import Case
 from dragdeck.errors import Caution, InputError, together
 from dragdeck.physics.packing import Bed
@@ -19,6 +19,9 @@ from dragdeck.study.paths.path import as_rows
 
 _PLACES = 200
 """Of a path, at which the surface below it is computed."""
+
+_SLOW = 0.1
+"""Speed relative to the bowl over that of the path, below which a warning is given."""
 
 
 class _Rise(NamedTuple):
@@ -133,20 +136,21 @@ def _spilled(case: Case, settled: Bed) -> Iterator[InputError]:
         return
     rim, top = study.bowl.height_m, settled.top_m + settled.margin_m + rise.highest_m
     floor = settled.surface_m - settled.margin_m + rise.lowest_m
-    tilt = f"the bed turns with the bowl, and its surface is inclined by {_driven_tilt(study):.3g}"
-    remedy = "rotate the bowl more slowly, or use fewer particles or a higher bowl"
+    tilt = f"{_driven(study)}, and its surface is inclined by {_driven_tilt(study):.3g}"
+    field = "motion.path" if study.motion.bowl is None else "motion.bowl"
+    remedy = "move the bowl more slowly, or use fewer particles or a higher bowl"
     for wrong, what, limit in (
         (top > rim, f"it stands up to {top:.4g} m high at the wall", f"the rim, {rim:g} m"),
         (floor <= 0, "no particles are left on the floor near the axis", "a covered floor"),
     ):
         if wrong:
-            yield InputError(
-                f"{tilt} degrees below the workpiece: {what}",
-                file=case.file,
-                field="motion.path" if study.motion.bowl is None else "motion.bowl",
-                limit=limit,
-                remedy=remedy,
-            )
+            problem = f"{tilt} degrees below the workpiece: {what}"
+            yield InputError(problem, file=case.file, field=field, limit=limit, remedy=remedy)
+
+
+def _driven(study: Study) -> str:
+    """What inclines the bed."""
+    return f"the bed {'is accelerated' if any(_sideways(study)) else 'turns with the bowl'}"
 
 
 def _out_of_box(case: Case, top_m: float) -> Iterator[InputError]:
@@ -157,13 +161,10 @@ def _out_of_box(case: Case, top_m: float) -> Iterator[InputError]:
         room = min(room, (1 - MESHED_PART) * top_m)
     if bowl is not None and max(bowl.reach_m) >= room:
         yield InputError(
-            "the bowl would leave the simulation box",
-            file=case.file,
-            field="motion.bowl",
+            "the bowl would leave the simulation box", file=case.file, field="motion.bowl",
             value=f"a displacement of {max(bowl.reach_m):.4g} m",
-            limit=f"below {room:.4g} m, the room around it",
-            remedy="use smaller amplitudes",
-        )
+            limit=f"below {room:.4g} m, the room around it", remedy="use smaller amplitudes",
+        )  # fmt: skip
 
 
 def _in_parts(case: Case) -> Iterator[InputError]:
@@ -173,22 +174,35 @@ def _in_parts(case: Case) -> Iterator[InputError]:
         return
     for name in ("windows", "soft_start"):
         if getattr(fidelity, name) is not None:
-            yield InputError(
-                "runs with other time steps do not go on with a bowl that is displaced",
-                file=case.file,
-                field=f"fidelity.{name}",
-                remedy=f"leave {name} out, or motion.bowl",
-            )
+            problem = "runs with other time steps do not go on with a bowl that is displaced"
+            field, remedy = f"fidelity.{name}", f"leave {name} out, or motion.bowl"
+            if case.requested:
+                field, remedy = "fidelity.tolerance", "name a fidelity in place of the tolerance"
+            yield InputError(problem, file=case.file, field=field, remedy=remedy)
 
 
 def bowl_cautions(case: Case) -> Iterator[Caution]:
-    """What a user should know of a bed that turns."""
-    tilt = _driven_tilt(case.study)
+    """What a user should know of a bowl that moves."""
+    study, motion = case.study, case.study.motion
+    tilt, above = _driven_tilt(study), study.bowl.height_m - expected_surface(study)
+    upwards = motion.bowl.displacement_speed_m_s if motion.bowl and motion.bowl.reach_m[2] else 0.0
+    thrown = (_factor(study) * upwards) ** 2 / (2 * study.gravity_m_s2)
+    if study.bowl.lid_m is None and thrown > above:
+        yield Caution(
+            "thrown",
+            f"the floor throws particles up to {thrown:.3g} m high, and the rim is {above:.3g} m "
+            "above the bed: use a smaller amplitude or frequency, or a lid (bowl.lid_m)",
+        )
+    if motion.bowl and motion.speed_in_bowl_m_s < _SLOW * motion.nominal_speed_m_s:
+        yield Caution(
+            "with_bowl",
+            f"the workpiece moves at only {motion.speed_in_bowl_m_s:.2g} m/s relative to the bowl, "
+            "which turns with it: it hardly moves through the bed",
+        )
     if tilt:
         yield Caution(
-            "tilt",
-            f"the bed turns with the bowl, and its surface is expected to be inclined by "
+            "tilt", f"{_driven(study)}, and its surface is expected to be inclined by "
             f"{tilt:.3g} degrees below the workpiece (that of a liquid minus "
             f"{case.study.motion.bed_friction_deg:g} degrees of friction, motion.bed_friction_deg):"
             " the immersion depth is measured from this surface, which forms during the transient",
-        )
+        )  # fmt: skip

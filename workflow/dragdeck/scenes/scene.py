@@ -57,8 +57,17 @@ _NOT_SAID = ("calibration", "fidelities", "licence", "scaling", "search", "sweep
 
 
 _OF_PROCESS = (
-    *("accepted", "assumptions", "compound", "drop_test", "fidelity", "filling", "motion"),
-    *("outputs", "reduction", "reference", "removal", "seed", "workpiece.shape", "workpieces"),
+    *(
+        "accepted",
+        "assumptions",
+        "compound",
+        "drop_test",
+        "fidelity",
+        "filling",
+        "motion",
+        "outputs",
+    ),
+    *("reduction", "reference", "removal", "roughness", "seed", "workpiece.shape", "workpieces"),
 )
 """Fields that no file of a run says, and those that only files of a process do."""
 
@@ -379,10 +388,9 @@ def _check_modulus(name: str, modulus_pa: float, scale: float, case: Case) -> No
         return
     least = ENGINE_SOFTEST_PA / case.study.materials[name].youngs_modulus_pa
     raise InputError(
-        "the Young's modulus is below the minimum of LIGGGHTS",
-        file=case.file,
+        "the Young's modulus is below the minimum of LIGGGHTS", file=case.file,
         field="fidelity.youngs_modulus_scale",
         value=f"{scale:g}, which gives {modulus_pa:.3g} Pa for {name}",
         limit=f"at least {ENGINE_SOFTEST_PA:.0e} Pa, a scale of {least:.3g} for {name}",
         remedy="choose a larger scale",
-    )
+    )  # fmt: skip

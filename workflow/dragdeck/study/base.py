@@ -32,7 +32,9 @@ def _number(value: object) -> object:
                 f"{value!r} has a comma: write {value.replace(',', '.')} with a decimal point"
             )
         if not DECIMAL.fullmatch(value):
-            raise ValueError(f"{value!r} is text, not a number: write it as 300, 0.5 or 5e6")
+            raise ValueError(
+                f"{value!r} is text, not a number: write it as 300, 0.5 or 5e6, without a unit"
+            )
         return float(value)
     return value
 

@@ -86,6 +86,8 @@ def warnings(study: Study) -> list[Caution]:
         cautions.append(Caution("fidelity", text))
     if study.removal:
         cautions += [Caution("trials", text) for text in disagreements(study.removal)]
+    if study.roughness:
+        cautions += [Caution("roughness", text) for text in study.roughness.doubts()]
     return cautions
 
 
@@ -129,11 +131,11 @@ def _problem(issue: ErrorDetails) -> InputError:
     if kind == "union_tag_invalid" and isinstance(value, Mapping):
         field, value = f"{field}.kind", value.get("kind")
     if kind == "extra_forbidden":
-        hint = _hint(str(issue["loc"][-1]), _every_key())
-        problem, remedy = (
-            "unknown key",
-            f"{hint}remove it, or see docs/reference/study.md for its spelling",
-        )
+        word, known = str(issue["loc"][-1]), _every_key()
+        problem, remedy = "unknown key", "remove it: another kind of this block has it"
+        if ".".join(field.split(".")[-2:]) not in known - {word}:
+            hint = _hint(word, known)
+            remedy = f"{hint}remove it, or see docs/reference/study.md for its spelling"
     elif kind in ("float_type", "int_type") and isinstance(value, list) and len(value) == 2:
         remedy = "if its comma is a decimal comma, write a decimal point, without brackets"
     elif kind == "missing":

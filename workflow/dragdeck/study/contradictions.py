@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import get_args
 
 from dragdeck.errors import InputError, RecordError, choices, near
+from dragdeck.physics.rounding import limit_of
 from dragdeck.study.base import flat
 from dragdeck.study.driven import directions
 from dragdeck.study.fidelity import BUILT_IN_FIDELITIES, Tolerance
@@ -191,14 +192,14 @@ def _motion(study: Study) -> _Found:
     frame = speed / study.outputs.network_hz
     if length < frame * (1 - 1e-9):
         problem = "not one frame of the contact network is written during the drag"
-        limit = f"at least {speed / length:.3g} Hz; or use a longer path"
+        limit = f"at least {limit_of(speed / length, up=True)} Hz; or use a longer path"
         yield "outputs.network_hz", problem, limit
         return
     most = (length - frame) * (1 + 1e-9)
     if motion.transient_m > most:
         limit = (
-            f"at most {most:.4g} m: the length of the path, {length:.4g} m, minus that between "
-            "two frames of the contact network (outputs.network_hz)"
+            f"at most {limit_of(most)} m: the length of the path, {length:.4g} m, minus that "
+            "between two frames of the contact network (outputs.network_hz)"
         )
         yield "motion.transient_m", problem, limit
     ramps = {"": motion.ramp_s} if motion.ramp_s else {}
@@ -206,10 +207,10 @@ def _motion(study: Study) -> _Found:
         f"{name}.": superposed_motion.ramp_s
         for name, superposed_motion in motion.superposed().items()
     }
-    for name, ramp in {**ramps, **moving}.items():
+    for name, ramp in {**ramps, **moving, "bowl.": motion.bowl_ramp_s}.items():
         if motion.passed_m(ramp) > most:
             longest = most / speed + motion.ramp_s / 2 if name else 2 * most / speed
-            limit = f"at most {longest:.3g} s; or use a longer path"
+            limit = f"at most {limit_of(longest)} s; or use a longer path"
             yield f"motion.{name}ramp_s", problem, limit
     if motion.uncounted_m > most and motion.counted_from_revolution is not None:
         limit = "a revolution that begins before the drag ends (motion.path.revolutions)"

@@ -246,7 +246,15 @@ class Motion(Superposed):
         """Length of the drag before the statistics begin, m: what is superposed has started."""
         whole = (self.path.revolution_m or 0.0) * ((self.counted_from_revolution or 1) - 1)
         starts = (self.passed_m(motion.ramp_s) for motion in self.superposed().values())
-        return max(self.transient_m, whole, self.passed_m(self.ramp_s), *starts)
+        risen = self.passed_m(self.bowl_ramp_s)
+        return max(self.transient_m, whole, self.passed_m(self.ramp_s), risen, *starts)
+
+    @property
+    def bowl_ramp_s(self) -> float:
+        """Time of the drag in which the amplitudes of the bowl still rise, s; below 0: before."""
+        entry = self.immersion_depth_m / self.plunge_speed_m_s
+        entry += math.dist(self.plunge_point, self.path.start_point) / self.approach_speed_m_s
+        return float(getattr(self.bowl, "ramp_s", 0.0)) - entry
 
     def passed_m(self, time_s: float) -> float:
         """Length of the path after a time, at the end of its start or later, m."""

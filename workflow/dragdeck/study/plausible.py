@@ -2,6 +2,7 @@
 
 import contextlib
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatch
@@ -72,13 +73,16 @@ def plausible_range(field: str) -> PlausibleRange | None:
 
 
 def implausible(data: Json) -> Iterator[tuple[InputError, bool]]:
-    """Every value of a study's plain data that is hardly meant, and whether it is refused.
+    """Values of a study's plain data that are hardly meant, and whether they are refused.
+
+    Of a list or table, the first stands for all, or the first that is refused.
 
     Parameters
     ----------
     data : mapping
         Numbers may be text, as YAML 1.1 reads ``5e6``; what is no number is passed by.
     """
+    alike: dict[tuple[str, str], list[tuple[InputError, bool]]] = {}
     for field, value in _numbers(flat(data)):
         known = plausible_range(field)
         if known is None or known.warned_below <= value <= known.warned_above:
@@ -89,7 +93,13 @@ def implausible(data: Json) -> Iterator[tuple[InputError, bool]]:
             f"{known.warned_below:g} to {known.warned_above:g}"
         )
         problem, remedy = "is not plausible", known.hint(value)
-        yield InputError(problem, field=field, value=value, limit=limit, remedy=remedy), refused
+        error = InputError(problem, field=field, value=value, limit=limit, remedy=remedy)
+        of_list = known.field, re.sub(r"\.\d+(?=\.|$)", "", field)
+        alike.setdefault(of_list, []).append((error, refused))
+    for doubts in alike.values():
+        (error, refused), *others = sorted(doubts, key=lambda doubt: not doubt[1])
+        error.problem += f", nor {len(others)} more of its list" if others else ""
+        yield error, refused
 
 
 def _numbers(values: Json) -> Iterator[tuple[str, float]]:

@@ -151,15 +151,19 @@ def _read(
     Of too long a file, no more is read than shows that it is.
     """
     columns, optional, table = row._fields, tuple(row._field_defaults), user_table(file, most)
-    header, needed = table.names, columns[: len(columns) - len(optional)]
+    header, scales = zip(*map(_in_si, table.names), strict=True)
+    needed = columns[: len(columns) - len(optional)]
     if not set(needed) <= set(header) <= set(columns) or len(set(header)) < len(header):
         limit = ",".join(needed) + (f", optionally {', '.join(optional)}" if optional else "")
         problem = f"the columns are not those of {row.__name__.lower()}s"
-        value = ",".join(header)[:200] if set(needed) & set(header) else None  # quote only a table
+        value = (
+            ",".join(table.names)[:200] if set(needed) & set(header) else None
+        )  # quote only a table
         line = table.header_line
         raise InputError(problem, file=file, line=line, value=value, limit=limit)
-    lines, numbers = table.numbers(header)
-    values, zero = dict(zip(header, numbers, strict=True)), np.zeros(len(lines))
+    lines, numbers = table.numbers(table.names)
+    scaled = map(np.multiply, scales, numbers)
+    values, zero = dict(zip(header, scaled, strict=True)), np.zeros(len(lines))
     points = np.transpose([values.get(name, zero) for name in columns]).tolist()
     places[field] = file, None, None
     for number, line in enumerate(lines.tolist()):
@@ -168,6 +172,17 @@ def _read(
             places[f"{field}.{number}.{at}"] = file, line, name
     rows: list[JsonValue] = points
     return rows
+
+
+_SMALLER = {"mm": ("m", 1e-3), "um": ("m", 1e-6), "ms": ("s", 1e-3), "us": ("s", 1e-6)}
+"""Units of columns, with that in which a study has them and its multiple."""
+
+
+def _in_si(column: str) -> tuple[str, float]:
+    """Name of a column in the unit of the study, and what its numbers are multiplied by."""
+    name, _, unit = column.rpartition("_")
+    meant, scale = _SMALLER.get(unit, (unit, 1.0))
+    return f"{name}_{meant}" if name else column, scale
 
 
 _CONTENTS: Mapping[str, _Content] = {

@@ -21,13 +21,14 @@ _MOST_BYTES = 64_000_000
 _UNITS = {
     "s": "s", "sec": "s", "ms": "ms", "us": "us", "\u00b5s": "us", "\u03bcs": "us",
     "N": "n", "mN": "mn", "kN": "kn", "m": "m", "mm": "mm", "kg": "kg", "g": "g",
+    "um": "um", "\u00b5m": "um", "\u03bcm": "um",
     "deg": "deg", "\u00b0": "deg", "rad": "rad",
 }  # fmt: skip
 """Units as programs write them, and as names of columns end with them."""
 
 _OTHER_UNITS = {
     *("-", "%", "Nm", "Nmm", "kNm", "N/m", "V", "mV", "A", "mA", "W", "kW", "Hz", "kHz", "rpm"),
-    *("1/min", "U/min", "min", "h", "cm", "um", "\u00b5m", "\u03bcm", "mm/s", "mm/min"),
+    *("1/min", "U/min", "min", "h", "cm", "mm/s", "mm/min"),
     *("m/s", "m/min", "m/s2", "m/s\u00b2", "bar", "Pa", "kPa", "MPa", "\u00b0C", "K", "J", ""),
 }  # fmt: skip
 """Units of columns that no reader wants, in a line of units."""

@@ -34,13 +34,17 @@ class _Loader(yaml.SafeLoader):
 def _mapping(loader: _Loader, node: yaml.MappingNode) -> dict[Any, Any]:
     seen: set[Any] = set()
     for number, (key_node, value_node) in enumerate(node.value):
-        if number and key_node.value.isdecimal() and not value_node.value:
+        plain = isinstance(key_node, yaml.ScalarNode)
+        if number and plain and key_node.value.isdecimal() and not value_node.value:
             _refuse_decimal_comma(node.value[number - 1][1], key_node)
-        key = loader.construct_object(key_node)
-        if key in seen:
-            raise yaml.constructor.ConstructorError(
-                None, None, f"key {key!r} is given twice", key_node.start_mark
+        key = None if key_node.tag.endswith(":merge") else loader.construct_object(key_node)
+        problem = f"key {key!r} is given twice" if isinstance(key, str) and key in seen else None
+        if not isinstance(key, str):
+            problem = (
+                "a key is text, in quotes where YAML reads something else; << is not supported"
             )
+        if problem:
+            raise yaml.constructor.ConstructorError(None, None, problem, key_node.start_mark)
         seen.add(key)
     return loader.construct_mapping(node, deep=True)
 
@@ -94,22 +98,23 @@ def read_yaml(file: Path) -> dict[str, JsonValue]:
         raise InputError("no such study file", file=file, remedy=_studies_nearby(file)) from None
     except UnicodeDecodeError as error:
         raise InputError(
-            "not UTF-8 text",
-            file=file,
+            "not UTF-8 text", file=file,
             value=f"byte {error.object[error.start]:#04x} at byte {error.start}",
             remedy="save it in the encoding UTF-8",
-        ) from None
+        ) from None  # fmt: skip
     except RecursionError:
         raise InputError("nested too deeply", file=file, remedy="remove a level") from None
     except yaml.MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else "?"
-        raise InputError(f"not YAML: {error.problem}", file=file, field=f"line {line}") from None
+        syntax = isinstance(error, yaml.scanner.ScannerError | yaml.parser.ParserError)
+        remedy = "check indentation (blanks, no tabs), colons and quotes there" if syntax else None
+        problem = f"not YAML: {error.problem}"
+        raise InputError(problem, file=file, field=f"line {line}", remedy=remedy) from None
     except (yaml.YAMLError, ValueError, TypeError) as error:
         raise InputError(f"not YAML of plain values: {error}", file=file) from None
     if not isinstance(data, dict):
-        raise InputError(
-            "the file must be a mapping of fields", file=file, value=type(data).__name__
-        )
+        limit = "fields and their values, such as title: A study"
+        raise InputError("the file has no fields", file=file, value=shown(data), limit=limit)
     return data
 
 
@@ -204,13 +209,10 @@ def mesh_beside(study: Path, name: str) -> Path:
         if (place / name).is_file():
             return place / name
     raise InputError(
-        "no such mesh file",
-        file=study,
-        field="workpiece.shape.file",
-        value=name,
+        "no such mesh file", file=study, field="workpiece.shape.file", value=name,
         limit="a file in " + ", ".join(str(place) for place in places),
         remedy="put the mesh there, or correct the name",
-    )
+    )  # fmt: skip
 
 
 _WHOLE = ("fidelity", "sweep")

@@ -14,6 +14,7 @@ from dragdeck.cases.bed import typical_reach
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError, choices, together
 from dragdeck.mesh.files import FORMATS
+from dragdeck.physics.rounding import limit_of
 from dragdeck.scenes.bed_space import expected_bed
 from dragdeck.scenes.fit import clearances
 from dragdeck.scenes.moving_bowl import bed_in_motion
@@ -125,10 +126,8 @@ def _check_doubles(cases: list[Case]) -> None:
         if same is not case:
             raise InputError(
                 f"a value is given twice: the cases {same.name} and {case.name} are the same",
-                file=case.file,
-                field="sweep",
-                remedy="remove one",
-            )
+                file=case.file, field="sweep", remedy="remove one",
+            )  # fmt: skip
 
 
 def beside_each_other(cases: Iterable[Case]) -> list[Case]:
@@ -180,13 +179,10 @@ def settle_case(
         return case
     if resolve is None:
         raise InputError(
-            "a tolerance cannot be used here",
-            file=named_in or file,
-            field="fidelity.tolerance",
-            value=study.fidelity.tolerance,
-            limit="the name of a fidelity, or its settings",
+            "a tolerance cannot be used here", file=named_in or file, field="fidelity.tolerance",
+            value=study.fidelity.tolerance, limit="the name of a fidelity, or its settings",
             remedy="use the settings that ./run dragdeck advise shows for it",
-        )
+        )  # fmt: skip
     return resolve(case, study.fidelity)
 
 
@@ -221,11 +217,10 @@ def study_file(studies: Path, name: str) -> Path:
     if not files:
         known = dict.fromkeys(file.parent.name for file in studies_called(studies))
         raise InputError(
-            f"unknown study {name!a}",
-            file=studies,
+            f"unknown study {name!a}", file=studies,
             limit=choices(name, filter(NAME.fullmatch, known)),
             remedy=f"choose one of these, or create a folder; its name has {NAME_LIMIT}",
-        )
+        )  # fmt: skip
     return files[0]
 
 
@@ -249,12 +244,9 @@ def new_study(studies: Path, name: str, base: str) -> Path:
         problem = "a study has that name already"
     if problem:
         raise InputError(
-            problem,
-            file=studies,
-            value=name,
-            limit=f"a name has {NAME_LIMIT}",
+            problem, file=studies, value=name, limit=f"a name has {NAME_LIMIT}",
             remedy="choose another",
-        )
+        )  # fmt: skip
     text = study_of_part(part) if of_part else _NEW_STUDY.read_text().format(name=name, base=base)
     folder.mkdir()
     if of_part:
@@ -271,11 +263,9 @@ def _set(data: dict[str, JsonValue], field: str, value: JsonValue, file: Path) -
         below = place.setdefault(name, {})
         if not isinstance(below, dict):
             raise InputError(
-                "the field would lie below a single value",
-                file=file,
-                field=field,
+                "the field would lie below a single value", file=file, field=field,
                 remedy="give the dotted name of one field",
-            )
+            )  # fmt: skip
         place = below
     place[last] = value
 
@@ -300,16 +290,14 @@ def with_larger_particles(case: Case) -> Case:
     wide = replace(case, study=study)
     gap = clearances(wide, bed_in_motion(study, expected_bed(study)).surface_m).wall_m
     diameter = 2 * typical_reach(study)
+    most = gap / LEAST_GAP / diameter * factor
     if factor > 1 and gap < LEAST_GAP * diameter * (1 - 1e-6):
         raise InputError(
             "the gap between workpiece and wall is too narrow for larger particles: the drag would "
-            "not be linear in their diameter",
-            field="reduction.coarser",
-            value=factor,
-            limit=f"at most {gap / LEAST_GAP / diameter * factor:.3g}: the gap of {gap:.4g} m is "
-            f"at least {LEAST_GAP:g} diameters",
-            remedy="use a smaller factor or a wider bowl",
-        )
+            "not be linear in their diameter", field="reduction.coarser", value=factor,
+            limit=f"at most {limit_of(most)}: the gap is at least {LEAST_GAP:g} diameters",
+            remedy="use a smaller factor or a wider bowl; below 1, leave it out",
+        )  # fmt: skip
     return wide
 
 

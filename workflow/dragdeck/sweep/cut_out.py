@@ -18,6 +18,7 @@ from dragdeck.cases.bed import bed_classes
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError, together
 from dragdeck.physics.packing import Bed
+from dragdeck.physics.rounding import limit_of
 from dragdeck.physics.turning_bed import surface_tilt
 from dragdeck.physics.walls import Container
 from dragdeck.scenes.bed_space import expected_bed
@@ -103,12 +104,11 @@ def with_cut_out(case: Case) -> Case:
     cut = cut_out(study, workpiece_reach(case), low)
     if cut.particle_count >= study.particle_count:
         raise InputError(
-            "the cut-out is no smaller than the machine",
-            field="reduction.cut_out",
+            "the cut-out is no smaller than the machine", field="reduction.cut_out",
             value=f"{cut.particle_count:,} particles",
             limit=f"below {study.particle_count:,}, those of the machine",
             remedy="simulate the machine: remove reduction; or use a shorter counted_m",
-        )
+        )  # fmt: skip
     return replace(case, study=cut)
 
 
@@ -132,15 +132,14 @@ def cut_out(study: Study, reach_m: float, low_m: float = 0.0) -> Study:
     passage, bed = _passage(study.motion), bed_in_motion(study, expected_bed(study))
     room = room_in_machine(study, passage, bed, reach_m, low_m)
     inner = math.hypot(*passage.places_m[0]) - reach_m
-    if passage.outwards and inner < (room.left_m, room.right_m)[passage.outwards > 0] * (1 - 1e-9):
+    least = (room.left_m, room.right_m)[passage.outwards > 0]
+    if passage.outwards and inner < least * (1 - 1e-9):
         raise InputError(
             "the circle is too narrow for a straight cut-out: beside the workpiece is the other "
-            "side of its path",
-            field="reduction.cut_out",
+            "side of its path", field="reduction.cut_out",
             value=f"{inner:.4g} m between the workpiece and the axis of the bowl",
-            limit=f"at least {(room.left_m, room.right_m)[passage.outwards > 0]:.4g} m",
-            remedy="simulate the machine: remove reduction",
-        )
+            limit=f"at least {least:.4g} m", remedy="simulate the machine: remove reduction",
+        )  # fmt: skip
     return _trough(study, passage, bed, room, reach_m, low_m)
 
 
@@ -296,6 +295,11 @@ def _straight(study: Study, passage: Passage) -> Motion:
     motion = old.model_copy(update=changed)
     asked = study.reduction.counted_m if study.reduction else None
     counted = asked or min(old.path_length_m - old.uncounted_m, COUNTED_DIAMETERS * diameter)
+    least = passage.speed_m_s / study.outputs.network_hz
+    if counted < least:
+        problem, field = "no frame of the contact network is written on it", "reduction.counted_m"
+        limit = f"at least {limit_of(least, up=True)} m, or a higher outputs.network_hz"
+        raise InputError(problem, field=field, value=counted, limit=limit)
     path = motion.path.with_length(round(motion.uncounted_m + counted, 6))
     return motion.model_copy(update={"path": path})
 

@@ -114,7 +114,8 @@ class MeshBowl(Bowl):
             raise ValueError("facet_size_m cannot be used: the bowl has the facets of its file")
         top = float(self._corners[:, :, 2].max())
         if abs(top / self.height_m - 1) > _SAME:
-            raise ValueError(f"height_m is {self.height_m:g}, but the rim is {top:.6g} m high")
+            known = f"height_m is {self.height_m:g}, but the rim is {top:.6g} m high"
+            raise ValueError(f"{known}: correct it, or unit")
         if not _inside(self.facets_m).rim:
             raise ValueError(
                 "the z axis does not pass through the middle of the bowl, nor through a column: "

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from dragdeck.arrays import Floats
 from dragdeck.mesh import shapes
 from dragdeck.physics.walls import Container, Wall
 from dragdeck.study.base import NonNegative
@@ -28,7 +29,7 @@ class RevolvedBowl(Bowl):
 
     kind: Literal["revolved"]
     """profile turned about the z axis"""
-    profile_m: Annotated[list[tuple[NonNegative, NonNegative]], Field(min_length=2)]
+    profile_m: Annotated[list[tuple[NonNegative, NonNegative]], Field(min_length=2, max_length=500)]
     """radius and height of the points of the profile, from the axis, or from the rim of a column,
     outwards to the rim of the bowl, m"""
 
@@ -48,6 +49,10 @@ class RevolvedBowl(Bowl):
             raise ValueError("the bowl must be widest and highest at its rim")
         if any(first == second for first, second in pairwise(self.profile_m)):
             raise ValueError("the profile has a point twice in succession")
+        if any(radius == 0 for radius, _ in self.profile_m[1:]):
+            raise ValueError("only the first point of the profile may be on the axis")
+        if _crosses_itself(np.array(self.profile_m)):
+            raise ValueError("the profile crosses itself")
         return self
 
     @property
@@ -98,3 +103,14 @@ class RevolvedBowl(Bowl):
     def words(self, number: Callable[[float], str]) -> str:
         """With the radius of the rim."""
         return f"bowl of revolution, radius {number(self.profile_m[-1][0])}"
+
+
+def _crosses_itself(points_m: Floats) -> bool:
+    """Whether two parts of a line through (N, 2) points cross, or one goes back on the last."""
+    along = np.diff(points_m, axis=0)
+    across = along[:, None, ::-1] * [1.0, -1.0]
+    side = ((points_m - points_m[:-1, None]) * across).sum(axis=2)
+    between = side[:, :-1] * side[:, 1:] < 0
+    back = (along[1:] * along[:-1]).sum(axis=1) < 0
+    straight = np.diagonal(side, 2) == 0
+    return bool((between & between.T).any() or (back & straight).any())
