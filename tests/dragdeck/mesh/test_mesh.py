@@ -368,7 +368,7 @@ def test_a_missing_file_and_what_cannot_be_a_length_are_refused(tmp_path: Path):
     for facet_size_m in (0.006, 1e-6):  # too coarse, and too many
         with pytest.raises(InputError) as caught:
             shapes.cylinder(0.005, 0.08, facet_size_m)
-        assert caught.value.field == "facet_size_m"
+        assert caught.value.field == "workpiece.shape.facet_size_m"
         assert caught.value.remedy
 
 

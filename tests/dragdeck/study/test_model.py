@@ -131,6 +131,14 @@ def test_an_unknown_key_has_a_remedy(small: dict[str, Any], field: str, words: s
     assert words in str(errors[field])
 
 
+def test_the_rate_that_is_asked_for_is_accepted(small: dict[str, Any]) -> None:
+    put(small, {"outputs.network_hz": 0.01})
+    with pytest.raises(InputError, match="not one frame") as caught:
+        validate(small, FILE)
+    put(small, {"outputs.network_hz": float(str(caught.value.limit).split()[2])})
+    assert validate(small, FILE).motion.transient_m > 0
+
+
 def test_a_missing_key_is_named(small: dict[str, Any]) -> None:
     del small["motion"]["immersion_depth_m"]
     with pytest.raises(InputError) as caught:

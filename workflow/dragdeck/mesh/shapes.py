@@ -229,11 +229,12 @@ def tube(radius_m: float, length_m: float, facet_size_m: float) -> Trimesh:
 def _require_facet_size(
     facet_size_m: float, radius_m: float, length_m: float, along_m: float | None = None
 ) -> None:
+    block = "bowl" if along_m is None else "workpiece.shape"
     if facet_size_m > radius_m:
         raise InputError(
             "the mesh elements are too coarse for the curvature of the surface",
-            field="facet_size_m", value=facet_size_m, limit=f"at most the radius, {radius_m:g} m",
-            remedy="use a smaller facet size",
+            field=f"{block}.facet_size_m", value=facet_size_m,
+            limit=f"at most the radius, {radius_m:g} m", remedy="use a smaller facet size",
         )  # fmt: skip
     along_m = along_m or facet_size_m
     lengthwise, across = length_m / along_m, radius_m / facet_size_m
@@ -242,7 +243,7 @@ def _require_facet_size(
         short = along_m < facet_size_m
         raise InputError(
             f"the mesh would need about {facets:.3g} facets",
-            field="facet_length_m" if short else "facet_size_m",
+            field=f"{block}.{'facet_length_m' if short else 'facet_size_m'}",
             value=along_m if short else facet_size_m, limit=f"at most {_MAX_FACETS} facets",
             remedy="use a larger facet size, in metres",
         )  # fmt: skip

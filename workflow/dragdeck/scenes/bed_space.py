@@ -106,9 +106,8 @@ def bowl_files(study: Study, top_m: float) -> dict[str, Callable[[], str]]:
     highest = beds.MESHED_PART * top_m
     height = highest if study.bowl.container.rim else min(study.bowl.height_m, highest)
     try:
-        check(mesh := study.bowl.mesh(height, size), field="facet_size_m", workpiece=False)
+        check(mesh := study.bowl.mesh(height, size), field="bowl.facet_size_m", workpiece=False)
     except InputError as error:
-        error.field = f"bowl.{error.field}"
         error.remedy = "use another facet_size_m, or a bowl without very short parts"
         raise
     return {"bowl.stl": lambda: stl_text(mesh)}

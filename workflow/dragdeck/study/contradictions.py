@@ -192,7 +192,8 @@ def _motion(study: Study) -> _Found:
     frame = speed / study.outputs.network_hz
     if length < frame * (1 - 1e-9):
         problem = "not one frame of the contact network is written during the drag"
-        limit = f"at least {limit_of(speed / length, up=True)} Hz; or use a longer path"
+        counted = max(length - motion.transient_m, 0.0) or length
+        limit = f"at least {limit_of(speed / counted, up=True)} Hz; or use a longer path"
         yield "outputs.network_hz", problem, limit
         return
     most = (length - frame) * (1 + 1e-9)

@@ -133,6 +133,5 @@ class Roughness(Model):
         rises = sum(later > earlier for earlier, later in combinations(series, 2))
         if 2 * rises > math.comb(len(series), 2):
             yield "roughness.measured: Ra mostly rises with time, and no removal explains it"
-        beyond = [ra for ra in series if not (self.steady_ra_m or 0.0) <= ra <= start]
-        if beyond:
+        if any(not (self.steady_ra_m or 0.0) <= ra <= start for ra in series):
             yield f"roughness.measured has Ra beyond that before ({start:.3g} m) or steady_ra_m"

@@ -40,9 +40,7 @@ def _mapping(loader: _Loader, node: yaml.MappingNode) -> dict[Any, Any]:
         key = None if key_node.tag.endswith(":merge") else loader.construct_object(key_node)
         problem = f"key {key!r} is given twice" if isinstance(key, str) and key in seen else None
         if not isinstance(key, str):
-            problem = (
-                "a key is text, in quotes where YAML reads something else; << is not supported"
-            )
+            problem = "a key is text, in quotes if YAML reads another thing; << is not supported"
         if problem:
             raise yaml.constructor.ConstructorError(None, None, problem, key_node.start_mark)
         seen.add(key)
