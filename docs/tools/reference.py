@@ -43,23 +43,23 @@ def markdown_table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def command_sections(parser: argparse.ArgumentParser) -> str:
-    """The commands of a program, and their arguments, each described once."""
+    """The commands of a program in a sentence each, and their options, each described once."""
     rows: list[list[str]] = []
     arguments: dict[tuple[str, str], list[str]] = {}
     for command in _commands(parser):
         name = command.prog.partition(" ")[2]
-        usage = _cell(" ".join(command.format_usage().split()[2:]).replace("[-h] ", ""))
-        about = command.description or ""
+        usage = _cell(" ".join(w for w in command.format_usage().split()[2:] if w != "[-h]"))
+        about = re.split(r"\. (?=[A-Z])", command.description or "")[0]
         rows.append([f"`{usage}`", about[:1].upper() + about[1:].removesuffix(".") + "."])
         for action in command._actions:
-            if "--help" not in action.option_strings:
+            if action.option_strings and "--help" not in action.option_strings:
                 arguments.setdefault((_names(action), _help(action)), []).append(name)
     described = [
         [f"`{name}`", "most" if len(uses) > 5 else ", ".join(f"`{use}`" for use in uses), meaning]
         for (name, meaning), uses in sorted(arguments.items(), key=lambda item: -len(item[1]))
     ]
     table = markdown_table(["command", "effect"], rows)
-    return f"{table}\n\n{markdown_table(['argument', 'commands', 'meaning'], described)}"
+    return f"{table}\n\n{markdown_table(['option', 'commands', 'meaning'], described)}"
 
 
 def _commands(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
@@ -93,6 +93,8 @@ def _names(action: argparse.Action) -> str:
 
 
 ENDS = re.compile(r"_(ci95_(?:low|high)|se)(?=_|\*|$)")
+ONLY_IN_CSV = {"clusters", "impacts", "summary", "touch_events"}
+"""Tables whose columns stand only in the file of all columns."""
 PARTS = re.compile(r"^[wxyz] (?=component|coordinate)|(?:drag|lateral|vertical) (?=force)")
 
 
@@ -125,6 +127,7 @@ def columns() -> str:
     made_tables = (
         (name, markdown_table(heads[: len(table_rows[0])], table_rows))
         for name, table_rows in parts.items()
+        if name.strip("`") not in ONLY_IN_CSV
     )
     return "\n\n".join(f"### {name}\n\n{table}" for name, table in made_tables)
 
@@ -180,6 +183,8 @@ def _fields(
 ) -> Iterator[tuple[str, str, str, str]]:
     """Name, limits with usual values, default and meaning of every field, depth first."""
     for name, field in model.model_fields.items():
+        if name == "kind":  # stands in the brackets of the other fields
+            continue
         path = f"{prefix}{name}"
         inner = list(_models(field.annotation))
         if not inner or any(get_args(part)[:1] == (str,) for part in _parts(field.annotation)):
