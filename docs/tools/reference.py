@@ -93,7 +93,7 @@ def _names(action: argparse.Action) -> str:
 
 
 ENDS = re.compile(r"_(ci95_(?:low|high)|se)(?=_|\*|$)")
-ONLY_IN_CSV = {"clusters", "impacts", "summary", "touch_events"}
+ONLY_IN_CSV = {"clusters", "impacts", "network", "summary", "thermo", "touch_events"}
 """Tables whose columns stand only in the file of all columns."""
 PARTS = re.compile(r"^[wxyz] (?=component|coordinate)|(?:drag|lateral|vertical) (?=force)")
 
@@ -162,7 +162,7 @@ def fields() -> dict[str, str]:
     groups: dict[str, list[list[str]]] = {}
     for (head, _, *cells), names in merged.items():
         groups.setdefault(head, []).append([_named(names), *cells])
-    heads = ["field", "limits (usual)", "default", "meaning"]
+    heads = ["field", "limits, or (usual)", "default", "meaning"]
     return {name: markdown_table(heads, rows) for name, rows in groups.items()}
 
 
@@ -277,7 +277,7 @@ _BOUND = re.compile(r"(above|at least|below|at most) ([^ ,]+),? ?")
 
 
 def _usual(path: str, limits: str) -> str:
-    """Limits within which a value is accepted; in brackets those without a warning."""
+    """Limits within which a value is accepted; or, in brackets, those without a warning."""
     name, rest = re.sub(r"\[\w+\]", "", path), _BOUND.sub("", limits)
     bounds = {word: float(value) for word, value in _BOUND.findall(limits)}
     places = ((name, f"{name}.0"), [f"{name}.0.{index}" for index in range(7)])
@@ -299,8 +299,9 @@ def _usual(path: str, limits: str) -> str:
         usual.append(f"{max(low, limit.warned_below):.7g} to {min(high, limit.warned_above):.7g}")
     if usual == [re.sub("above |below ", "", text) for text in accepted]:
         usual = []
-    text = "; ".join([*filter(None, [rest.strip()]), *accepted]).replace("or; ", "or ")
-    return f"{text} ({'; '.join(usual)})" if usual else text
+    if usual:
+        return f"{rest.strip().removesuffix(' or')} ({'; '.join(usual)})".strip()
+    return "; ".join([*filter(None, [rest.strip()]), *accepted]).replace("or; ", "or ")
 
 
 def _default(field: FieldInfo) -> str:
