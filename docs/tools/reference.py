@@ -41,6 +41,9 @@ def markdown_table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 # --- command line --------------------------------------------------------------------
 
+OPTIONAL = re.compile(r"\[-(?:[^][]|\[[^]]*\])*\]")
+"""An optional argument in a usage, such as ``[--var NAME [VALUE ...]]``."""
+
 
 def command_sections(parser: argparse.ArgumentParser) -> str:
     """The commands of a program in a sentence each, and their options, each described once."""
@@ -48,14 +51,14 @@ def command_sections(parser: argparse.ArgumentParser) -> str:
     arguments: dict[tuple[str, str], list[str]] = {}
     for command in _commands(parser):
         name = command.prog.partition(" ")[2]
-        usage = _cell(" ".join(w for w in command.format_usage().split()[2:] if w != "[-h]"))
+        usage = _cell(" ".join(OPTIONAL.sub("", command.format_usage()).split()[2:]))
         about = re.split(r"\. (?=[A-Z])", command.description or "")[0]
         rows.append([f"`{usage}`", about[:1].upper() + about[1:].removesuffix(".") + "."])
         for action in command._actions:
             if action.option_strings and "--help" not in action.option_strings:
                 arguments.setdefault((_names(action), _help(action)), []).append(name)
     described = [
-        [f"`{name}`", "most" if len(uses) > 5 else ", ".join(f"`{use}`" for use in uses), meaning]
+        [f"`{name}`", ", ".join(f"`{use}`" for use in uses), meaning]
         for (name, meaning), uses in sorted(arguments.items(), key=lambda item: -len(item[1]))
     ]
     table = markdown_table(["command", "effect"], rows)
@@ -332,7 +335,13 @@ def bibliography() -> str:
     style = find_plugin("pybtex.style.formatting", "plain")()
     backend = find_plugin("pybtex.backends", "markdown")()
     formatted = sorted(style.format_entries(entries.entries.values()), key=lambda entry: entry.key)
-    return "\n\n".join(f"## {entry.key}\n\n{entry.text.render(backend)}" for entry in formatted)
+    texts = ((entry.key, entry.text.render(backend).partition("\n")) for entry in formatted)
+    return "\n\n".join(f"## {key}\n\n{_few(names)}\n{rest}" for key, (names, _, rest) in texts)
+
+
+def _few(names: str) -> str:
+    """The names of up to three authors; of more, the first."""
+    return names if names.count(", ") < 3 else f"{names.partition(', ')[0]} et al\\."
 
 
 def audit_rules() -> str:
