@@ -96,7 +96,7 @@ def _names(action: argparse.Action) -> str:
 
 
 ENDS = re.compile(r"_(ci95_(?:low|high)|se)(?=_|\*|$)")
-ONLY_IN_CSV = {"clusters", "impacts", "network", "summary", "thermo", "touch_events"}
+ONLY_IN_CSV = {"chains", "clusters", "impacts", "network", "summary", "thermo", "touch_events"}
 """Tables whose columns stand only in the file of all columns."""
 PARTS = re.compile(r"^[wxyz] (?=component|coordinate)|(?:drag|lateral|vertical) (?=force)")
 
