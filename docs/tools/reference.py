@@ -87,8 +87,6 @@ def _cell(text: str) -> str:
 def _names(action: argparse.Action) -> str:
     words = action.metavar or action.dest.upper()
     value = words if isinstance(words, str) else " ".join(words)
-    if not action.option_strings:
-        return str(action.metavar or action.dest)
     return ", ".join(action.option_strings) + ("" if action.nargs == 0 else f" {value}")
 
 
@@ -127,12 +125,11 @@ def columns() -> str:
             parts["In several tables"].append([*cells, listed])
         else:
             parts.setdefault(listed, []).append(cells)
-    made_tables = (
-        (name, markdown_table(heads[: len(table_rows[0])], table_rows))
-        for name, table_rows in parts.items()
+    return "\n\n".join(
+        f"### {name}\n\n{markdown_table(heads[: len(cells[0])], cells)}"
+        for name, cells in parts.items()
         if name.strip("`") not in ONLY_IN_CSV
     )
-    return "\n\n".join(f"### {name}\n\n{table}" for name, table in made_tables)
 
 
 def _braced(names: Sequence[str]) -> str:
@@ -300,9 +297,7 @@ def _usual(path: str, limits: str) -> str:
         below = "below " if high == bounds.get("below") else ""
         accepted.append(f"{above}{low:.7g} to {below}{high:.7g}")
         usual.append(f"{max(low, limit.warned_below):.7g} to {min(high, limit.warned_above):.7g}")
-    if usual == [re.sub("above |below ", "", text) for text in accepted]:
-        usual = []
-    if usual:
+    if usual != [re.sub("above |below ", "", text) for text in accepted]:
         return f"{rest.strip().removesuffix(' or')} ({'; '.join(usual)})".strip()
     return "; ".join([*filter(None, [rest.strip()]), *accepted]).replace("or; ", "or ")
 
@@ -328,6 +323,9 @@ def fidelities() -> str:
 
 # --- bibliography ------------------------------------------------------------------------
 
+MANY = re.compile(r"^([^,\n]*)(?:, [^,\n]*){3,}")
+"""The names of more than three authors, of which the first is shown."""
+
 
 def bibliography() -> str:
     """Every source, under an anchor of its key."""
@@ -335,13 +333,10 @@ def bibliography() -> str:
     style = find_plugin("pybtex.style.formatting", "plain")()
     backend = find_plugin("pybtex.backends", "markdown")()
     formatted = sorted(style.format_entries(entries.entries.values()), key=lambda entry: entry.key)
-    texts = ((entry.key, entry.text.render(backend).partition("\n")) for entry in formatted)
-    return "\n\n".join(f"## {key}\n\n{_few(names)}\n{rest}" for key, (names, _, rest) in texts)
-
-
-def _few(names: str) -> str:
-    """The names of up to three authors; of more, the first."""
-    return names if names.count(", ") < 3 else f"{names.partition(', ')[0]} et al\\."
+    texts = (
+        (entry.key, MANY.sub(r"\1 et al\\.", entry.text.render(backend))) for entry in formatted
+    )
+    return "\n\n".join(f"## {key}\n\n{text}" for key, text in texts)
 
 
 def audit_rules() -> str:
