@@ -113,7 +113,7 @@ def bowl_files(study: Study, top_m: float) -> dict[str, Callable[[], str]]:
     return {"bowl.stl": lambda: stl_text(mesh)}
 
 
-def bowl_of_run(study: Study) -> BowlOfRun:
+def closed_bowl(study: Study) -> BowlOfRun:
     """The bowl of a process at rest, with polygons in place of its cylinders if it is a mesh."""
     closed, size = dict(study.bowl.closed), study.bowl_facet_size_m
     if size is not None:

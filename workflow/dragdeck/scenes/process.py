@@ -260,7 +260,7 @@ def _process_case(
         settings=study.chosen_fidelity().model_dump(include={"timestep_fraction", "speed_factor"}),
         run=PROCESS.run_id(case),
         media=scenes.media_of_run(study, buoyancy_density(study)),
-        bowl=bed_space.bowl_of_run(study).model_copy(update={"motion": way.driven.bowl}),
+        bowl=bed_space.closed_bowl(study).model_copy(update={"motion": way.driven.bowl}),
         assumptions=[*scenes.assumed(study), *_of_liquid(case, surface_m)],
         asked=case.advised,
         study=scenes.said_study(study),
