@@ -187,8 +187,8 @@ def test_a_file_that_is_no_table_of_waypoints_is_not_quoted(made: Made) -> None:
     with pytest.raises(InputError, match="the columns are not those of waypoints") as caught:
         made("root:x:0:0:root:/root:/bin/sh\n")
     assert "root:x" not in str(caught.value)
-    with pytest.raises(InputError, match="value:  time_s,x_m,y_mm"):
-        made("time_s,x_m,y_mm\n0,0,0\n1,1,0\n")
+    with pytest.raises(InputError, match="value:  time_s,x_m,y_in"):
+        made("time_s,x_m,y_in\n0,0,0\n1,1,0\n")
 
 
 def test_neither_file_nor_points(small: dict[str, Any], write_study: Any) -> None:

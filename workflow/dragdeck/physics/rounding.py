@@ -10,8 +10,8 @@ def round_to(value: float, digits: int) -> float:
 
 
 def rounded(value: float, *, up: bool, digits: int = 2) -> float:
-    """Round a number up or down to significant digits; one that is not positive to the nearest."""
-    if value <= 0:
+    """Round a number up or down to significant digits; one without a logarithm to the nearest."""
+    if not 0 < value < math.inf:
         return round_to(value, digits)
     unit = 10.0 ** (math.floor(math.log10(value)) - digits + 1)
     units = value / unit
