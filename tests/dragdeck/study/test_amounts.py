@@ -148,7 +148,7 @@ def test_as_many_as_count_may_have_are_accepted_by_mass_and_height(
 def test_a_cylinder_may_have_fine_strips_if_they_are_long() -> None:
     with pytest.raises(InputError, match="facets") as caught:
         cylinder(0.005, 0.08, 1e-3, 1e-7)
-    assert caught.value.field == "facet_length_m"
+    assert caught.value.field == "workpiece.shape.facet_length_m"
     assert len(cylinder(0.005, 0.08, 1e-3, 0.01).faces) < 2000
 
 
