@@ -30,7 +30,7 @@ def levels_of(imports: Mapping[str, set[str]]) -> dict[str, int]:
 
 @pytest.mark.parametrize(
     ("package", "modules", "most"),
-    [("dragdeck", 80, 14), ("dragchain", 80, 11), ("evidence", 20, 7)],
+    [("dragdeck", 80, 15), ("dragchain", 80, 11), ("evidence", 20, 7)],
 )
 def test_no_cycle_and_few_levels(package: str, modules: int, most: int) -> None:
     levels = levels_of(imports_of(package))

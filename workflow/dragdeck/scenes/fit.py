@@ -215,8 +215,8 @@ def _beside(case: Case, gap: float) -> Iterator[InputError]:
 
 def _depth_field(case: Case) -> str:
     several, at = (case.whole or case).study.workpieces, max(case.number - 1, 0)
-    own = several and several.stations[at].immersion_depth_m
-    return f"workpieces.each.{at}.immersion_depth_m" if own else "motion.immersion_depth_m"
+    deeper = several and several.stations[at].immersion_depth_m
+    return f"workpieces.each.{at}.immersion_depth_m" if deeper else "motion.immersion_depth_m"
 
 
 def _below(case: Case, tip_m: float) -> Iterator[InputError]:
