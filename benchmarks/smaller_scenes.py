@@ -2,7 +2,7 @@
 
     ./run all --config study=drag_finisher      # and the others below
     python benchmarks/smaller_scenes.py docs/data/scenes results/drag_finisher{,_coarse} \
-        results/stream_finisher results/stream_machine{,_whole}
+        results/stream_finisher results/stream_machine{,_whole} results/coarser_{slow,fast,wide}
 
 Makes three records of the runs of these studies: ``smaller_scenes.csv``, mean values over the
 packings of each scene and size with the cost of filling and process; ``cut_out_change.csv``, the
@@ -77,6 +77,8 @@ def _changes(table: pd.DataFrame) -> Iterator[dict[str, object]]:
     """Relative change of the drag by the cut-out, the mean over the particle sizes of a study."""
     for study, of_study in table.groupby("study"):
         rows = {scene: part.set_index("factor") for scene, part in of_study.groupby("scene")}
+        if len(rows) < 2:
+            continue
         cut, whole = (rows[scene] for scene in ("cut out", "whole"))
         sizes = cut.index.intersection(whole.index)
         ratio = np.log((cut["drag_n"] / whole["drag_n"])[sizes])
