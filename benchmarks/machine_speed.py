@@ -18,7 +18,7 @@ from scipy.stats import t
 
 from dragchain.quantities.document import MEASURED_FILE, RunQuantities
 from dragchain.statistics.estimate import flattened
-from dragdeck.outlook.timestep import stable_fraction
+from dragdeck.outlook.timestep import stability_forecast
 from dragdeck.project import Project
 from dragdeck.records.run import RunRecord
 from dragdeck.scenes.process import PROCESS
@@ -34,7 +34,7 @@ def rows(project: Project) -> Iterator[dict[str, object]]:
             {
                 "speed_m_s": case.study.motion.nominal_speed_m_s,
                 "seed": case.study.seed,
-                "forecast": case.study.chosen_fidelity().timestep_fraction / stable_fraction(case),
+                "forecast": stability_forecast(case),
                 "measured": checks["stable_timestep"].number,
                 "drag_n": values["drag_mean"],
                 "contacts": values["workpiece_contacts"],

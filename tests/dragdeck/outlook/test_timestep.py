@@ -110,6 +110,7 @@ def test_the_law_gives_the_numbers_of_a_scene_it_was_not_fitted_to(
     law = stable_step_law()
     kappa = scale ** (2 / 3) * describe(paper(scale, fraction))["stiffness_number"]
     largest = law.largest_fraction(kappa, 0.86, 0.15 / 3.27, number)
+    assert law.number(largest, kappa, 0.86, 0.15 / 3.27) == pytest.approx(number, rel=1e-12)
     assert largest == pytest.approx(fraction, rel=0.15)
 
 

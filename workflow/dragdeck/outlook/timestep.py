@@ -195,18 +195,30 @@ def stable_fraction(case: Case, margin: float = 0.0) -> float:
     margin : float
         Logarithm of the stability number that the step then is forecast to have.
     """
+    return stable_step_law().largest_fraction(
+        *_contacts(case.study, _pressure(case)), number=math.exp(margin)
+    )
+
+
+def stability_forecast(case: Case) -> float:
+    """Stability number that a case's process is forecast to have."""
+    fraction = case.study.chosen_fidelity().timestep_fraction
+    return stable_step_law().number(fraction, *_contacts(case.study, _pressure(case)))
+
+
+def _pressure(case: Case) -> float:
+    """Pressure in the bed at the tip of the moving workpiece, Pa."""
     density = SOLID_FRACTION_ESTIMATE * beds.bed_density(case.study)
-    pressure = beds.tip_pressure(case.study) + _MOMENTUM * density * case.axis_speed_m_s**2
-    return _stable_under(case.study, pressure, math.exp(margin))
+    return beds.tip_pressure(case.study) + _MOMENTUM * density * case.axis_speed_m_s**2
 
 
-def _stable_under(study: Study, pressure_pa: float, number: float) -> float:
-    """The step over the Rayleigh time that has a stability number under a pressure."""
+def _contacts(study: Study, pressure_pa: float) -> tuple[float, float, float]:
+    """Stiffness number, restitution and relative spread of the radii, under a pressure."""
     softer = study.chosen_fidelity().youngs_modulus_scale ** (2 / 3)
     kappa = softer * mechanics.stiffness_number(beds.particle_material(study), pressure_pa)
     restitution = study.pair(study.media.main_material, study.media.main_material).restitution
     spread = study.media.typical_std_m / study.media.typical_radius_m
-    return stable_step_law().largest_fraction(kappa, restitution, spread, number)
+    return kappa, restitution, spread
 
 
 def settling_cautions(case: Case) -> Iterator[Caution]:
@@ -216,7 +228,7 @@ def settling_cautions(case: Case) -> Iterator[Caution]:
     rest (measured: docs/evidence/stability.md).
     """
     step, study = case.study.chosen_fidelity().filling_timestep_fraction, case.study.at_filling()
-    limit = _stable_under(study, beds.floor_pressure(study), 1.0)
+    limit = stable_step_law().largest_fraction(*_contacts(study, beds.floor_pressure(study)))
     if step > limit * (1 + 1e-9):
         yield Caution(
             "stable_timestep",

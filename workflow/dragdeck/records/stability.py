@@ -34,6 +34,12 @@ class StableStepLaw(Part):
     largest: float
     runs: int
 
+    def number(self, fraction: float, kappa: float, restitution: float, spread: float) -> float:
+        """The stability number of a step over the Rayleigh time."""
+        u = fraction * kappa**-0.25
+        square = self.stiffness * u**2 + self.damping * damping_ratio(restitution) * u
+        return math.sqrt(square) * math.exp(self.spread * spread)
+
     def largest_fraction(
         self, kappa: float, restitution: float, spread: float, number: float = 1.0
     ) -> float:
