@@ -214,9 +214,10 @@ def _beside(case: Case, gap: float) -> Iterator[InputError]:
 
 
 def _depth_field(case: Case) -> str:
-    several, at = (case.whole or case).study.workpieces, max(case.number - 1, 0)
-    deeper = several and several.stations[at].immersion_depth_m
-    return f"workpieces.each.{at}.immersion_depth_m" if deeper else "motion.immersion_depth_m"
+    """The field that states how deep this workpiece is."""
+    carousel, at = (case.whole or case).study.workpieces, max(case.number - 1, 0)
+    stated = carousel and carousel.stations[at].immersion_depth_m
+    return f"workpieces.each.{at}.immersion_depth_m" if stated else "motion.immersion_depth_m"
 
 
 def _below(case: Case, tip_m: float) -> Iterator[InputError]:

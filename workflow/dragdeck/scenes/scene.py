@@ -57,17 +57,9 @@ _NOT_SAID = ("calibration", "fidelities", "licence", "scaling", "search", "sweep
 
 
 _OF_PROCESS = (
-    *(
-        "accepted",
-        "assumptions",
-        "compound",
-        "drop_test",
-        "fidelity",
-        "filling",
-        "motion",
-        "outputs",
-    ),
-    *("reduction", "reference", "removal", "roughness", "seed", "workpiece.shape", "workpieces"),
+    *("accepted", "assumptions", "compound", "drop_test", "fidelity", "filling", "motion"),
+    *("outputs", "reduction", "reference", "removal", "roughness", "seed"),
+    *("workpiece.shape", "workpieces"),
 )
 """Fields that no file of a run says, and those that only files of a process do."""
 

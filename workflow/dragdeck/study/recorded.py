@@ -156,9 +156,8 @@ def _read(
     if not set(needed) <= set(header) <= set(columns) or len(set(header)) < len(header):
         limit = ",".join(needed) + (f", optionally {', '.join(optional)}" if optional else "")
         problem = f"the columns are not those of {row.__name__.lower()}s"
-        value = (
-            ",".join(table.names)[:200] if set(needed) & set(header) else None
-        )  # quote only a table
+        is_table = set(needed) & set(header)  # nothing else is quoted
+        value = ",".join(table.names)[:200] if is_table else None
         line = table.header_line
         raise InputError(problem, file=file, line=line, value=value, limit=limit)
     lines, numbers = table.numbers(table.names)

@@ -90,11 +90,12 @@ class Roughness(Model):
         steps = np.diff([height.x_m for height in self.profile or ()])
         if len(steps) and not (steps.all() and np.allclose(steps, steps.mean(), rtol=_UNEVEN)):
             raise ValueError("the profile is not evenly spaced along x_m: resample it")
-        if not self.start_ra_m:
+        start_ra_m = self.start_ra_m
+        if not start_ra_m:
             raise ValueError("the profile is flat: its Ra is 0")
         for name, ra in {"steady_ra_m": self.steady_ra_m, "target_ra_m": self.target_ra_m}.items():
-            if ra and ra >= self.start_ra_m:
-                before = f"that before the process, {self.start_ra_m:.3g} m"
+            if ra and ra >= start_ra_m:
+                before = f"that before the process, {start_ra_m:.3g} m"
                 raise ValueError(f"{name} is {ra:g}, not below {before}")
         fewest = 2 if self.steady_ra_m else 3
         if 0 < len(self.measured) < fewest:
@@ -119,7 +120,8 @@ class Roughness(Model):
     @property
     def start_ra_m(self) -> float:
         """Ra before the process, m."""
-        return float(np.abs(self.heights_m - self.heights_m.mean()).mean())
+        z = self.heights_m
+        return float(np.abs(z - z.mean()).mean())
 
     def doubts(self) -> Iterator[str]:
         """What a profile or measured Ra contradict, a line each."""
