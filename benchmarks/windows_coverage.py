@@ -26,7 +26,7 @@ from dragchain.statistics.estimate import Estimate
 from dragchain.windows.estimate import WindowOfRun
 from dragchain.windows.rounds import Asked, judged, with_drag
 from dragdeck.records.windows import UNKNOWN, WindowsRecord
-from dragdeck.scenes.lead import FIRST_WINDOWS, spread_out
+from dragdeck.scenes.lead import spread_out
 
 TRUE, STRETCHES, BLOCKS, LENGTHS = -2.0, 16, 3, 9.0
 """Drag, N; stretches of a path; blocks of a stretch; cost of the whole drag in windows, each of
@@ -132,8 +132,9 @@ def _judged(
         )
         for place in spread_out(STRETCHES)
     ]  # fmt: skip
-    asked = Asked(process.tolerance, ("drag_mean",), STRETCHES, LENGTHS, process.seeds)
-    number, cost = FIRST_WINDOWS, float(FIRST_WINDOWS)
+    quantities = ("drag_mean",)
+    asked = Asked(process.tolerance, quantities, STRETCHES, LENGTHS, BLOCKS, process.seeds)
+    number, cost = 0, 0.0
     while True:
         last = judged(run, windows[:number], asked, process.record)
         if last.whole:

@@ -103,7 +103,8 @@ def test_a_round_judges_as_many_windows_as_the_one_before_wanted(tmp_path: Path)
     ours = work("windows", tmp_path, made=judged)
     run, *others = (folder.rpartition("/")[2] for folder in ours.every_folder("process"))
     assert len(others) == 5
-    second = SimpleNamespace(study="windows", run=run, round="2")
+    first, second = (SimpleNamespace(study="windows", run=run, round=text) for text in "12")
+    assert ours.windows_of_round(first) == []
     assert len(ours.windows_of_round(second)) == 2
     assert ours.last_round(second).endswith("-3.json")  # type: ignore[union-attr]
     options = ours.windows_options(second)

@@ -11,7 +11,7 @@ from dragdeck.cases.case import Case, digest, of_each_workpiece
 from dragdeck.errors import InputError, choices
 from dragdeck.outlook.timestep import check_timestep
 from dragdeck.records.tradeoff import TradeoffRecord
-from dragdeck.scenes.lead import FIRST_WINDOWS, LEAD, with_leads
+from dragdeck.scenes.lead import FIRST_WINDOWS, LEAD, WHOLE_DRAG, with_leads
 from dragdeck.scenes.process import PROCESS, SCENES
 from dragdeck.scenes.scene import SceneType
 from dragdeck.scenes.workpiece import workpiece_length
@@ -190,15 +190,23 @@ class Project:
     ) -> dict[Path, Case]:
         """The folders of the engine runs of cases, each with its first case.
 
-        Those from which they go on are among them, and the windows that are certain or begun.
+        Those from which they go on are among them, and the windows that are begun, or are the first
+        where no whole drag is run instead.
         """
         runs = by_run(with_leads(cases) if scene.needs_bed else cases, scene).values()
         folders = {self.run_folder(case, scene, of_plan=of_plan): case for case in runs}
-        return {
-            folder: case
-            for folder, case in folders.items()
-            if case.rank_of_window <= FIRST_WINDOWS or folder.is_dir()
+        windows = {folder: case for folder, case in folders.items() if case.rank_of_window}
+        instead = [
+            case.lead
+            for folder, case in windows.items()
+            if case.part == WHOLE_DRAG and folder.is_dir()
+        ]
+        left_out = {
+            folder
+            for folder, case in windows.items()
+            if not folder.is_dir() and (case.rank_of_window > FIRST_WINDOWS or case.lead in instead)
         }
+        return {folder: case for folder, case in folders.items() if folder not in left_out}
 
     def run_folder(self, case: Case, scene: SceneType, *, of_plan: bool = False) -> Path:
         """The folder of one engine run; windows and process runs of a plan stand apart."""

@@ -23,7 +23,7 @@ from dragdeck.decks.templates import environment, template_files
 from dragdeck.engine.status import other_engines
 from dragdeck.errors import InputError
 from dragdeck.outlook.runs import StudyRun, expected_runs
-from dragdeck.scenes.lead import whole_drag, windows_of, with_lead, with_leads
+from dragdeck.scenes.lead import FIRST_WINDOWS, whole_drag, windows_of, with_lead, with_leads
 from dragdeck.scenes.process import PROCESS, SCENES
 from dragdeck.study.calibration import measurements
 from dragdeck.study.recorded import recorded_file
@@ -279,13 +279,21 @@ class Workflow:
         return other_engines(self.project.root / file for file in runs)
 
     def planned_runs(self, jobs: Iterable[Any]) -> list[StudyRun]:
-        """The engine runs of Snakemake's jobs: what is expected of each, and how far it is."""
+        """The engine runs of Snakemake's jobs: what is expected of each, and how far it is.
+
+        The first windows are among them, although a first round may choose the whole drag instead.
+        """
         cases: dict[str, dict[Path, Case]] = {}
         for job in jobs:
             if job.rule.name in projects.RUNNERS:
                 place, _ = projects.RUNNERS[job.rule.name]
                 folder = self.project.root / Path(job.output[0]).parent
                 cases.setdefault(place, {})[folder] = self.case_of(place, job.wildcards)
+            elif job.rule.name == "judge_windows" and job.wildcards.round == "1":
+                for window in windows_of(self.case_of("process", job.wildcards))[:FIRST_WINDOWS]:
+                    name = PROCESS.run_id(window)
+                    path = projects.run_path(job.wildcards.study, projects.WINDOWS, name)
+                    cases.setdefault(projects.WINDOWS, {})[self.project.root / path] = window
         several = (
             expected_runs(projects.PLACES[place], folders) for place, folders in cases.items()
         )

@@ -17,7 +17,7 @@ from dragdeck.cases.case import Case, digest
 from dragdeck.decks import RUN_FILE
 from dragdeck.errors import InputError
 from dragdeck.rules import Wildcards, Workflow
-from dragdeck.scenes.lead import FIRST_WINDOWS, whole_drag, whole_lengths, windows_of
+from dragdeck.scenes.lead import counted_blocks, whole_drag, whole_lengths, windows_of
 from dragdeck.scenes.process import PROCESS, SCENES
 from dragdeck.study.search import RECORD, SearchRecord, SearchRound
 from dragdeck.study.yaml import read_study
@@ -47,8 +47,8 @@ class WorkflowInRounds(Workflow):
         return [self._judged(wildcards, number - 1)] if number > 1 else []
 
     def windows_of_round(self, wildcards: Wildcards) -> list[str]:
-        """The folders of the windows that a round judges: of those that the one before wanted."""
-        wanted = self._said_before(wildcards).get("wanted", FIRST_WINDOWS)
+        """The folders of the windows that a round judges: those that the one before wanted."""
+        wanted = self._said_before(wildcards).get("wanted", 0)
         return self._window_folders(wildcards, self.windows_of_run(wildcards)[:wanted])
 
     def drag_of_round(self, wildcards: Wildcards) -> list[str]:
@@ -88,7 +88,8 @@ class WorkflowInRounds(Workflow):
         return (
             f"--tolerance {asked.tolerance} --quantities {quantities}"
             f" --most {len(self.windows_of_run(wildcards))}"
-            f" --lengths {whole_lengths(study):.6g} {self.packings_option(wildcards)}{drag}"
+            f" --lengths {whole_lengths(study):.6g} --sample {counted_blocks(study)[1]:.6g}"
+            f" {self.packings_option(wildcards)}{drag}"
         )
 
     # --- searches --------------------------------------------------------------------------

@@ -140,6 +140,22 @@ class Paired:
         )
 
 
+def expected(stretches: Floats, known: Known) -> Paired:
+    """What windows of a soft run are expected to give, by its own scatter and by other scenes.
+
+    Parameters
+    ----------
+    stretches : (B,) ndarray
+        As for `paired`.
+    known : Known
+    """
+    soft, count = float(stretches.mean()), len(stretches)
+    of_stretch = float(np.var(stretches / soft, ddof=1)) if count > 1 else 0.0
+    about, of_path = known.variance_ratio * of_stretch, known.slope**2 * of_stretch / count
+    of_whole = about / count + of_path
+    return Paired(soft, about, of_path, known.packing_std**2, known.degrees, of_whole)
+
+
 def paired(windows: Floats, beside: Floats, stretches: Floats, known: Known) -> Paired:
     """The value from K windows and the soft run.
 

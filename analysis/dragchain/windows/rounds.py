@@ -24,10 +24,12 @@ from dragchain.windows.estimate import (
     Round,
     WindowOfRun,
     corrected_map,
+    expected,
     paired,
     windows_needed,
 )
 from dragdeck.records.windows import UNKNOWN, WindowsRecord
+from dragdeck.scenes.lead import FIRST_WINDOWS
 
 _FEWEST = 2
 """Windows of which one alone says nothing of its scatter."""
@@ -53,6 +55,7 @@ def judge_windows(
     quantities: Sequence[str],
     most: int,
     lengths: float,
+    sample: float,
     packings: int,
     drag: Path | None,
     out: Path,
@@ -64,7 +67,7 @@ def judge_windows(
     run_dir : Path
         The run with reduced moduli.
     windows : sequence of Path
-        Folders of its windows so far.
+        Folders of its windows so far; none in the first round.
     tolerance : float
         Relative half-width of the interval at which no further window is run.
     quantities : sequence of str
@@ -73,6 +76,8 @@ def judge_windows(
         Number of windows that there can be.
     lengths : float
         How many windows cost as much as the whole drag.
+    sample : float
+        Blocks of the path that a window samples.
     packings : int
         Of the case, whose mean is to be inside the tolerance: each of them may be further off.
     drag : Path or None
@@ -87,7 +92,7 @@ def judge_windows(
     """
     soft = RunQuantities.read(run_dir / MEASURED_FILE)
     measured = [measured_window(folder) for folder in windows]
-    asked = Asked(tolerance, tuple(quantities), most, lengths, packings)
+    asked = Asked(tolerance, tuple(quantities), most, lengths, sample, packings)
     judged_round = judged(soft, measured, asked, WindowsRecord.shipped())
     if drag is not None:
         judged_round = with_drag(judged_round, RunQuantities.read(drag / MEASURED_FILE), asked)
@@ -102,6 +107,7 @@ class Asked:
     quantities: tuple[str, ...]
     most: int = 0
     lengths: float = math.inf
+    sample: float = 1.0
     packings: int = 1
 
     @property
@@ -117,11 +123,13 @@ def judged(
 
     Another round follows if it is expected to meet the tolerance: with as many windows as are
     needed for that, at most twice as many as so far; or with the whole drag, where that costs less
-    or windows cannot do it. Where neither can, this round is the last.
+    or windows cannot do it. Where neither can, this round is the last. The first round has no
+    windows: what is expected follows from the soft run and from other scenes, and where neither
+    way is expected to do, the first windows show it at the least cost.
     """
     good = [window for window in windows if not window.refused]
-    pairs = dict(_paired(soft, good, record))
-    values = {quantity.name: pair.estimate(len(good)) for quantity, pair in pairs.items()}
+    pairs = dict(_paired(soft, good, record) if windows else _expected_pairs(soft, asked, record))
+    values = {quantity.name: pair.estimate(len(good)) for quantity, pair in pairs.items() if good}
     values = {name: value for name, value in values.items() if value.known}
     widest = _widest(values, asked.quantities)
     reached = len(good) >= _FEWEST and widest <= asked.of_each
@@ -129,11 +137,15 @@ def judged(
     needs = [windows_needed(pair, len(good), asked.of_each, asked.most) for pair in concerned]
     need = Need(*(max(numbers) for numbers in zip(Need(_FEWEST, 1), *needs, strict=True)))
     more = max(1, need.windows - len(good))
-    by_windows, by_drag = _expected(concerned, need.windows, asked, len(good))
+    if windows and len(good) < _FEWEST:  # of one, nothing is known; after none, others will fail
+        by_windows, by_drag = bool(good), not good
+    else:
+        by_windows, by_drag = _may_do(concerned, need.windows, asked)
     by_windows &= len(windows) < asked.most
     by_drag &= not (by_windows and more <= asked.lengths)
-    last = reached or not (by_windows or by_drag)
-    wanted = min(len(windows) + more, math.ceil(_MOST_MORE * len(windows)), asked.most)
+    last = bool(windows) and (reached or not (by_windows or by_drag))
+    most_next = math.ceil(_MOST_MORE * len(windows)) or FIRST_WINDOWS
+    wanted = min(max(len(windows) + more, FIRST_WINDOWS), most_next, asked.most)
     return Round(
         values=values,
         tolerance=Reached(
@@ -153,14 +165,11 @@ def judged(
     )
 
 
-def _expected(pairs: Sequence[Paired], windows: int, asked: Asked, good: int) -> tuple[bool, bool]:
+def _may_do(pairs: Sequence[Paired], windows: int, asked: Asked) -> tuple[bool, bool]:
     """Whether so many windows, and whether the whole drag, are expected to meet the tolerance.
 
-    Where no window was good, others will hardly be; of a single one, nothing is known yet; and
-    nothing gives a quantity that two good windows lack.
+    Nothing gives a quantity that is not known of all.
     """
-    if good < _FEWEST:
-        return bool(good), not good
     if len(pairs) < len(asked.quantities):
         return False, False
     widths = [pair.relative_half_width(windows, scatter=_DOUBT) for pair in pairs]
@@ -171,13 +180,14 @@ def _expected(pairs: Sequence[Paired], windows: int, asked: Asked, good: int) ->
 def with_drag(before: Round, drag: RunQuantities, asked: Asked) -> Round:
     """The last round, which the whole drag at the physical modulus ends.
 
-    A drag that failed leaves what the windows say.
+    A drag that failed leaves what the windows say; the first of them follow if there are none.
     """
     if not drag.complete:
         refused = {**before.tolerance.refused, drag.run: drag.why_failed or "not complete"}
-        update = {"refused": refused}
-        tolerance = before.tolerance.model_copy(update=update)
-        return before.model_copy(update={"tolerance": tolerance, "whole": False, "last": True})
+        tolerance = before.tolerance.model_copy(update={"refused": refused})
+        update = {"tolerance": tolerance, "whole": False, "last": bool(before.windows)}
+        wanted = before.wanted or min(FIRST_WINDOWS, asked.most)
+        return before.model_copy(update={**update, "wanted": wanted})
     return Round(
         values={name: value for name, value in drag.values_of_run.items() if value.known},
         tolerance=reached_by(drag, asked).model_copy(
@@ -231,6 +241,18 @@ def _paired(
                 stretches(soft, quantity.name, windows[0].arc_m),
                 record.quantities.get(quantity.name, UNKNOWN),
             )
+            yield quantity, pair.root if quantity.squared else pair
+
+
+def _expected_pairs(
+    soft: PathQuantities, asked: Asked, record: WindowsRecord
+) -> Iterator[tuple[Quantity, Paired]]:
+    """What is expected of each requested quantity before there are windows."""
+    known, arc_m = soft.values(), asked.sample * soft.block_m
+    for quantity in MEASURED:
+        if quantity.name in asked.quantities and quantity.name in known:
+            of_others = record.quantities.get(quantity.name, UNKNOWN)
+            pair = expected(stretches(soft, quantity.name, arc_m), of_others)
             yield quantity, pair.root if quantity.squared else pair
 
 

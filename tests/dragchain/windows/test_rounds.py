@@ -48,6 +48,27 @@ def asked(
     return Asked(tolerance, quantities, most, lengths)
 
 
+@pytest.mark.parametrize(
+    ("tolerance", "lengths", "whole"),
+    [(0.08, 99.0, False), (0.08, 2.0, True), (0.3, 2.0, False), (0.001, 2.0, False)],
+    ids=["windows are cheaper", "they are not", "few are enough", "nothing is"],
+)
+def test_the_soft_run_decides_whether_windows_are_run(
+    tolerance: float, lengths: float, whole: bool
+) -> None:
+    first = judged(SOFT, [], asked(tolerance, lengths=lengths), RECORD)
+    assert (first.whole, first.wanted) == ((True, 0) if whole else (False, 3))
+    assert not first.last and not first.values and not first.tolerance.reached
+
+
+def test_windows_follow_a_whole_drag_that_failed(small_run: RunQuantities) -> None:
+    before = judged(SOFT, [], asked(0.08, lengths=2.0), RECORD)
+    failed = small_run.model_copy(update={"complete": False})
+    after = with_drag(before, failed, asked(0.08))
+    assert (after.whole, after.last, after.wanted) == (False, False, 3)
+    assert small_run.run in after.tolerance.refused
+
+
 def test_it_stops_when_the_tolerance_is_reached() -> None:
     found = judge([15.0, 15.5, 14.5], 0.2)
     assert found.tolerance.reached and found.last and found.wanted == 3

@@ -22,6 +22,9 @@ from dragdeck.study.model import Study
 LEAD = "lead"
 """Part of a case that only leads to another one's process."""
 
+WHOLE_DRAG = "whole-drag"
+"""Part of a case that runs its whole drag at the physical modulus, instead of windows."""
+
 RAMP_STAGES = 24
 
 _SHORTEST_RAMP_S, _RAMP_FALLS, _SETTLING_FALLS = 0.05, 2.0, 9.0
@@ -31,7 +34,7 @@ s. The bed rises by what the overlaps give up; in a drag with an inertial number
 coordination number is at its plateau after that time (docs/evidence/windows.md)."""
 
 FIRST_WINDOWS = 3
-"""Windows of the first round, if so many fit."""
+"""Windows that are run first, if so many fit."""
 
 _FEWEST = 2
 """Windows of which one alone says nothing of its scatter."""
@@ -107,7 +110,7 @@ def whole_drag(case: Case) -> list[Case]:
         return []
     rank = FIRST_WINDOWS + len(lead.stretch.marks) + 1
     study = _window_study(lead.study)
-    return [_from_mark(lead, study, case.number, 0, 1.0, "whole-drag", rank)]
+    return [_from_mark(lead, study, case.number, 0, 1.0, WHOLE_DRAG, rank)]
 
 
 def _from_mark(
