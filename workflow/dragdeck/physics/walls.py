@@ -6,7 +6,7 @@ kind of bowl.
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Literal
+from typing import Literal, NamedTuple, Self
 
 import numpy as np
 from pydantic import PositiveFloat
@@ -107,42 +107,59 @@ def from_primitive(shape: str, sizes_m: Sequence[float], centre_m: Floats) -> tu
     return place - sizes_m[0], normal
 
 
-def _outwards(centre_m: Floats, sides: int) -> Floats:
-    """Unit vectors, (N, 2), to the middles of those sides of a polygon that points face."""
-    side = np.floor(np.arctan2(centre_m[:, 1], centre_m[:, 0]) / math.tau * sides)
-    middle = math.tau * (side + 0.5) / sides
-    return np.column_stack([np.cos(middle), np.sin(middle)])
-
-
 def _from_polygon(
     centre_m: Floats, radius_m: float, inwards: int, sides: int
 ) -> tuple[Floats, Floats]:
-    """Distances of points from the nearest side of a polygon about a circle, and normals.
-
-    In front of a column, beyond the end of a side, its corner is nearest.
-    """
-    outwards = _outwards(centre_m, sides)
-    across = np.column_stack([-outwards[:, 1], outwards[:, 0]])
-    out = (centre_m[:, :2] * outwards).sum(axis=1) - radius_m
-    along = (centre_m[:, :2] * across).sum(axis=1)
-    end = radius_m * math.tan(math.pi / sides) if inwards > 0 else math.inf
-    beyond = np.sign(along) * np.clip(np.abs(along) - end, 0.0, None) * (out > 0)
-    distance = np.copysign(np.hypot(out, beyond), out)
-    away = out[:, None] * outwards + beyond[:, None] * across
-    normal = away / np.where(distance == 0, 1e-300, distance)[:, None]
-    return inwards * distance, inwards * np.column_stack([normal, np.zeros_like(out)])
+    """Distances of points from the nearest side of a polygon about a circle, and normals."""
+    faced = _Faced.of(centre_m, sides)
+    out = faced.out_m - radius_m
+    distance, normal = faced.contacts(np.full_like(out, radius_m), out, np.zeros_like(out))
+    sign = inwards * np.copysign(1.0, out)
+    return sign * distance, sign[:, None] * normal
 
 
 def _from_cone(centre_m: Floats, ends_m: Floats, sides: int) -> tuple[Floats, Floats]:
     """Distances of points from the nearest side of a cone, and normals away from it."""
+    faced = _Faced.of(centre_m, sides)
     begin, along = ends_m[:2], ends_m[2:] - ends_m[:2]
-    outwards = _outwards(centre_m, sides)
-    place = np.column_stack([(centre_m[:, :2] * outwards).sum(axis=1), centre_m[:, 2]])
+    place = np.column_stack([faced.out_m, centre_m[:, 2]])
     share = np.clip((place - begin) @ along / (along @ along), 0.0, 1.0)
-    away = place - begin - share[:, None] * along
-    distance = np.linalg.norm(away, axis=1)
-    across, up = (away / np.maximum(distance, 1e-300)[:, None]).T
-    return distance, np.column_stack([across[:, None] * outwards, up])
+    nearest = begin + share[:, None] * along
+    return faced.contacts(nearest[:, 0], *(place - nearest).T)
+
+
+class _Faced(NamedTuple):
+    """The side of a polygon around the z axis that each of N points faces.
+
+    Unit vectors to its middle and along it, (N, 2); coordinates of the points in these, m.
+    """
+
+    outwards: Floats
+    across: Floats
+    out_m: Floats
+    along_m: Floats
+    sides: int
+
+    @classmethod
+    def of(cls, centre_m: Floats, sides: int) -> Self:
+        """Of (N, 3) points."""
+        side = np.floor(np.arctan2(centre_m[:, 1], centre_m[:, 0]) / math.tau * sides)
+        middle = math.tau * (side + 0.5) / sides
+        outwards = np.column_stack([np.cos(middle), np.sin(middle)])
+        across = np.column_stack([-outwards[:, 1], outwards[:, 0]])
+        parts = ((centre_m[:, :2] * vector).sum(axis=1) for vector in (outwards, across))
+        return cls(outwards, across, *parts, sides)
+
+    def contacts(self, radius_m: Floats, out_m: Floats, up_m: Floats) -> tuple[Floats, Floats]:
+        """Distances, (N,), and normals, (N, 3), from where the side has a radius.
+
+        The points are out and up from there; in front of a corner, they are beside it, too.
+        """
+        end = radius_m * math.tan(math.pi / self.sides)
+        beyond = np.sign(self.along_m) * np.clip(np.abs(self.along_m) - end, 0.0, None)
+        distance = np.sqrt(out_m**2 + beyond**2 + up_m**2)
+        flat = out_m[:, None] * self.outwards + beyond[:, None] * self.across
+        return distance, np.column_stack([flat, up_m]) / np.maximum(distance, 1e-300)[:, None]
 
 
 class Container(Part):
