@@ -147,8 +147,8 @@ class _Faced(NamedTuple):
         middle = math.tau * (side + 0.5) / sides
         outwards = np.column_stack([np.cos(middle), np.sin(middle)])
         across = np.column_stack([-outwards[:, 1], outwards[:, 0]])
-        parts = ((centre_m[:, :2] * vector).sum(axis=1) for vector in (outwards, across))
-        return cls(outwards, across, *parts, sides)
+        out_m, along_m = ((centre_m[:, :2] * way).sum(axis=1) for way in (outwards, across))
+        return cls(outwards, across, out_m, along_m, sides)
 
     def contacts(self, radius_m: Floats, out_m: Floats, up_m: Floats) -> tuple[Floats, Floats]:
         """Distances, (N,), and normals, (N, 3), from where the side has a radius.
