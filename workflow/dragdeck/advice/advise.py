@@ -93,7 +93,8 @@ class Option:
             text += f", begun with E x {chosen.soft_start.youngs_modulus_scale:g}"
         if windows is not None:
             step = f"{100 * windows.timestep_fraction:.3g} %"
-            text += f", {FIRST_WINDOWS} to {windows.most} windows with E x 1 at {step}"
+            count = f"{FIRST_WINDOWS} to {windows.most}"
+            text += f", {count} windows or the whole drag with E x 1 at {step}"
         return text
 
 

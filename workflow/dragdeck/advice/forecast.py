@@ -27,7 +27,8 @@ _DEFAULT_TOLERANCE = Tolerance(tolerance=0.1)
 
 _OF_WINDOWS = (
     "windows are run until the 95 % confidence interval of each quantity at the physical Young's "
-    f"modulus is inside it; steps and wall time are those of {FIRST_WINDOWS}"
+    "modulus is inside it, or the whole drag where that costs less; steps and wall time are those "
+    f"of {FIRST_WINDOWS}"
 )
 
 _OF_STIFF_RUN = (
