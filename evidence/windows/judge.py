@@ -14,6 +14,7 @@ import numpy as np
 import pandas as pd
 import yaml
 from pydantic import JsonValue
+from scipy.stats import binomtest, norm
 
 from dragchain.quantities.document import EXTRAPOLATED, MEASURED_FILE, Extrapolated, RunQuantities
 from dragchain.statistics.estimate import NORMAL_QUANTILE
@@ -31,6 +32,9 @@ from dragdeck.sweep.design import Design, Variation
 
 PLAIN = "-plain"
 """Ends the name of the study of plain runs beside one with a tolerance."""
+
+ALL = "all"
+"""Stands for a quantity in the row of all."""
 
 KINDS = Path(__file__).with_name("kinds.yaml")
 
@@ -83,13 +87,44 @@ def judge_tolerances(out: Path, studies: Sequence[str]) -> None:
     Parameters
     ----------
     out : Path
-        CSV file.
+        CSV file; beside it, NAME_summary.csv has what `summary` makes of it.
     studies : sequence of str
         Those with a tolerance; the plain runs of NAME are of the study NAME-plain.
     """
     project = project_here()
-    rows = [row for study in studies for row in _rows(project, study)]
-    pd.DataFrame(rows).to_csv(out, index=False, float_format="%.5g")
+    table = pd.DataFrame([row for study in studies for row in _rows(project, study)])
+    table.to_csv(out, index=False, float_format="%.5g")
+    of_all = summary(table)
+    of_all.to_csv(out.with_name(f"{out.stem}_summary.csv"), index=False, float_format="%.5g")
+
+
+def summary(table: pd.DataFrame) -> pd.DataFrame:
+    """Of each quantity, and of all: promises, how many were kept, and how far values are off.
+
+    A tolerance that was reached is a promise, which is kept if the error is within it. By chance
+    are those that would be broken if all intervals, of values and of references, were exact. The
+    interval of the share kept is that of Clopper and Pearson (1934, Biometrika 26, 404).
+
+    Parameters
+    ----------
+    table : DataFrame
+        Rows of `judge_tolerances`.
+    """
+    rows = []
+    for quantity in [*table["quantity"].unique(), ALL]:
+        of = table if quantity == ALL else table[table["quantity"] == quantity]
+        given = of[of["reached"]]
+        off = given["error"].abs() / given["tolerance"]
+        std = np.hypot(given["half_width"] / NORMAL_QUANTILE, given["reference_error"])
+        share = binomtest(int((off <= 1).sum()), max(len(given), 1)).proportion_ci()
+        rows.append({
+            "quantity": quantity, "values": len(of), "promises": len(given),
+            "kept": int((off <= 1).sum()), "share_low": share.low, "share_high": share.high,
+            "by_chance": 2 * norm.sf(given["tolerance"] / std).sum(), "largest": off.max(),
+            "error": of["error"].mean(), "error_se": of["error"].sem(),
+            "covered": int(of["covered"].sum()),
+        })  # fmt: skip
+    return pd.DataFrame(rows)
 
 
 def _rows(project: Project, study: str) -> Iterator[dict[str, Any]]:

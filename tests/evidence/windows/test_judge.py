@@ -53,3 +53,7 @@ def test_errors_are_those_against_the_plain_runs(
     assert row["error"] == pytest.approx(value / row["reference"] - 1, abs=1e-4)
     assert (row["reached"], row["covered"], row["windows"]) == (reached, covered, 3)
     assert 0 < row["reference_error"] < 0.03 and math.isclose(row["half_width"], 0.15)
+    of_drag, of_all = pd.read_csv("kinds_summary.csv").to_dict("records")
+    assert (of_drag["promises"], of_drag["kept"], of_drag["covered"]) == (1, covered, covered)
+    assert of_all["largest"] == pytest.approx(abs(row["error"]) / 0.2, rel=1e-3)
+    assert 0.0 < of_all["by_chance"] < 0.05
