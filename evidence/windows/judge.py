@@ -17,10 +17,13 @@ from pydantic import JsonValue
 from scipy.stats import binomtest, norm
 
 from dragchain.quantities.document import EXTRAPOLATED, MEASURED_FILE, Extrapolated, RunQuantities
-from dragchain.statistics.estimate import NORMAL_QUANTILE
+from dragchain.quantities.other_scenes import other_scenes
+from dragchain.quantities.registry import MEASURED
+from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate
 from dragdeck.advice.advise import plain_option
 from dragdeck.cases.case import Case, of_each_workpiece
 from dragdeck.project import Project, by_run, project_here
+from dragdeck.records.case import load_case
 from dragdeck.records.run import RunRecord
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.lead import with_leads
@@ -143,7 +146,7 @@ def _rows(project: Project, study: str) -> Iterator[dict[str, Any]]:
         ]
         for name in result.tolerance.asked:
             value, (mean, error) = result.values[name], _reference(beside, name)
-            spread = math.hypot(value.half_width, NORMAL_QUANTILE * error)
+            soft = _estimate(folder, name)
             yield {
                 "study": study,
                 "workpiece": case.number,
@@ -157,10 +160,27 @@ def _rows(project: Project, study: str) -> Iterator[dict[str, Any]]:
                 "reference": mean,
                 "reference_error": error / abs(mean),
                 "error": value.value / mean - 1,
-                "covered": abs(value.value - mean) <= spread,
+                "covered": _agree(value, mean, error),
+                "estimate": soft.value,
+                "estimate_half_width": soft.relative_half_width,
+                "estimate_covered": _agree(soft, mean, error) if soft.known else None,
                 "cpu_time_s": cpu,
                 "plain_cpu_time_s": plain_cpu,
             }
+
+
+def _agree(value: Estimate, mean: float, error: float) -> bool:
+    """Whether an interval includes a reference within the standard error of that."""
+    return abs(value.value - mean) <= math.hypot(value.half_width, NORMAL_QUANTILE * error)
+
+
+def _estimate(folder: Path, name: str) -> Estimate:
+    """What the soft run and other scenes say of a quantity; unknown where these say nothing."""
+    (quantity,) = (quantity for quantity in MEASURED if quantity.name == name)
+    others = other_scenes(quantity, load_case(folder))
+    if others is None:
+        return Estimate(math.nan, math.nan, math.nan)
+    return others.estimate(RunQuantities.read(folder / MEASURED_FILE).estimates({})[name])
 
 
 def _reference(runs: Sequence[RunQuantities], name: str) -> tuple[float, float]:

@@ -7,7 +7,9 @@ from made_study import Made
 
 from dragdeck.cases.bed import bed_volume, expected_surface
 from dragdeck.errors import InputError
+from dragdeck.scenes.fit import ROOM_BELOW, ROOM_BESIDE, clearances, in_diameters
 from dragdeck.scenes.process import PROCESS, process_scene
+from dragdeck.scenes.process_cautions import process_cautions
 from dragdeck.sweep.cases import LEAST_GAP
 
 ROOMY: dict[str, Any] = {
@@ -63,3 +65,23 @@ def test_the_gap_holds_enough_of_the_larger_particles(made: Made) -> None:
     with pytest.raises(InputError) as refused:
         made({"reduction": {"coarser": 1.03 * largest}})
     assert refused.value.field == "reduction.coarser" and refused.value.file
+
+
+@pytest.mark.parametrize("enough", [True, False])
+@pytest.mark.parametrize(
+    ("limiting", "bowl_m", "count"), [("beside", 0.03, 20_000), ("below", 0.04, 20_000)]
+)
+def test_little_room_for_larger_particles_is_said(
+    made: Made, limiting: str, bowl_m: float, count: int, *, enough: bool
+) -> None:
+    scene = {"media.radius_mean_m": 1e-3, "media.count": count, "bowl.radius_m": bowl_m}
+    true = made(scene)
+    gaps = clearances(true, expected_surface(true.study))
+    largest = {
+        "beside": in_diameters(true, gaps.wall_m) / ROOM_BESIDE,
+        "below": in_diameters(true, gaps.floor_m) / ROOM_BELOW,
+    }
+    assert min(largest, key=lambda side: largest[side]) == limiting
+    case = made({**scene, "reduction": {"coarser": largest[limiting] * (0.95 if enough else 1.05)}})
+    said = [caution for caution in process_cautions(case) if "reduction.coarser" in str(caution)]
+    assert (not said) == enough

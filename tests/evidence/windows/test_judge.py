@@ -9,7 +9,7 @@ from scene_runs import made_run
 from dragchain.quantities.document import EXTRAPOLATED, MEASURED_FILE, Extrapolated, Need, Reached
 from dragchain.statistics.estimate import Estimate
 from dragdeck.project import Project
-from dragdeck.scenes.process import PROCESS
+from dragdeck.scenes.process import PROCESS, process_scene
 from dragdeck.study.fidelity import Tolerance
 from evidence.__main__ import main
 
@@ -43,6 +43,8 @@ def test_errors_are_those_against_the_plain_runs(
     folder = kinds.run_folder(asked, PROCESS)
     (folder / EXTRAPOLATED).parent.mkdir(parents=True)
     Extrapolated(values={"drag_mean": drag}, tolerance=asked_for).write(folder / EXTRAPOLATED)
+    process_scene(asked).case.write(folder / "case.json")
+    made_run(0, 1.0, 7).write(folder / MEASURED_FILE)
     for seed, case in enumerate(kinds.cases("kind-circle-plain")):
         folder = kinds.run_folder(case, PROCESS)
         (folder / MEASURED_FILE).parent.mkdir(parents=True)
@@ -53,6 +55,7 @@ def test_errors_are_those_against_the_plain_runs(
     assert row["error"] == pytest.approx(value / row["reference"] - 1, abs=1e-4)
     assert (row["reached"], row["covered"], row["windows"]) == (reached, covered, 3)
     assert 0 < row["reference_error"] < 0.03 and math.isclose(row["half_width"], 0.15)
+    assert row["estimate"] == pytest.approx(-2.0, rel=0.2) and row["estimate_covered"]
     of_drag, of_all = pd.read_csv("kinds_summary.csv").to_dict("records")
     assert (of_drag["promises"], of_drag["kept"], of_drag["covered"]) == (1, covered, covered)
     assert of_all["largest"] == pytest.approx(abs(row["error"]) / 0.2, rel=1e-3)

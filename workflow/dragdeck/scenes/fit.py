@@ -53,6 +53,10 @@ JAMMING_GAP = 2.0
 """Particle diameters between workpiece and bowl below which a warning is given: in a narrower gap,
 an arch of two particles can block the workpiece (docs/development/liggghts.md)."""
 
+ROOM_BESIDE, ROOM_BELOW = 6.0, 4.0
+"""Particle diameters beside the workpiece and below it from which the drag no longer depends on
+them within 13 and 5 % (docs/evidence/simplifications.md)."""
+
 
 @dataclass(frozen=True)
 class Clearances:

@@ -6,12 +6,26 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dragdeck.cases.bed import JUST_BEYOND, bed_timestep, box_half_widths, impact_time
+from dragdeck.cases.bed import (
+    JUST_BEYOND,
+    bed_timestep,
+    box_half_widths,
+    expected_surface,
+    impact_time,
+)
 from dragdeck.cases.case import Case
 from dragdeck.errors import Caution
 from dragdeck.mesh.contacts import gap_fraction
 from dragdeck.physics.rounding import rounded
-from dragdeck.scenes.fit import JAMMING_GAP, driven_surface, in_diameters, wall_gap
+from dragdeck.scenes.fit import (
+    JAMMING_GAP,
+    ROOM_BELOW,
+    ROOM_BESIDE,
+    clearances,
+    driven_surface,
+    in_diameters,
+    wall_gap,
+)
 from dragdeck.scenes.workpiece import (
     FACET_STEP_S,
     PARTICLE_STEPS_PER_S,
@@ -103,6 +117,7 @@ def process_cautions(case: Case) -> Iterator[Caution]:
             f"the gap between workpiece and bowl is {gap:.2g} particle diameters, less than "
             f"{JAMMING_GAP:g}: particles may jam there and cause very large forces",
         )
+    yield from _little_room(case)
     fidelity = study.chosen_fidelity()
     surface = max(driven_surface(case), fidelity.speed_factor * _against_bowl(case))
     contact = impact_time(study, fidelity.youngs_modulus_scale, surface)
@@ -115,6 +130,24 @@ def process_cautions(case: Case) -> Iterator[Caution]:
             f"{_FEWEST_STEPS_PER_CONTACT}: single impacts are not resolved; use a smaller "
             "fidelity.timestep_fraction",
             {"timestep_fraction": rounded(shorter, up=False)},
+        )
+
+
+def _little_room(case: Case) -> Iterator[Caution]:
+    """A warning where walls or the floor are too near to larger particles."""
+    reduction = case.study.reduction
+    if reduction is None or (reduction.coarser or 1) <= 1:
+        return
+    gaps = clearances(case, expected_surface(case.study))
+    beside, below = (in_diameters(case, gap) for gap in (gaps.wall_m, gaps.floor_m))
+    if beside * JUST_BEYOND < ROOM_BESIDE or below * JUST_BEYOND < ROOM_BELOW:
+        yield Caution(
+            "gap",
+            f"particles {reduction.coarser:g} times as large have {beside:.2g} of their diameters "
+            f"beside the workpiece and {below:.2g} below it: with less than {ROOM_BESIDE:g} and "
+            f"{ROOM_BELOW:g}, the drag rises more than linearly with their size, and the drag that "
+            "is extrapolated to the true size is too small; use a smaller reduction.coarser or a "
+            "wider bowl",
         )
 
 

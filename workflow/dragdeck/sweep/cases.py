@@ -271,8 +271,8 @@ def _set(data: dict[str, JsonValue], field: str, value: JsonValue, file: Path) -
 
 
 LEAST_GAP = 2.7
-"""Smallest gap between workpiece and wall, in diameters of the larger particles, from which the
-drag was linear in their diameter (docs/evidence/simplifications.md)."""
+"""Smallest gap between workpiece and wall, in diameters of the larger particles. Below
+`dragdeck.scenes.fit.ROOM_BESIDE` there is a warning (docs/evidence/simplifications.md)."""
 
 
 def with_larger_particles(case: Case) -> Case:
@@ -293,8 +293,8 @@ def with_larger_particles(case: Case) -> Case:
     most = gap / LEAST_GAP / diameter * factor
     if factor > 1 and gap < LEAST_GAP * diameter * (1 - 1e-6):
         raise InputError(
-            "the gap between workpiece and wall is too narrow for larger particles: the drag would "
-            "not be linear in their diameter", field="reduction.coarser", value=factor,
+            "the gap between workpiece and wall is too narrow for larger particles",
+            field="reduction.coarser", value=factor,
             limit=f"at most {limit_of(most)}: the gap is at least {LEAST_GAP:g} diameters",
             remedy="use a smaller factor or a wider bowl; below 1, leave it out",
         )  # fmt: skip

@@ -22,6 +22,7 @@ from dragdeck.physics.rounding import limit_of
 from dragdeck.physics.turning_bed import surface_tilt
 from dragdeck.physics.walls import Container
 from dragdeck.scenes.bed_space import expected_bed
+from dragdeck.scenes.fit import ROOM_BELOW, ROOM_BESIDE
 from dragdeck.scenes.moving_bowl import bed_in_motion
 from dragdeck.scenes.workpiece import dip, workpiece_reach
 from dragdeck.study.bowl_motions.acceleration import Acceleration
@@ -32,17 +33,15 @@ from dragdeck.study.motion import Motion
 from dragdeck.study.paths.line import LinePath
 from dragdeck.study.paths.path import AroundBowl
 
-SIDE_DIAMETERS, SIDE_WORKPIECES = 6.0, 4.0
-"""Gap to a side wall, in particle and in workpiece diameters, from which the drag no longer depends
-on it (+-13 %)."""
+SIDE_WORKPIECES = 4.0
+"""Gap to a side wall in workpiece diameters; that in particle diameters is `ROOM_BESIDE`."""
 
 AHEAD_DIAMETERS, AHEAD_HEIGHTS = 14.0, 1.7
 """Distance of the workpiece's axis from the end wall, in particle diameters and heights of the
 bed, above which it raises the drag by less than 10 %."""
 
-BELOW_DIAMETERS, TRANSIENT_DIAMETERS = 4.0, 12.0
-"""Bed below the tip, with 2.7 of which the drag was 5 % higher; and path until the drag is steady
-at 1 m/s and more."""
+TRANSIENT_DIAMETERS = 12.0
+"""Path until the drag is steady at 1 m/s and more."""
 
 LARGEST_FACTOR = 2.0
 """Gap and bed below hold for the diameters that are simulated. Scenes of several sizes have the
@@ -148,14 +147,14 @@ def room_in_machine(study: Study, passage: Passage, bed: Bed, reach_m: float, lo
     diameter, bowl = _diameter(study), study.bowl.container
     larger = study.reduction is not None and study.reduction.coarser is not None
     simulated = LARGEST_FACTOR * diameter if larger else diameter
-    aside = max(SIDE_DIAMETERS * simulated, SIDE_WORKPIECES * 2 * reach_m)
+    aside = max(ROOM_BESIDE * simulated, SIDE_WORKPIECES * 2 * reach_m)
     tip = bed.surface_m - study.motion.immersion_depth_m - low_m
     heights = np.linspace(tip, bed.surface_m, _HEIGHTS)
     left, right = (
         _free(bowl, passage.places_m, sign * passage.left, heights, reach_m, aside)
         for sign in (1, -1)
     )
-    under = BELOW_DIAMETERS * simulated
+    under = ROOM_BELOW * simulated
     below = _free_below(bowl, passage.places_m, tip, reach_m, under)
     height = study.motion.immersion_depth_m + low_m + below
     ahead = max(AHEAD_DIAMETERS * diameter, AHEAD_HEIGHTS * height)
