@@ -2,7 +2,8 @@
 
     ./run all --config study=drag_finisher      # and the others below
     python benchmarks/smaller_scenes.py docs/data/scenes results/drag_finisher{,_coarse} \
-        results/stream_finisher results/stream_machine{,_whole} results/coarser_{slow,fast,wide}
+        results/stream_finisher results/stream_machine{,_whole} \
+        results/{coarser,roomy}_{slow,fast} results/roomy_thick
 
 Makes three records of the runs of these studies: ``smaller_scenes.csv``, mean values over the
 packings of each scene and size with the cost of filling and process; ``cut_out_change.csv``, the
