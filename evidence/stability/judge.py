@@ -169,7 +169,7 @@ def _condition(group: Sequence[PointRun], base: PointSettings) -> Iterator[dict[
     """The points of one condition; its reference comes first."""
     runs = sorted(group, key=lambda run: not run.point.reference)
     regime, case, measure = runs[0].point.regime, runs[0].case, MEASURES[runs[0].point.regime]
-    measured = [measure.row(run, ended) if (ended := run.ended) else None for run in runs]
+    measured = [measure.row(ended, run.point) if (ended := run.ended) else None for run in runs]
     fine = measured[0]
     if fine and regime == "settle":
         fine = {**fine, "height_scatter": _height_scatter(runs, measured)}
@@ -204,7 +204,7 @@ def _condition(group: Sequence[PointRun], base: PointSettings) -> Iterator[dict[
             "critical_step_s": critical_s,
             "fraction_of_critical": step_s / critical_s,
             "damped_fraction": damped_fraction(point.number("restitution")),
-            "steps_per_contact": (run.impact.contact_time_s if run.impact else math.nan) / step_s,
+            "steps_per_contact": run.contact_time_s / step_s,
             "steps": seen.steps,
             "energy_ratio": seen.energy_ratio,
             "overlap_ratio": seen.overlap_ratio,

@@ -11,10 +11,10 @@ import numpy as np
 
 from dragchain.arrays import Floats
 from dragchain.run.case import friction_with
-from dragchain.run.kinematics import drag_phase, needed
+from dragchain.run.kinematics import drag_phase
 from dragchain.statistics.correlated import estimate_mean
 from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate
-from dragchain.tables.network_contacts import contact_rows
+from dragchain.tables.network_contacts import BODY_IDS, contact_rows
 from dragchain.tables.run_folder import Run
 from dragchain.tables.workpiece_contacts import WorkpieceFrames
 from dragchain.tables.write import workpiece_force_rows
@@ -25,9 +25,9 @@ from dragdeck.physics.contact_mechanics import fall_energy, sphere_mass
 from dragdeck.physics.contact_network import touching
 from dragdeck.records.case import CaseOfRun
 from dragdeck.records.run import RunRecord
-from evidence.stability.network import BOWL, PARTICLE, WORKPIECE, Contacts, network_frequency
+from evidence.stability.network import Contacts, network_frequency, overlap_ratio
 from evidence.stability.points import MapPoint
-from evidence.stability.scenes import ImpactCase, ImpactOfRun
+from evidence.stability.scenes import ImpactCase
 
 PointRow = Mapping[str, float]
 """What a run showed. Every regime has ``overlap_ratio``, the largest overlap over the radius, and
@@ -67,20 +67,15 @@ class PointRun:
         return kind.read(file) if file.is_file() else None
 
     @property
-    def impact(self) -> ImpactOfRun | None:
-        """How its bodies meet; None outside single impacts."""
-        return self.case.impact if isinstance(self.case, ImpactCase) else None
+    def contact_time_s(self) -> float:
+        """Elastic contact time of a single impact; NaN of all else."""
+        return self.case.contact_time_s if isinstance(self.case, ImpactCase) else math.nan
 
     @cached_property
     def record(self) -> RunRecord | None:
         """How the run ended; None of a point that was not run."""
         file = self.folder / STATE_FILE
         return RunRecord.read(file) if file.is_file() else None
-
-    @property
-    def sticks(self) -> bool:
-        """Whether its contacts have friction, and so a tangential stiffness."""
-        return self.point.number("friction") > 0.0
 
     @property
     def measurable(self) -> bool:
@@ -99,10 +94,6 @@ class PointRun:
         return Run(self.folder, self.case) if self.case and self.measurable else None
 
 
-_PARTNERS = np.array([PARTICLE, WORKPIECE, BOWL, BOWL])
-"""Partners in the contacts of `KINDS`."""
-
-
 # --- beds: one that settles, and one at rest under a load --------------------------------------
 
 REST_FLOOR = 1e-7
@@ -112,17 +103,17 @@ _LAST_SAMPLES = 50
 """Samples at the end of a resting bed's run whose mean energy counts: a quarter of them."""
 
 
-def _measure_settled(point: PointRun, run: Run) -> PointRow:
+def _measure_settled(run: Run, _: MapPoint) -> PointRow:
     """A bed that settled, and its largest kinetic energy while it did."""
     *_, last = run.frames("particles")
     return {
-        **_bed(point, run.case, last),
+        **_bed(run.case, last),
         "height_m": float(last.columns["z_m"].mean()),
         "peak_energy_j": float(_bed_energy(run).max()),
     }
 
 
-def _measure_resting(point: PointRun, run: Run) -> PointRow:
+def _measure_resting(run: Run, _: MapPoint) -> PointRow:
     """A bed at rest, and its kinetic energy at the end over N m g d.
 
     Its contacts are those before the step under test begins.
@@ -130,20 +121,17 @@ def _measure_resting(point: PointRun, run: Run) -> PointRow:
     first, *_, last = run.frames("particles")
     unit = _fall_energy(run.case, run.case.media.count)
     return {
-        **_bed(point, run.case, first),
+        **_bed(run.case, first),
         "height_m": float(last.columns["z_m"].mean()),
         "rest_energy_ratio": float(_bed_energy(run)[-_LAST_SAMPLES:].mean()) / unit,
     }
 
 
-def _bed(point: PointRun, case: CaseOfRun, frame: Frame) -> PointRow:
-    radius = frame.radii
-    bodies, normal, overlap = touching(frame.centres, radius, case.bowl.walls)
-    partner = np.where(bodies[1] == len(radius), BOWL, PARTICLE)
-    contacts = Contacts(bodies, normal, overlap, partner)
+def _bed(case: CaseOfRun, frame: Frame) -> PointRow:
+    contacts = touching(frame.centres, frame.radii, case.bowl.walls)
     return {
-        "overlap_ratio": contacts.overlap_ratio(radius),
-        "frequency_rad_s": network_frequency(case, point.sticks, radius, contacts),
+        "overlap_ratio": overlap_ratio(frame.radii, contacts),
+        "frequency_rad_s": network_frequency(case, frame.radii, contacts),
     }
 
 
@@ -178,9 +166,10 @@ def _resting_energy(row: PointRow, fine: PointRow | None) -> float:
 # --- impacts, met at different moments within a step -------------------------------------------
 
 
-def _measure_impacts(point: PointRun, run: Run) -> PointRow:
+def _measure_impacts(run: Run, _: MapPoint) -> PointRow:
     """Mean, smallest and largest of the impacts of a run; speeds are over that of the impact."""
-    impact = needed(point.impact, "impact")
+    assert isinstance(run.case, ImpactCase)
+    impact = run.case.impact
     plate = impact.size_ratio == 0.0
     frames = [frame.by_particle() for frame in run.frames("particles")]
     first, last = frames[0], frames[-1]
@@ -194,19 +183,16 @@ def _measure_impacts(point: PointRun, run: Run) -> PointRow:
         _energy(frame, run.case.media.density_kg_m3).reshape(-1, 1 if plate else 2).sum(axis=1)
         for frame in (first, last)
     )
-    deepest = Contacts(
-        bodies=np.array([[0], [1]]),
-        normal=np.array([[0.0, 0.0, -1.0]]),
-        overlap_m=np.array([overlap]),
-        partner=np.array([PARTICLE]),  # a plate is of the particles' material
-    )
     radius = first.radii
+    of_one = radius[: 1 if plate else 2]
+    deepest = np.array([[0], [1]]), np.array([[0.0, 0.0, -1.0]]), np.array([overlap])
+    touch = ("particle",)  # a plate is of the particles' material
     peaks = _spread("peak_force", force.max(axis=0))
     return {
         "overlap_ratio": overlap / float(radius.min()),
-        "frequency_rad_s": network_frequency(
-            run.case, point.sticks, radius[: 1 if plate else 2], deepest
-        ),
+        "frequency_rad_s": network_frequency(run.case, of_one, deepest, touch)
+        if overlap > 0.0
+        else 0.0,
         **_spread("restitution", speed[:, 2] / impact.normal_speed_m_s),
         **peaks,
         "peak_force_n": peaks["peak_force_mean"],
@@ -263,7 +249,7 @@ _NETWORK_FRAMES = 8
 """Frames of a reference whose networks are looked at; the stiffest counts."""
 
 
-def _measure_drag(point: PointRun, run: Run) -> PointRow:
+def _measure_drag(run: Run, point: MapPoint) -> PointRow:
     """Mean force along the motion with the half-width of its interval, and the energy.
 
     The half-width is infinite if it is not to be relied on. ``motion_ratio`` is the median kinetic
@@ -276,9 +262,9 @@ def _measure_drag(point: PointRun, run: Run) -> PointRow:
         for name in ("drag_n", "in_statistics")
     )
     mean = estimate_mean(drag[counted])
-    speed = point.point.number("workpiece_speed_m_s")
+    speed = point.number("workpiece_speed_m_s")
     return {
-        **_drag_contacts(point, run),
+        **_drag_contacts(run, point.reference),
         "drag_mean_n": mean.mean,
         "drag_half_width_n": mean.ci95_high - mean.mean if mean.reliable else math.inf,
         "motion_ratio": _median_motion_j(run) / _usual_motion_j(run.case, speed),
@@ -300,13 +286,13 @@ def _usual_motion_j(case: CaseOfRun, speed_m_s: float) -> float:
     return media.count * 0.5 * mass * speed_m_s**2 + _fall_energy(case, 1)
 
 
-def _drag_contacts(point: PointRun, run: Run) -> PointRow:
+def _drag_contacts(run: Run, reference: bool) -> PointRow:
     """Largest overlap of the drag, and frequency of the stiffest of some frames."""
     particles = {frame.step: frame for frame in run.frames("particles")}
     pairs = {frame.step: frame for frame in run.frames("contacts")}
     steps = np.array(sorted(pairs))
     every = steps[np.linspace(0, len(steps) - 1, min(len(steps), _NETWORK_FRAMES)).astype(int)]
-    some = set(every.tolist() if point.point.reference else every[:1].tolist())
+    some = set(every.tolist() if reference else every[:1].tolist())
     largest = frequency = 0.0
     for on_workpiece in run.workpiece_pairs():
         if on_workpiece.step not in pairs:
@@ -314,10 +300,9 @@ def _drag_contacts(point: PointRun, run: Run) -> PointRow:
         workpiece = on_workpiece.join(merge=False)  # both stiffnesses of an edge act
         frame = particles[on_workpiece.step].by_particle()
         contacts = _engine_contacts(frame, pairs[on_workpiece.step], workpiece, run.case)
-        largest = max(largest, contacts.overlap_ratio(frame.radii))
+        largest = max(largest, overlap_ratio(frame.radii, contacts))
         if on_workpiece.step in some:
-            own_frequency = network_frequency(run.case, point.sticks, frame.radii, contacts)
-            frequency = max(frequency, own_frequency)
+            frequency = max(frequency, network_frequency(run.case, frame.radii, contacts))
     return {"overlap_ratio": largest, "frequency_rad_s": frequency}
 
 
@@ -328,13 +313,10 @@ def _engine_contacts(
     walls = workpiece.workpiece, workpiece.bowl
     rows = contact_rows(frame, pairs, *walls, case.bowl.walls, friction_with(case, "particle"))
     ids = np.asarray(frame.columns["particle_id"], dtype=np.int64)
-    a = np.searchsorted(ids, rows.a_id)
-    b = np.where(rows.b_id > 0, np.searchsorted(ids, rows.b_id), len(ids))
-    towards = rows.point_m - frame.centres[a]
-    normal = towards / np.linalg.norm(towards, axis=1, keepdims=True)
-    hit = rows.overlap_m > 0.0
-    bodies, partner = np.stack([a, b])[:, hit], _PARTNERS[rows.kind[hit]]
-    return Contacts(bodies, normal[hit], rows.overlap_m[hit], partner)
+    of_wall = len(ids) + (rows.b_id == BODY_IDS["particle-workpiece"])
+    others = np.where(rows.b_id > 0, np.searchsorted(ids, rows.b_id), of_wall)
+    bodies, hit = np.stack([np.searchsorted(ids, rows.a_id), others]), rows.overlap_m > 0.0
+    return bodies[:, hit], -rows.normal[hit], rows.overlap_m[hit]
 
 
 def _drag_errors(row: PointRow, fine: PointRow) -> dict[str, Estimate]:
@@ -361,7 +343,7 @@ class Measure(NamedTuple):
         Ratio of energies of a row and that of the fine step; NaN where that is needed.
     """
 
-    row: Callable[[PointRun, Run], PointRow]
+    row: Callable[[Run, MapPoint], PointRow]
     errors: Callable[[PointRow, PointRow], dict[str, Estimate]]
     energy_ratio: Callable[[PointRow, PointRow | None], float]
 

@@ -131,8 +131,8 @@ def _settled_bed(base: Case, name: str, settings: PointSettings, batch: Batch) -
 def _scene_of(point: MapPoint, base: Case, beds: Mapping[str, Bed]) -> AnyScene:
     case, source = point_case(base, point.settings, point.fraction), bed_name(point.settings)
     if point.regime == "impact":
-        how = ImpactSettings(*map(point.number, ("speed_m_s", "angle_deg", "size_ratio")))
-        return impact_scene(case, point.name, how, point.fraction)
+        impact = ImpactSettings.model_validate(point.settings)
+        return impact_scene(case, point.name, impact, point.fraction)
     if point.regime == "settle":
         return filling_scene(case)
     if point.regime == "column":

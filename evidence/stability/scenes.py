@@ -23,6 +23,7 @@ from dragdeck.records.case import CaseOfRun
 from dragdeck.records.run import Phase
 from dragdeck.scenes.bed_space import box_top
 from dragdeck.scenes.scene import case_of_study, deck_of_study
+from evidence.placed import COLLIDE, CollideDeck, ExactPlane
 
 # --- single impacts, many at once: particles on a plate, or small particles on large ones ------
 
@@ -36,8 +37,7 @@ _CONTACT_TIMES = 4
 """Length of the run in elastic contact times: room for the slowest rebound."""
 
 
-@dataclass(frozen=True)
-class ImpactSettings:
+class ImpactSettings(Part):
     """How two bodies meet.
 
     Attributes
@@ -67,31 +67,12 @@ class ImpactSettings:
         return radius_m * ratio / (1 + ratio), mass_kg * mass / (1 + mass)
 
 
-@dataclass(frozen=True, kw_only=True)
-class _ImpactDeck(Deck):
-    """What the impact template sees."""
-
-    plate: bool
-    steps: int
-
-
-class ImpactOfRun(Part):
-    """How the bodies meet; the contact time is the elastic one (Hertz)."""
-
-    speed_m_s: float
-    normal_speed_m_s: float
-    size_ratio: float
-    effective_radius_m: float
-    effective_mass_kg: float
-    effective_modulus_pa: float
-    contact_time_s: float
-
-
 class ImpactCase(CaseOfRun):
-    """Single impacts."""
+    """Single impacts; the contact time is the elastic one (Hertz)."""
 
     scene: Literal["impact"] = "impact"
-    impact: ImpactOfRun
+    impact: ImpactSettings
+    contact_time_s: float
     limits: RunLimits
 
 
@@ -131,7 +112,7 @@ def impact_scene(
     height = 2 * radius * (2 + 2 * impact.size_ratio) + 2 * travel
     largest = max(1.0, impact.size_ratio) ** 3
     deck = deck_of_study(
-        _ImpactDeck,
+        CollideDeck,
         case,
         [study.media.main_material],
         title="Single impacts",
@@ -143,7 +124,7 @@ def impact_scene(
         timestep_s=dt,
         outputs=(outputs.thermo(steps, steps), outputs.particles_and_forces(period, steps)),
         thermo_steps=steps,
-        plate=impact.size_ratio == 0.0,
+        walls=[ExactPlane("plate", 1, "zplane 0.0")] if impact.size_ratio == 0.0 else [],
         steps=steps,
     )
     content = case_of_study(
@@ -157,20 +138,13 @@ def impact_scene(
             radius_std_m=0.0,
             density_kg_m3=material.density_kg_m3,
         ),
-        impact=ImpactOfRun(
-            speed_m_s=impact.speed_m_s,
-            normal_speed_m_s=impact.normal_speed_m_s,
-            size_ratio=impact.size_ratio,
-            effective_radius_m=body_radius,
-            effective_mass_kg=body_mass,
-            effective_modulus_pa=modulus,
-            contact_time_s=contact,
-        ),
+        impact=impact,
+        contact_time_s=contact,
         limits=run_limits(len(bodies), largest * mass, 0.0, height, impact.speed_m_s),
     )
     box = ((-side, side), (-side, side), (-height, height))
     files = {"particles.data": lambda: data_file("impacts", 1, box, bodies)}
-    return Scene(deck=deck, case=content, steps=steps, files=files)
+    return Scene(deck=deck, case=content, steps=steps, files=files, override=COLLIDE)
 
 
 def _bodies(radius_m: float, density_kg_m3: float, impact: ImpactSettings, dt: float) -> list[Body]:

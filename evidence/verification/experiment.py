@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, Literal
 
 from pydantic.dataclasses import dataclass as checked
@@ -11,35 +10,17 @@ from dragdeck import __version__
 from dragdeck.cases.case import digest
 from dragdeck.decks import outputs
 from dragdeck.decks.deck import Body as DataBody
-from dragdeck.decks.deck import Deck, Materials, Scene, Vector, contact_law, data_file
+from dragdeck.decks.deck import Materials, Scene, Vector, contact_law, data_file
 from dragdeck.parts import omitted
 from dragdeck.physics.contact_mechanics import rayleigh_time
 from dragdeck.physics.rounding import round_to
 from dragdeck.records.run import CaseFile, CountOfRun, RanksOfRun
 from dragdeck.study.contact_law import Contact, Pair, RollingModel
 from dragdeck.study.workpiece import Material
+from evidence.placed import CollideDeck, ExactPlane
 
 _FRAMES_TIMES_BODIES = 25_000
 """Rows of the largest output of a run: every step for two particles, fewer frames for a rack."""
-
-
-@dataclass(frozen=True)
-class ExactPlane:
-    """An exact plane.
-
-    Attributes
-    ----------
-    name : str
-        Of the engine's fix, and of its force columns.
-    type : int
-        Material type, from 1.
-    shape : str
-        As the engine wants it, for example ``zplane 0.0``.
-    """
-
-    name: str
-    type: int
-    shape: str
 
 
 @checked(frozen=True)
@@ -125,13 +106,8 @@ class CollideCase(CaseFile):
         return next(wall.type for wall in self.walls if wall.name == body)
 
 
-@dataclass(frozen=True)
-class Experiment:
-    """A run of this scene: what it models, its steps, and the steps between frames if given."""
-
-    case: CollideCase
-    steps: int
-    period: int | None = None
+Experiment = Scene[CollideCase]
+"""A run of the suite."""
 
 
 def experiment(
@@ -162,6 +138,7 @@ def experiment(
     bodies : sequence of PlacedSphere
         The first sets the Rayleigh time.
     steps, period : int
+        Of the run, and between frames if given.
     **more
         Further fields of `CollideCase`.
     """
@@ -180,24 +157,15 @@ def experiment(
     content = case.model_dump(mode="json", by_alias=True, exclude=silent)
     content["study"] = case.study_name
     run = "-".join([test, *slug, digest({**content, "steps": steps})])
-    return Experiment(case.model_copy(update={"run": run}), steps, period)
+    return _scene(case.model_copy(update={"run": run}), steps, period)
 
 
-@dataclass(frozen=True, kw_only=True)
-class _CollideDeck(Deck):
-    """What the collide template sees."""
-
-    walls: Sequence[ExactPlane]
-    steps: int
-
-
-def collide_scene(experiment: Experiment) -> Scene[CollideCase]:
-    """The scene of an experiment: one engine process, no checkpoints, no pair output."""
-    case, steps = experiment.case, experiment.steps
-    every = experiment.period or frame_period(steps, len(case.bodies))
+def _scene(case: CollideCase, steps: int, period: int | None) -> Experiment:
+    """One engine process, no checkpoints, no pair output; a run of many particles stays small."""
+    every = period or max(1, math.ceil(steps * len(case.bodies) / _FRAMES_TIMES_BODIES))
     look = max(1, steps // 10)
     (x, y, z), size = case.gravity_m_s2, math.hypot(*case.gravity_m_s2)
-    deck = _CollideDeck(
+    deck = CollideDeck(
         title=case.title,
         study=case.study_name,
         scene=case.scene,
@@ -223,11 +191,6 @@ def collide_scene(experiment: Experiment) -> Scene[CollideCase]:
         steps=steps,
         files={"bodies.data": lambda: _bodies_data(case, steps * case.timestep_s)},
     )
-
-
-def frame_period(steps: int, bodies: int) -> int:
-    """Steps between frames, so that a run of many particles stays small."""
-    return max(1, math.ceil(steps * bodies / _FRAMES_TIMES_BODIES))
 
 
 def _pair_table(case: CollideCase) -> Materials:

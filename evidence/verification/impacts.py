@@ -13,7 +13,8 @@ from dragdeck.study.base import Model, Number, Positive, Whole
 from dragdeck.study.contact_law import Pair
 from dragdeck.study.model import Study
 from dragdeck.study.workpiece import Material
-from evidence.verification.experiment import ContactFacts, ExactPlane, Experiment, PlacedSphere
+from evidence.placed import ExactPlane
+from evidence.verification.experiment import ContactFacts, Experiment, PlacedSphere
 
 RIGID = "rigid"
 _RIGID_FACTOR = 1e6

@@ -17,7 +17,6 @@ from dragdeck.engine.reports import say
 from dragdeck.errors import RejectedRunError
 from dragdeck.project import find_project, run_path, study_templates
 from evidence.verification.checks import ComparedRuns, checks_by_test
-from evidence.verification.experiment import collide_scene
 from evidence.verification.quantity_check import JUDGED, CheckVerdict, check_rows
 from evidence.verification.recording import read_recording
 from evidence.verification.suite import suite_file, suite_of
@@ -53,10 +52,8 @@ def verify(study: str, fidelity: str | None, out_dir: Path, cores: int | None) -
     case = project.cases(study, fidelity)[0]
     folder = project.root / run_path("verification", "collide", "")
     batch = Batch(folder, environment(project.templates, study_templates(case)))
-    suite = {
-        name: partial(collide_scene, collision) for name, collision in suite_of(case.study).items()
-    }
-    batch.each(suite, say, cores or cores_here())
+    suite = suite_of(case.study)
+    batch.each({run: partial(suite.__getitem__, run) for run in suite}, say, cores or cores_here())
     return verdict(write_verification(out_dir, [folder / name for name in suite]), out_dir)
 
 

@@ -14,13 +14,8 @@ from dragdeck.physics.rounding import round_to
 from dragdeck.study.base import Model, Whole
 from dragdeck.study.contact_law import Pair
 from dragdeck.study.model import Study
-from evidence.verification.experiment import (
-    ContactFacts,
-    ExactPlane,
-    Experiment,
-    PlacedSphere,
-    experiment,
-)
+from evidence.placed import ExactPlane
+from evidence.verification.experiment import ContactFacts, Experiment, PlacedSphere, experiment
 from evidence.verification.impacts import (
     APPROACH_STEPS,
     LONGEST_CONTACTS,

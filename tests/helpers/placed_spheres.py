@@ -17,7 +17,8 @@ from dragdeck.engine.reports import silent
 from dragdeck.engine.run_folder import run
 from dragdeck.study.contact_law import Pair
 from dragdeck.study.workpiece import Material
-from evidence.verification.experiment import ExactPlane, PlacedSphere, collide_scene, experiment
+from evidence.placed import ExactPlane
+from evidence.verification.experiment import PlacedSphere, experiment
 
 
 def frames_of(
@@ -25,12 +26,10 @@ def frames_of(
     bodies: Sequence[PlacedSphere], *, liquid: Liquid | None = None, **settings: Any,
 ) -> list[Frame]:  # fmt: skip
     """Frames of the spheres; pairs are of types, 1 of the spheres and 2 of the plane."""
-    scene = collide_scene(
-        experiment(
-            "placed", 1, "Placed spheres", [], types=[("particle", material), ("plane", material)],
-            pairs=pairs, bodies=bodies, walls=[ExactPlane("floor", 2, "zplane 0.0")], series="",
-            vary="", contacts=[], steps_per_contact=1, **settings,
-        )
+    scene = experiment(
+        "placed", 1, "Placed spheres", [], types=[("particle", material), ("plane", material)],
+        pairs=pairs, bodies=bodies, walls=[ExactPlane("floor", 2, "zplane 0.0")], series="",
+        vary="", contacts=[], steps_per_contact=1, **settings,
     )  # fmt: skip
     wet = replace(scene, deck=replace(scene.deck, liquid=liquid)) if liquid else scene
     write_run(wet, folder, environment(ROOT / "templates"))

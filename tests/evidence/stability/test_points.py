@@ -46,8 +46,8 @@ def test_an_unknown_setting_is_refused(tmp_path: Path) -> None:
 
 @pytest.fixture
 def base() -> Case:
-    (found,) = load_cases(ROOT / "studies" / "stability" / "study.yaml")
-    return found
+    (case,) = load_cases(ROOT / "studies" / "stability" / "study.yaml")
+    return case
 
 
 def test_a_point_sets_its_values(base: Case) -> None:
@@ -72,9 +72,14 @@ def test_like_particles_have_half_the_modulus_of_one(base: Case) -> None:
     assert particle.shear_pa == pytest.approx(shear / (2 * (2 - nu)), rel=1e-12)
 
 
+def impact(speed_m_s: float, size_ratio: float) -> ImpactSettings:
+    """An impact along the normal."""
+    return ImpactSettings(speed_m_s=speed_m_s, angle_deg=0.0, size_ratio=size_ratio)
+
+
 def test_a_large_particle_is_almost_a_plate() -> None:
     def body(size_ratio: float) -> tuple[float, float]:
-        return ImpactSettings(1.0, 0.0, size_ratio).effective_body(1.0, 1.0)
+        return impact(1.0, size_ratio).effective_body(1.0, 1.0)
 
     radius, mass = body(100.0)
     assert radius == pytest.approx(100 / 101) and mass == pytest.approx(1.0, rel=1e-5)
@@ -84,9 +89,7 @@ def test_a_large_particle_is_almost_a_plate() -> None:
 
 def test_impacts_begin_at_different_moments_of_a_step(base: Case) -> None:
     settings = {"youngs_modulus_pa": 77e9, "restitution": 0.86, "friction": 0.34}
-    scene = impact_scene(
-        point_case(base, settings, 0.2), "a-run", ImpactSettings(0.5, 0.0, 0.0), 0.2
-    )
+    scene = impact_scene(point_case(base, settings, 0.2), "a-run", impact(0.5, 0.0), 0.2)
     rows = scene.files["particles.data"]().split("Atoms\n\n")[1].split("\n\n")[0].splitlines()
     radius = base.study.media.radius_mean_m
     gaps = [float(row.split()[-1]) - radius for row in rows]

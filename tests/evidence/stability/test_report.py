@@ -40,12 +40,12 @@ def coarse(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return results
 
 
-def found(results: Path) -> pd.DataFrame:
+def points_of(results: Path) -> pd.DataFrame:
     return pd.read_parquet(results / "points.parquet")
 
 
 def test_a_coarse_map_on_the_engine(coarse: Path) -> None:
-    rows = found(coarse)
+    rows = points_of(coarse)
     kinds = {
         (row["regime"], row["label"], row["fraction"]): row["class"]
         for row in rows.to_dict("records")
@@ -63,18 +63,19 @@ def test_a_coarse_map_on_the_engine(coarse: Path) -> None:
 
 
 def test_a_stack_breaks_at_the_critical_step_of_its_network(coarse: Path) -> None:
-    rows = found(coarse)
+    rows = points_of(coarse)
     stack = rows[rows["regime"] == "column"].set_index("fraction")
     assert stack.loc[0.6, "fraction_of_critical"] < 1.0 < stack.loc[1.2, "fraction_of_critical"]
 
 
 def test_an_elastic_impact_is_that_of_hertz(coarse: Path) -> None:
     """Peak force of Johnson 1985, eq. 11.22 f.: 4/3 E* R^(1/2) d^(3/2) at the largest overlap d."""
-    rows = found(coarse)
+    rows = points_of(coarse)
     (row,) = rows[(rows["label"] == "e 1") & rows["reference"]].to_dict("records")
-    case = json.loads((coarse / row["folder"] / "case.json").read_text())["impact"]
-    mass, radius = case["effective_mass_kg"], case["effective_radius_m"]
-    modulus, speed = case["effective_modulus_pa"], case["speed_m_s"]
+    case = json.loads((coarse / row["folder"] / "case.json").read_text())
+    radius, density = case["media"]["radius_mean_m"], case["media"]["density_kg_m3"]
+    mass, speed = 4 / 3 * math.pi * radius**3 * density, case["impact"]["speed_m_s"]
+    modulus = case["contact_moduli"]["particle"]["modulus_pa"]
     overlap = (15 * mass * speed**2 / (16 * math.sqrt(radius) * modulus)) ** 0.4
     force = 4 / 3 * modulus * math.sqrt(radius) * overlap**1.5
     assert row["peak_force_n"] == pytest.approx(force, rel=1e-3)
@@ -83,7 +84,7 @@ def test_an_elastic_impact_is_that_of_hertz(coarse: Path) -> None:
 
 
 def test_fewer_steps_in_a_contact_make_a_larger_error(coarse: Path) -> None:
-    errors = restitution_errors(found(coarse)).worst
+    errors = restitution_errors(points_of(coarse)).worst
     assert len(errors) >= 2 and errors[0] > TOLERANCE > errors[-1]
 
 

@@ -78,8 +78,8 @@ def test_the_integrated_rebound_is_the_exact_one(partner: Particle | None) -> No
         for restitution in (0.06, 0.3, 0.68, 1.0)
         for limit in (True, False)
     ]
-    found = law.integrated_impacts(contacts, [RelativeMotion(0.5)] * len(contacts))
-    for contact, after in zip(contacts, found, strict=True):
+    ends = law.integrated_impacts(contacts, [RelativeMotion(0.5)] * len(contacts))
+    for contact, after in zip(contacts, ends, strict=True):
         assert after.normal_m_s / 0.5 == pytest.approx(contact.rebound, abs=2e-4)
 
 
@@ -106,8 +106,8 @@ def test_impacts_end_as_the_law_integrated_with_an_adaptive_step() -> None:
         (0.3591, 2.736749, -263.147308),
         (0.35, 0.078925, -21.071105), (0.35, 0.401915, -198.001456), (0.35, 2.73303, -266.866056),
     )  # fmt: skip
-    found = [after for contact in contacts for after in integrated(contact, *before)]
-    for after, (normal, along, spin) in zip(found, known, strict=True):
+    ends = [after for contact in contacts for after in integrated(contact, *before)]
+    for after, (normal, along, spin) in zip(ends, known, strict=True):
         assert after.normal_m_s == pytest.approx(normal, abs=1e-4)
         assert after.tangential_m_s == pytest.approx(along, abs=5e-4)
         assert after.spin_rad_s == pytest.approx(spin, abs=0.15)
@@ -116,6 +116,6 @@ def test_impacts_end_as_the_law_integrated_with_an_adaptive_step() -> None:
 def test_a_huge_partner_is_a_plane_and_a_mirrored_impact_the_mirror_image() -> None:
     huge = replace(PLANE, partner=Particle(1e6, 1e6))
     before = RelativeMotion(0.5, 0.4), RelativeMotion(0.5, -0.4)
-    (one, other), (on_huge, _) = integrated(PLANE, *before), integrated(huge, *before)
-    assert on_huge.tangential_m_s == pytest.approx(one.tangential_m_s, rel=1e-5)
-    assert (other.tangential_m_s, other.spin_rad_s) == (-one.tangential_m_s, -one.spin_rad_s)
+    (first, second), (on_huge, _) = integrated(PLANE, *before), integrated(huge, *before)
+    assert on_huge.tangential_m_s == pytest.approx(first.tangential_m_s, rel=1e-5)
+    assert (second.tangential_m_s, second.spin_rad_s) == (-first.tangential_m_s, -first.spin_rad_s)

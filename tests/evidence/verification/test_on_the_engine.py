@@ -13,7 +13,6 @@ from dragdeck.decks.templates import environment
 from dragdeck.engine.run_folder import run
 from dragdeck.errors import RejectedRunError
 from dragdeck.project import Project
-from evidence.verification.experiment import collide_scene
 from evidence.verification.report import verdict, write_verification
 from evidence.verification.suite import suite_of
 
@@ -35,7 +34,7 @@ def folders(case: Case, project: Project) -> list[Path]:
     for name, experiment in suite_of(case.study).items():
         if name.startswith(CHOSEN):
             folder = project.results(experiment.case.study_name) / "collide" / name
-            write_run(collide_scene(experiment), folder, environment(project.templates))
+            write_run(experiment, folder, environment(project.templates))
             run(folder, lambda line: None)
             made.append(folder)
     assert len(made) == len(CHOSEN)

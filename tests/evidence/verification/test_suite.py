@@ -14,7 +14,7 @@ from dragdeck.decks.render import deck_text
 from dragdeck.decks.templates import environment
 from dragdeck.project import Project
 from dragdeck.study.model import Study
-from evidence.verification.experiment import Experiment, collide_scene
+from evidence.verification.experiment import Experiment
 from evidence.verification.impacts import Impacts, hertz_time
 from evidence.verification.suite import suite_of
 
@@ -25,21 +25,20 @@ def experiments(case: Case) -> dict[str, Experiment]:
 
 
 def of_test(experiments: dict[str, Experiment], name: str) -> list[Experiment]:
-    return [found for found in experiments.values() if found.case.test == name]
+    return [experiment for experiment in experiments.values() if experiment.case.test == name]
 
 
 def test_every_experiment_is_a_deck(experiments: dict[str, Experiment], project: Project) -> None:
     templates = environment(project.templates)
     for experiment in experiments.values():
-        scene = collide_scene(experiment)
-        text = deck_text(scene, templates)
+        text = deck_text(experiment, templates)
         assert f"\nrun {experiment.steps}\n" in text
         assert text.count("wall/gran") == len(experiment.case.walls)
         limited = text.count("limitForce on")
         assert limited == (1 + len(experiment.case.walls) if experiment.case.limit_force else 0)
-        last = next(out.last_step for out in scene.deck.outputs if out.name == "bodies")
+        last = next(out.last_step for out in experiment.deck.outputs if out.name == "bodies")
         assert last is not None
-        assert experiment.steps - scene.deck.outputs[1].period_steps < last <= experiment.steps
+        assert experiment.steps - experiment.deck.outputs[1].period_steps < last <= experiment.steps
 
 
 def test_the_runs_of_the_default_study_keep_their_names() -> None:
@@ -62,9 +61,9 @@ def test_no_two_particles_touch_at_the_start_but_in_the_column(
     for experiment in experiments.values():
         if experiment.case.test == "column":
             continue
-        for one, other in itertools.combinations(experiment.case.bodies, 2):
-            apart = math.dist(one.position_m, other.position_m)
-            assert apart > one.radius_m + other.radius_m
+        for first, second in itertools.combinations(experiment.case.bodies, 2):
+            apart = math.dist(first.position_m, second.position_m)
+            assert apart > first.radius_m + second.radius_m
 
 
 def test_every_impact_begins_within_the_same_step(experiments: dict[str, Experiment]) -> None:
@@ -81,7 +80,7 @@ def test_each_restitution_is_a_type_of_its_own(experiments: dict[str, Experiment
     size = len(experiment.case.types)
     table = next(
         table.values
-        for table in collide_scene(experiment).deck.materials.law.tables
+        for table in experiment.deck.materials.law.tables
         if table.name == "restitution"
     )
     assert [table[at * size + size - 1] for at in range(size - 1)] == values

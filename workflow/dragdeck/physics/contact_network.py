@@ -81,6 +81,7 @@ def network_number(
     timestep_s: float,
     classes: Ints,
     rigid: RigidBodies | None = None,
+    tolerance: float = _TOLERANCE,
 ) -> float:
     """The `stability_number` of given contacts, with walls of any shape.
 
@@ -94,6 +95,8 @@ def network_number(
         For each class of particles, those with a body of each class.
     classes : (N + W,) ndarray of int
         Class of each particle, then of each wall.
+    tolerance : float
+        Relative error of the eigenvalue; 0: the machine's.
     """
     bodies, normal, overlap = contacts
     walls = len(classes) - len(radius_m)
@@ -127,9 +130,9 @@ def network_number(
         point = centre_m[bodies[0]] + (radius_m[bodies[0]] - overlap / 2)[:, None] * normal
         arms = point - np.vstack([rigid.centre_m, np.zeros(3)])[owner[bodies]]
         levers = Levers(arms, np.concatenate([rigid.roots, np.zeros((1, 3, 3))]))
-        largest = largest_eigenvalue(owner[bodies], normal, weights, of_bodies, _TOLERANCE, levers)
+        largest = largest_eigenvalue(owner[bodies], normal, weights, of_bodies, tolerance, levers)
         return math.sqrt(largest) / 2
-    return math.sqrt(largest_eigenvalue(bodies, normal, weights, inverse_mass, _TOLERANCE)) / 2
+    return math.sqrt(largest_eigenvalue(bodies, normal, weights, inverse_mass, tolerance)) / 2
 
 
 def largest_eigenvalue(
