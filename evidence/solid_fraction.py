@@ -5,7 +5,6 @@ shape, spread of the sizes, friction and width of the bowl, and the solid fracti
 runs are ordinary fillings; the same command resumes an interrupted measurement.
 """
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,32 +12,18 @@ import pandas as pd
 
 from dragdeck.cases.bed import bed_radii, bed_volume, expected_surface
 from dragdeck.cases.case import Case
-from dragdeck.decks.templates import environment
-from dragdeck.engine.batch import Batch
 from dragdeck.engine.reports import say
-from dragdeck.project import find_project
 from dragdeck.records.packing import Packing
 from dragdeck.scenes.filling import FILLING
-from dragdeck.study.yaml import read_yaml
-from dragdeck.sweep.cases import settle_case
-from dragdeck.sweep.design import Design, Variation
-from evidence.beds import settled
+from evidence.beds import Repeated, batch_here, designed, settled
 
 DESIGN = Path(__file__).with_suffix(".yaml")
 
 
-class Beds(Variation):
+class Beds(Repeated):
     """Beds of the design with the name of their shape."""
 
     shape: str = "sphere"
-
-
-def bed_cases() -> Iterator[tuple[str, Case]]:
-    """Shape and case of each packing."""
-    data: Any = read_yaml(DESIGN)
-    design = Design[Beds].read(DESIGN, "beds")
-    for block, values in design.settings():
-        yield block.shape, settle_case(DESIGN, data["study"], values)
 
 
 def row(shape: str, case: Case, bed: Packing) -> dict[str, Any]:
@@ -61,12 +46,10 @@ def row(shape: str, case: Case, bed: Packing) -> dict[str, Any]:
 
 def measure_beds(out: Path) -> None:
     """Make the beds that are missing, and write the record."""
-    project = find_project(Path.cwd())
-    batch = Batch(project.results("solid_fraction"), environment(project.templates))
-    rows = []
-    for shape, case in bed_cases():
+    batch, rows = batch_here("solid_fraction"), []
+    for block, case in designed(Beds, DESIGN, "beds"):
         run = FILLING.run_id(case)
         bed = Packing.read(settled(batch, run, FILLING.build(case, None)))
-        rows.append(row(shape, case, bed))
-        say(f"{shape}: {rows[-1]['solid_fraction']:.3f}")
+        rows.append(row(block.shape, case, bed))
+        say(f"{block.shape}: {rows[-1]['solid_fraction']:.3f}")
         pd.DataFrame(rows).to_csv(out, index=False, float_format="%.5g")

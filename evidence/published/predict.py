@@ -3,7 +3,6 @@
 The predictions of ``design.yaml`` are committed before the published values are typed in.
 """
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -17,18 +16,13 @@ from dragchain.statistics.bed_effects import EffectsFit, fit_effects
 from dragchain.statistics.estimate import Estimate
 from dragdeck.cases.case import Case
 from dragdeck.decks import RUN_FILE
-from dragdeck.decks.templates import environment
 from dragdeck.engine.batch import Batch
 from dragdeck.engine.reports import say
-from dragdeck.project import find_project
 from dragdeck.records.case import load_case
 from dragdeck.records.run import RunRecord
 from dragdeck.scenes.angles import AngleRun, angle_scene
 from dragdeck.scenes.process import PROCESS
-from dragdeck.study.yaml import read_yaml
-from dragdeck.sweep.cases import settle_case
-from dragdeck.sweep.design import Design, Variation
-from evidence.beds import dragged
+from evidence.beds import Repeated, batch_here, designed, dragged
 
 DESIGN = Path(__file__).with_name("design.yaml")
 
@@ -53,12 +47,6 @@ _FROM_DEPTH_M = 0.013
 """Two particle diameters: above, the flat plate meets single particles."""
 
 
-class Repeated(Variation):
-    """Points of the design and the number of their packings."""
-
-    packings: int = 2
-
-
 def predict_published(out_dir: Path) -> None:
     """Make the runs that are missing; write a row per run, and the predictions.
 
@@ -71,12 +59,10 @@ def predict_published(out_dir: Path) -> None:
     RejectedRunError
         A check of a run did not pass.
     """
-    project = find_project(Path.cwd())
-    batch = Batch(project.results("published"), environment(project.templates))
+    batch, rows = batch_here("published"), []
     out_dir.mkdir(parents=True, exist_ok=True)
-    rows = []
     for result in RESULTS:
-        for case in predicted_cases(result):
+        for _, case in designed(Repeated, DESIGN, result):
             measure = _heap if result == "repose" else _drag
             rows.append({"result": result, **measure(batch, case)})
             say(f"{result}: {len(rows)} runs")
@@ -84,15 +70,6 @@ def predict_published(out_dir: Path) -> None:
     predictions(pd.DataFrame(rows)).to_csv(
         out_dir / "predictions.csv", index=False, float_format="%.4g"
     )
-
-
-def predicted_cases(result: str) -> Iterator[Case]:
-    """The cases of a design, packing by packing of each point."""
-    data: Any = read_yaml(DESIGN)
-    design = Design[Repeated].read(DESIGN, result)
-    for block, values in design.settings():
-        for seed in range(1, block.packings + 1):
-            yield settle_case(DESIGN, data["study"], {**values, "seed": seed})
 
 
 # --- measures ------------------------------------------------------------------------------------

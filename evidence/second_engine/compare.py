@@ -21,11 +21,10 @@ from dragchain.statistics.estimate import Estimate
 from dragdeck.arrays import Floats
 from dragdeck.cases.case import Case
 from dragdeck.decks.deck import Scene
-from dragdeck.decks.templates import environment
 from dragdeck.dumps.reader import read_dump
 from dragdeck.engine.batch import Batch
 from dragdeck.engine.reports import say
-from dragdeck.project import find_project
+from dragdeck.project import project_here
 from dragdeck.records.case import ProcessCase
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import PROCESS, process_scene
@@ -33,7 +32,7 @@ from dragdeck.scenes.scene import read_bed
 from dragdeck.study.yaml import read_study
 from dragdeck.sweep.cases import settle_case, study_file
 from dragdeck.sweep.design import Design, Variation
-from evidence.beds import dragged
+from evidence.beds import batch_here, dragged
 from evidence.second_engine.script import SCRIPT_FILE, script, write_particles
 
 DESIGN = Path(__file__).with_name("design.yaml")
@@ -56,10 +55,9 @@ def compare_engines(out_dir: Path) -> None:
     CalledProcessError
         LAMMPS stopped, or is not installed.
     """
-    project, rows = find_project(Path.cwd()), []
+    batch, rows = batch_here("second_engine"), []
     out_dir.mkdir(parents=True, exist_ok=True)
-    batch = Batch(project.results("second_engine"), environment(project.templates))
-    for case in design_cases(study_file(project.studies, "quickstart")):
+    for case in design_cases(study_file(project_here().studies, "quickstart")):
         rows += rows_of_case(batch, case)
         runs = pd.DataFrame(rows)
         runs.to_csv(out_dir / "engine_runs.csv", index=False, float_format="%.5g")
@@ -95,7 +93,7 @@ def design_cases(file: Path) -> Iterator[Case]:
 
 def run_lammps(folder: Path, scene: Scene[ProcessCase], particles: Path) -> Path:
     """Run a process in LAMMPS, unless its script has been run to its end; its folder."""
-    text, done = script(scene, "mindlin"), folder / "done.txt"
+    text, done = script(scene), folder / "done.txt"
     if done.is_file() and done.read_text() == text:
         return folder
     folder.mkdir(exist_ok=True)

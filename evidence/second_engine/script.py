@@ -65,15 +65,13 @@ run {steps}
 """
 
 
-def script(scene: Scene[ProcessCase], spring: str) -> str:
+def script(scene: Scene[ProcessCase]) -> str:
     """The script of a process.
 
     Parameters
     ----------
     scene : Scene
         With analytical walls and a cylinder on a circle.
-    spring : str
-        Tangential model of LAMMPS, ``mindlin`` or one of its kin.
 
     Raises
     ------
@@ -100,14 +98,15 @@ def script(scene: Scene[ProcessCase], spring: str) -> str:
         + turned
         for axis, turned in enumerate([*around, ""])
     ]
+    laws = {name: _law(constants) for name, constants in case.contact_moduli.items()}
     drive, outputs = workpiece.driven.drive, {of.name: of.period_steps for of in deck.outputs}
     return _SCRIPT.format(
         case=case.run,
         particles=PARTICLES_FILE,
         deck=deck,
-        laws={name: _law(of, spring) for name, of in case.contact_moduli.items()},
+        laws=laws,
         bowl="\n".join(
-            f"fix {wall.name} all wall/gran granular {_law(case.contact_moduli['bowl'], spring)} "
+            f"fix {wall.name} all wall/gran granular {laws['bowl']} "
             f"{wall.shape} {wall.at_m!r}{' NULL' if wall.shape == 'zplane' else ''}"
             for wall in deck.bowl.walls
         ),
@@ -124,7 +123,7 @@ def script(scene: Scene[ProcessCase], spring: str) -> str:
     )  # fmt: skip
 
 
-def _law(constants: ContactConstants, spring: str) -> str:
+def _law(constants: ContactConstants) -> str:
     """The contact law with these effective constants, as of two bodies of a like material.
 
     LAMMPS takes Young's modulus and Poisson's ratio of one material and computes the effective
@@ -136,7 +135,7 @@ def _law(constants: ContactConstants, spring: str) -> str:
     poisson = (1 - 4 * ratio) / (1 - 2 * ratio)
     young = 2 * constants.modulus_pa * (1 - poisson**2)
     return (
-        f"hertz/material {young!r} {constants.restitution!r} {poisson!r} tangential {spring} "
+        f"hertz/material {young!r} {constants.restitution!r} {poisson!r} tangential mindlin "
         f"NULL {2 * math.sqrt(ratio)!r} {constants.friction!r} damping coeff_restitution "
         "limit_damping"
     )

@@ -29,9 +29,7 @@ from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.lead import with_leads
 from dragdeck.scenes.process import PROCESS
 from dragdeck.study.base import Json
-from dragdeck.study.yaml import read_yaml
-from dragdeck.sweep.cases import settle_case
-from dragdeck.sweep.design import Design, Variation
+from evidence.beds import Repeated, designed
 
 PLAIN = "-plain"
 """Ends the name of the study of plain runs beside one with a tolerance."""
@@ -42,7 +40,7 @@ ALL = "all"
 KINDS = Path(__file__).with_name("kinds.yaml")
 
 
-class Kinds(Variation):
+class Kinds(Repeated):
     """A scene of the design with the name of its kind."""
 
     kind: str
@@ -76,11 +74,10 @@ def write_pair(name: str, case: Case, fidelity: str, packings: int) -> None:
 
 def write_kinds(fidelity: str, packings: int) -> str:
     """Write both studies of each kind; return the names."""
-    data: Any = read_yaml(KINDS)
     names = []
-    for block, values in Design[Kinds].read(KINDS, "kinds").settings():
+    for block, case in designed(Kinds, KINDS, "kinds"):
         names.append(f"kind-{block.kind.replace(' ', '-')}")
-        write_pair(names[-1], settle_case(KINDS, data["study"], values), fidelity, packings)
+        write_pair(names[-1], case, fidelity, packings)
     return "\n".join(names)
 
 

@@ -9,14 +9,8 @@ import pytest
 
 from dragdeck.scenes.angles import AngleRun, angle_scene
 from dragdeck.scenes.process import process_scene
-from evidence.published.predict import (
-    LIFTED,
-    RESULTS,
-    compare,
-    predicted_cases,
-    predictions,
-    write_verdicts,
-)
+from evidence.beds import Repeated, designed
+from evidence.published.predict import DESIGN, LIFTED, RESULTS, compare, predictions, write_verdicts
 
 PLATES = {"plate_flat": 400e3, "plate_upright": 160e3}
 WORK = {1: 1.0, 3: 1.2, 5: 1.05, 11: 0.8}
@@ -118,7 +112,8 @@ def test_a_result_has_the_verdicts_of_its_quantities(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("result", RESULTS)
 def test_the_product_can_run_the_design(result: str) -> None:
-    for case in (case for case in predicted_cases(result) if case.study.seed == 1):
+    cases = [case for _, case in designed(Repeated, DESIGN, result)]
+    for case in (case for case in cases if case.study.seed == 1):
         if result == "repose":
             run = AngleRun(rig="repose", friction=0.3, rolling_friction=0.1, seed=1)
             assert angle_scene(case, run).case.media.count

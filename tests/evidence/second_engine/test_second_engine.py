@@ -21,7 +21,7 @@ from evidence.second_engine.script import script
 
 def made(load: Load, field: str, value: object) -> str:
     (case,) = load({field: value})
-    return script(process_scene(case), "mindlin")
+    return script(process_scene(case))
 
 
 @pytest.mark.parametrize("name", ["particle", "bowl", "workpiece"])
@@ -30,9 +30,9 @@ def test_lammps_gets_the_effective_moduli(load: Load, name: str) -> None:
     (case,) = load({})
     scene = process_scene(case)
     (line,) = {
-        "particle": re.findall(r"^pair_coeff.*", script(scene, "mindlin"), re.M),
-        "bowl": re.findall(r"^fix floor.*", script(scene, "mindlin"), re.M),
-        "workpiece": re.findall(r"^fix workpiece all wall.*", script(scene, "mindlin"), re.M),
+        "particle": re.findall(r"^pair_coeff.*", script(scene), re.M),
+        "bowl": re.findall(r"^fix floor.*", script(scene), re.M),
+        "workpiece": re.findall(r"^fix workpiece all wall.*", script(scene), re.M),
     }[name]
     young, restitution, poisson = map(float, line.split("hertz/material ")[1].split()[:3])
     damping, friction = map(float, line.split("mindlin NULL ")[1].split()[:2])
@@ -47,7 +47,7 @@ def test_lammps_gets_the_effective_moduli(load: Load, name: str) -> None:
 def test_the_cylinder_is_where_liggghts_has_the_workpiece(load: Load, direction: str) -> None:
     (case,) = load({"motion.path.direction": direction, "motion.path.start_deg": 30})
     scene = process_scene(case)
-    formulas = dict(re.findall(r"^variable (\w+) equal (.*)", script(scene, "mindlin"), re.M))
+    formulas = dict(re.findall(r"^variable (\w+) equal (.*)", script(scene), re.M))
     start = scene.deck.workpieces[0].start_m  # type: ignore[attr-defined]
     way = course(case.study, expected_bed(case.study))
     for leg in scene.deck.legs:  # type: ignore[attr-defined]
