@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from make_record import Sensor, record_of
 from paper_drops import BIAS, FALL_S, HEIGHT, G, paper_drop, paper_drops, rebound
 
 from dragchain.calibration.fit import WIDTH_LIMIT, calibrate, observe, sample_impacts
@@ -15,6 +14,7 @@ from dragchain.calibration.results import bias_table, result
 from dragchain.calibration.simulated_drops import Drops, emulate, waveform
 from dragchain.errors import TableError
 from dragdeck.errors import RecordError
+from evidence.drop_record import Sensor, record_of
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,6 @@ from typing import Any
 
 import pytest
 from made_study import Made
-from make_record import Sensor, synthetic_record
 
 from dragchain.calibration.drops import Drop, confirmation, drop_case, full, production, sweep
 from dragchain.calibration.fit import calibrate
@@ -23,6 +22,7 @@ from dragdeck.project import Project
 from dragdeck.scenes.drop_test import DROP_TEST, DropFidelity, drop_scene
 from dragdeck.study.calibration import measurements
 from dragdeck.study.force_record import read_record
+from evidence.drop_record import Sensor, synthetic_record
 
 
 @pytest.fixture

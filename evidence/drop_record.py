@@ -1,9 +1,8 @@
-"""Make a synthetic record of a drop test: a drop of the engine as a force sensor would show it.
+"""The synthetic record of a drop test: a drop of the engine as a force sensor would show it.
 
-How ``record.csv`` was made is described in docs/evidence/calibration.md.
+How ``studies/droptest/record.csv`` was made is described in docs/evidence/calibration.md.
 """
 
-import argparse
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +15,7 @@ from dragdeck.cases.case import Case
 from dragdeck.decks.templates import environment
 from dragdeck.engine.batch import Batch
 from dragdeck.engine.reports import say
-from dragdeck.project import find_project, study_templates
+from dragdeck.project import project_here, study_templates
 from dragdeck.study.calibration import measurements
 from dragdeck.study.force_record import Record, check_samples
 
@@ -102,26 +101,20 @@ def synthetic_record(drops: Drops, sensor: Sensor, seed: int) -> str:
     return "\n".join([*head, *(f"{t:.{stamps}f},{f:.{digits}f}" for t, f in samples)]) + "\n"
 
 
-def main() -> None:
-    """Run the drop and write its record."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path, help="folder of the drop")
-    parser.add_argument("out", type=Path, help="the CSV")
-    parser.add_argument("--rate", type=float, required=True, help="samples per second, Hz")
-    parser.add_argument("--noise", type=float, required=True, help="standard deviation, N")
-    parser.add_argument("--offset", type=float, default=0.0, help="N")
-    parser.add_argument("--drift", type=float, default=0.0, help="N/s")
-    parser.add_argument("--resolution", type=float, default=0.0, help="N")
-    parser.add_argument("--seed", type=int, required=True)
-    options = parser.parse_args()
-    sensor = Sensor(options.rate, options.noise, options.offset, options.drift, options.resolution)
-    project = find_project(Path.cwd())
+def make_record(folder: Path, out: Path, seed: int, **sensor: float) -> None:
+    """Run a drop of the study ``droptest`` in a folder, and write its record.
+
+    Parameters
+    ----------
+    folder, out : Path
+        Of the drop, and the CSV file.
+    seed : int
+        Of the drop and of the noise.
+    **sensor
+        Fields of `Sensor`.
+    """
+    project = project_here()
     case = project.cases("droptest")[0]
-    batch = Batch(options.folder, environment(project.templates, study_templates(case)))
-    drops = run_drops(case, [drop_of(case, options.seed)], batch, say)
-    text = synthetic_record(drops, sensor, options.seed)
-    options.out.write_text(text, encoding="utf-8")
-
-
-if __name__ == "__main__":
-    main()
+    batch = Batch(folder, environment(project.templates, study_templates(case)))
+    drops = run_drops(case, [drop_of(case, seed)], batch, say)
+    out.write_text(synthetic_record(drops, Sensor(**sensor), seed), encoding="utf-8")
