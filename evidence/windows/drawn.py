@@ -19,6 +19,7 @@ import numpy as np
 
 from dragchain.quantities.document import MEASURED_FILE
 from dragchain.windows.rounds import measured_window
+from dragdeck.errors import InputError, choices
 from dragdeck.project import project_here
 from dragdeck.records.case import load_case
 from dragdeck.scenes.lead import windows_of
@@ -38,6 +39,9 @@ MATERIALS = {
     "polypropylene": (1.5e9, 0.42, 905.0),
 }
 """Young's modulus, Pa, Poisson's ratio, and density, kg/m3, of common media."""
+
+_USUAL = 6
+"""So many of them are drawn if none are named."""
 
 _SOLID, _GRAVITY = 0.59, 9.81
 
@@ -65,53 +69,50 @@ def drawn(
     speed = math.exp(random.uniform(low, high)) * math.sqrt(_SOLID * _GRAVITY * depth * d)
     restitution, friction = random.uniform(0.5, 0.9), random.uniform(0.15, 0.5)
     on_tool = friction * random.uniform(0.6, 1.0)
-    return {
+    scene = {
         "title": f"Drawn scene {number}: {name}",
         "materials": {"media": _material(*MATERIALS[name]), "tool": _material(210e9, 0.3, 7800.0)},
         "pairs": {
-            "media-media": {"restitution": _short(restitution), "friction": _short(friction)},
-            "media-tool": {"restitution": _short(restitution - 0.05), "friction": _short(on_tool)},
+            "media-media": {"restitution": restitution, "friction": friction},
+            "media-tool": {"restitution": restitution - 0.05, "friction": on_tool},
         },
         "media": {
             "material": "media",
             "count": math.ceil(6 * _SOLID * outer**2 * height),
-            "radius_mean_m": _short(d / 2),
-            "radius_std_m": _short(random.uniform(0.02, 0.08) * d / 2),
+            "radius_mean_m": d / 2,
+            "radius_std_m": random.uniform(0.02, 0.08) * d / 2,
         },
-        "bowl": {
-            "material": "tool",
-            "radius_m": _short(outer * d),
-            "height_m": _short(1.6 * height * d),
-        },
-        "workpiece": {
-            "material": "tool",
-            "shape": {"kind": "cylinder", "radius_m": _short(thick * d / 2)},
-        },
+        "bowl": {"material": "tool", "radius_m": outer * d, "height_m": 1.6 * height * d},
+        "workpiece": {"material": "tool", "shape": {"kind": "cylinder", "radius_m": thick * d / 2}},
         "motion": {
             "path": {
                 "kind": "circle",
-                "radius_m": _short(reach * d),
-                "revolutions": _short(random.uniform(10.0, 20.0) / (2 * math.pi * reach)),
+                "radius_m": reach * d,
+                "revolutions": random.uniform(10.0, 20.0) / (2 * math.pi * reach),
             },
-            "speed_m_s": _short(speed),
-            "immersion_depth_m": _short(depth * d),
-            "transient_m": _short(1.5 * d),
+            "speed_m_s": speed,
+            "immersion_depth_m": depth * d,
+            "transient_m": 1.5 * d,
         },
         "outputs": {
-            "workpiece_force_hz": _short(100 * speed / d),
-            "workpiece_contacts_hz": _short(50 * speed / d),
-            "network_hz": _short(12 * speed / d),
+            "workpiece_force_hz": 100 * speed / d,
+            "workpiece_contacts_hz": 50 * speed / d,
+            "network_hz": 12 * speed / d,
         },
         "seed": int(random.integers(1, 10_000)),
     }
+    return _short(scene)
 
 
 def _material(modulus: float, poisson: float, density: float) -> dict[str, float]:
     return {"youngs_modulus_pa": modulus, "poissons_ratio": poisson, "density_kg_m3": density}
 
 
-def _short(number: float) -> float:
-    return float(f"{number:.4g}")
+def _short(part: Any) -> Any:
+    """Plain data with numbers of four digits."""
+    if isinstance(part, dict):
+        return {name: _short(entry) for name, entry in part.items()}
+    return float(f"{part:.4g}") if isinstance(part, float) else part
 
 
 def draw_scenes(
@@ -119,7 +120,7 @@ def draw_scenes(
     scenes: int,
     fidelity: str,
     packings: int,
-    materials: Sequence[str],
+    materials: Sequence[str] | None,
     inertial: Sequence[float],
 ) -> str:
     """Write a study for each scene into the project, and perhaps one of plain runs; their names.
@@ -132,15 +133,24 @@ def draw_scenes(
         Block of each study, as YAML.
     packings : int
         Of the plain runs; 0: no such study.
-    materials : sequence of str
-        Of the media; scenes have them in turn.
+    materials : sequence of str, optional
+        Of the media, names in `MATERIALS`; scenes have them in turn.
     inertial : (2,) sequence of float
         Range of the inertial number.
+
+    Raises
+    ------
+    InputError
+        No such material.
     """
     random, names = np.random.default_rng(seed), []
+    media = materials or list(MATERIALS)[:_USUAL]
+    for name in set(media) - set(MATERIALS):
+        limit = choices(name, MATERIALS)
+        raise InputError("no such material", field="--materials", value=name, limit=limit)
     for number in range(scenes):
         names.append(f"drawn-{seed}-{number:02d}")
-        scene = drawn(random, number, materials[number % len(materials)], inertial)
+        scene = drawn(random, number, media[number % len(media)], inertial)
         case = settle_case(Path(names[-1]), scene, {})
         write_pair(names[-1], case, fidelity, packings)
     return "\n".join(names)

@@ -10,7 +10,6 @@ runs give ratio and scatter, too, and the slope is 0.
 """
 
 import math
-import tarfile
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -37,6 +36,7 @@ from evidence.windows.scene_runs import (
     is_soft,
     last_day,
     mean_attribute,
+    read_archive,
     read_scenes,
     runs_with,
 )
@@ -160,16 +160,11 @@ _FEWEST_WINDOWS = 5
 
 def read_windows(archive: Path) -> list[Windowed]:
     """The soft runs of an archive with their windows."""
-    folders = defaultdict[str, dict[str, RunQuantities]](dict)
-    with tarfile.open(archive) as files:
-        for member in files:
-            if stream := files.extractfile(member):
-                folder, name = member.name.rsplit("/", 1)
-                folders[folder][name] = RunQuantities.model_validate_json(stream.read())
+    folders = defaultdict[Path, dict[str, RunQuantities]](dict)
+    for file, run in read_archive(archive):
+        folders[file.parent][file.name] = run
     return [
-        Windowed(
-            runs["soft.json"], [window_of(run) for name, run in runs.items() if name != "soft.json"]
-        )
+        Windowed(runs.pop("soft.json"), list(map(window_of, runs.values())))
         for runs in folders.values()
     ]
 
@@ -252,20 +247,8 @@ def _of_windows(quantity: Quantity, pairs: Sequence[Pairs]) -> dict[str, float]:
         math.log(of.about(slope) / of.variance) - _log_bias(of.windows) + _log_bias(of.stretches)
         for of in pairs
     ]
-    by_chance = float(
-        np.mean(
-            [
-                _log_variance(len(of.windows) - 1) + _log_variance(len(of.stretches) - 1)
-                for of in pairs
-            ]
-        )
-    )
-    return {
-        "slope": slope,
-        "slope_std": slope_std,
-        "variance_ratio": math.exp(float(np.mean(logs))),
-        "degrees": _degrees(float(np.var(logs, ddof=1)) - by_chance),
-    }
+    degrees = [(len(of.windows) - 1, len(of.stretches) - 1) for of in pairs]
+    return {"slope": slope, "slope_std": slope_std, **_ratio_of_variances(logs, degrees)}
 
 
 def _soft(runs: Sequence[QuantityOfRun]) -> list[QuantityOfRun]:
@@ -287,18 +270,22 @@ def _of_whole_runs(scenes: Sequence[Sequence[QuantityOfRun]]) -> dict[str, float
         for stiff, soft in pairs
     ]
     degrees = [[sum(len(run.blocks) - 1 for run in runs) for runs in pair] for pair in pairs]
-    by_chance = float(np.mean([sum(map(_log_variance, of_pair)) for of_pair in degrees]))
+    return {"slope": 0.0, "slope_std": 0.0, **_ratio_of_variances(logs, degrees)}
+
+
+def _ratio_of_variances(
+    logs: Sequence[float], degrees: Sequence[Sequence[int]]
+) -> dict[str, float]:
+    """A ratio of variances, and degrees of freedom of its scatter from scene to scene.
+
+    The scatter is that of the logarithms of the measured ratios beyond chance, of which the
+    logarithm of a variance with so many degrees of freedom has the trigamma function of half.
+    """
+    by_chance = polygamma(1, np.array(degrees) / 2).sum(axis=1).mean()
     return {
-        "slope": 0.0,
-        "slope_std": 0.0,
         "variance_ratio": math.exp(float(np.mean(logs))),
-        "degrees": _degrees(float(np.var(logs, ddof=1)) - by_chance),
+        "degrees": _degrees(float(np.var(logs, ddof=1) - by_chance)),
     }
-
-
-def _log_variance(degrees: int) -> float:
-    """Variance of the logarithm of a variance with so many degrees of freedom."""
-    return float(polygamma(1, degrees / 2))
 
 
 def _log_bias(values: Floats) -> float:

@@ -3,7 +3,7 @@
 import math
 import tarfile
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -27,18 +27,21 @@ Scenes = Sequence[Sequence[SceneRun]]
 """The runs of each scene."""
 
 
+def read_archive(archive: Path) -> Iterator[tuple[Path, SceneRun]]:
+    """The runs of an archive, each with the path of its file in it."""
+    with tarfile.open(archive) as files:
+        for member in files:
+            if stream := files.extractfile(member):
+                yield Path(member.name), SceneRun.model_validate_json(stream.read())
+
+
 def read_scenes(archives: Sequence[Path]) -> Scenes:
     """All runs, by what tells one scene from another: archive and dimensionless numbers."""
     scenes = defaultdict[object, list[SceneRun]](list)
     for archive in archives:
-        with tarfile.open(archive) as files:
-            for member in files:
-                if member.name.endswith(".json") and (stream := files.extractfile(member)):
-                    run = SceneRun.model_validate_json(stream.read())
-                    numbers = {
-                        name: run.numbers[name] for name in run.numbers.keys() - {"particles"}
-                    }
-                    scenes[archive, frozenset(numbers.items())].append(run)
+        for _, run in read_archive(archive):
+            numbers = {name: value for name, value in run.numbers.items() if name != "particles"}
+            scenes[archive, frozenset(numbers.items())].append(run)
     return list(scenes.values())
 
 
