@@ -14,7 +14,7 @@ from datetime import UTC, datetime
 from functools import partial
 from operator import attrgetter
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -61,14 +61,12 @@ class CostOption(Variation):
     unit: Literal["per_step", "per_second"] = "per_second"
 
 
-def options(design: Path = DESIGN) -> Mapping[str, tuple[CostOption, Settings]]:
-    """The options of a design by name with the fields that they set, the reference first."""
-    named = {}
-    for option, values in Design[CostOption].read(design).settings():
-        shown = [values[field] for field in option.vary]
-        words = {"name": option.name.format(*shown), "what": option.what.format(*shown)}
-        named[words["name"]] = (option.model_copy(update=words), values)
-    return named
+class TimedOption(NamedTuple):
+    """An option with its words, the fields that it sets, and its case."""
+
+    option: CostOption
+    values: Settings
+    case: Case
 
 
 def option_case(case: Case, values: Settings, seconds: float) -> Case:
@@ -111,24 +109,26 @@ def _value(value: Any, study: Study) -> Any:
     return type(current)(float(factor) * current)
 
 
-def option_cases(
-    case: Case, values: Mapping[str, Settings], seconds: float, report: Report
-) -> dict[str, Case]:
-    """The case of every option that the study can have and does not have itself."""
-    cases: dict[str, Case] = {}
-    standard: Study | None = None
-    for name, changes in values.items():
+def timed_options(
+    case: Case, seconds: float, report: Report, design: Path = DESIGN
+) -> dict[str, TimedOption]:
+    """The options that the study can have and does not have itself; the reference first."""
+    timed, standard = dict[str, TimedOption](), None
+    for block, values in Design[CostOption].read(design).settings():
+        shown = [values[field] for field in block.vary]
+        words = {"name": block.name.format(*shown), "what": block.what.format(*shown)}
         try:
-            case_of_option = option_case(case, changes, seconds)
+            of_option = option_case(case, values, seconds)
         except InputError as error:
             if standard is None:
                 raise
-            report(f"{name} is left out: {error}")
+            report(f"{words['name']} is left out: {error}")
             continue
-        if case_of_option.study != standard:
-            cases[name] = case_of_option
-        standard = standard or case_of_option.study
-    return cases
+        if of_option.study != standard:
+            option = block.model_copy(update=words)
+            timed[option.name] = TimedOption(option, values, of_option)
+        standard = standard or of_option.study
+    return timed
 
 
 # --- the result ------------------------------------------------------------------------------
@@ -256,12 +256,11 @@ def time_options(
         raise InputError("this measurement is there already", file=out, remedy=remedy)
     if rounds < 1:
         raise InputError("nothing to time", field="--rounds", value=rounds, limit="at least 1")
-    load, chosen = os.getloadavg()[0], options(design)
+    load = os.getloadavg()[0]
     if load > _QUIET:
         report(f"warning: the machine is busy (load average {load:.2f}); CPU times will scatter")
-    cases = option_cases(
-        case, {name: changes for name, (_, changes) in chosen.items()}, seconds, report
-    )
+    chosen = timed_options(case, seconds, report, design)
+    cases = {name: timed.case for name, timed in chosen.items()}
     first, *others = cases
     folder = out.resolve().parent / "costs"
     own_templates = environment(templates, study_templates(case))
@@ -284,10 +283,10 @@ def time_options(
                 records[name].append(RunRecord.read(batch.folder / name / "state.json"))
     steps_s = {name: make().deck.timestep_s for name, make in scenes.items() if records[name]}
     base = records[first]
-    standard, of_standard = chosen[first]
+    standard, of_standard, _ = chosen[first]
     timed = []
     for name in others:
-        option, values = chosen[name]
+        option, values, _ = chosen[name]
         changed = {key: value for key, value in values.items() if of_standard.get(key) != value}
         pairs = [(a, b) for a, b in zip(records[name], base, strict=False) if a.complete]
         if pairs:

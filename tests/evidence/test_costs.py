@@ -14,22 +14,21 @@ from dragdeck.project import Project
 from dragdeck.records.run import RunRecord
 from dragdeck.sweep.cases import load_cases
 from evidence.__main__ import main
-from evidence.costs import CostOption, cost, geometric, option_cases, options, time_options
+from evidence.costs import CostOption, cost, geometric, time_options, timed_options
 
 SECONDS = 0.05
 
 
 def cases(case: Case) -> dict[str, Case]:
-    values = {name: own for name, (_, own) in options().items()}
-    return option_cases(case, values, SECONDS, silent)
+    return {name: of.case for name, of in timed_options(case, SECONDS, silent).items()}
 
 
 def test_the_interval_of_known_ratios() -> None:
     """Logarithms 0, 1, 2: mean 1, standard error 1 / sqrt(3), t of 2 degrees 4.30265."""
-    found = geometric([1.0, math.e, math.e**2])
+    mean = geometric([1.0, math.e, math.e**2])
     half = 4.302652730 / math.sqrt(3)
-    assert found.value == pytest.approx(math.e)
-    assert math.log(found.ci95_high) == pytest.approx(1 + half)
+    assert mean.value == pytest.approx(math.e)
+    assert math.log(mean.ci95_high) == pytest.approx(1 + half)
 
 
 def record(cpu_time_s: float, wall_time_s: float, steps: int) -> RunRecord:
@@ -60,17 +59,17 @@ def test_a_cost_counts_steps_or_seconds() -> None:
 
 
 def test_every_option_is_the_standard_case_with_other_fields(case: Case) -> None:
-    found = cases(case)
-    standard = found["standard"].study
+    by_name = cases(case)
+    standard = by_name["standard"].study
     motion = standard.motion
     assert motion.nominal_speed_m_s * SECONDS == pytest.approx(motion.path_length_m)
     assert standard.chosen_fidelity().ranks == 1
-    for name, one in found.items():
-        assert (one.study == standard) == (name == "standard")
+    for name, option in by_name.items():
+        assert (option.study == standard) == (name == "standard")
     wide = case.study.workpiece.shape.facet_size_m
-    assert found["workpiece_wide_facets"].study.workpiece.shape.facet_size_m == 2 * wide
-    assert found["fewer_particles"].study.media.count == 3 * case.study.media.count // 4
-    rest = found["rotating_bowl"].study.motion
+    assert by_name["workpiece_wide_facets"].study.workpiece.shape.facet_size_m == 2 * wide
+    assert by_name["fewer_particles"].study.media.count == 3 * case.study.media.count // 4
+    rest = by_name["rotating_bowl"].study.motion
     assert rest.nominal_speed_m_s * SECONDS == pytest.approx(rest.path_length_m)
 
 
@@ -119,21 +118,21 @@ def test_two_options_on_the_engine(
         time_options(
             case, project.templates, out, silent, rounds=rounds, seconds=0.08, design=design
         )
-        found: dict[str, Any] = json.loads(out.read_text())
-        return found
+        document: dict[str, Any] = json.loads(out.read_text())
+        return document
 
     first = time_them(tmp_path / "costs.json", 1)
     runs = {file: file.read_text() for file in (tmp_path / "costs").glob("*/*/run.json")}
-    found = time_them(tmp_path / "again.json", 2)
+    second = time_them(tmp_path / "again.json", 2)
     assert len(runs) == 3 + 1 and all(file.read_text() == text for file, text in runs.items())
-    assert found["versions"]["engine"].startswith("3.")
-    points, step = found["costs"]
+    assert second["versions"]["engine"].startswith("3.")
+    points, step = second["costs"]
     assert (points["name"], step["name"]) == ("restart_points", "step_0.2")
-    assert points["steps"] == found["base"]["steps"]
+    assert points["steps"] == second["base"]["steps"]
     assert step["per_second"] == pytest.approx(
-        step["per_step"] * found["base"]["timestep_s"] / step["timestep_s"], rel=1e-4
+        step["per_step"] * second["base"]["timestep_s"] / step["timestep_s"], rel=1e-4
     )
-    for entry in found["costs"]:
+    for entry in second["costs"]:
         assert entry["ci95_low"] < entry["ratio"] < entry["ci95_high"]
         assert entry["rounds"] == 2
     assert first["costs"][0]["ci95_low"] is None
