@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 from trimesh import Trimesh
 
-from dragdeck.arrays import Floats, Ints
+from dragdeck.arrays import Floats
 from dragdeck.engine.reports import say
 from dragdeck.records.run import RunRecord
 
@@ -31,20 +31,14 @@ def _ring(radius: Floats | float, z: float, turn: float = 0.0, x: float = 0.0) -
 
 def _body(rings: Sequence[Floats], hole: bool = False) -> Trimesh:
     """The surface through rings, whose first and last are closed, or joined where it has a hole."""
-    count, here = len(_AROUND), np.arange(len(_AROUND))
-    after, ends = np.roll(here, -1), [] if hole else [rings[0].mean(axis=0), rings[-1].mean(axis=0)]
-    facets = list[Ints]()
-    for ring in range(len(rings) - (not hole)):
-        low, high = ring * count, (ring + 1) % len(rings) * count
-        facets.append(np.column_stack([low + here, low + after, high + after]))
-        facets.append(np.column_stack([low + here, high + after, high + here]))
-    for end, (first, then) in enumerate(
-        [(after, here), (here - count, after - count)][: len(ends)]
-    ):
-        middle = np.full(count, len(rings) * count + end)
-        last = len(rings) * count * end
-        facets.append(np.column_stack([middle, last + first, last + then]))
-    return Trimesh(np.vstack([*rings, *ends]), np.vstack(facets), process=False)
+    if not hole:
+        closed = [np.broadcast_to(ring.mean(axis=0), ring.shape) for ring in (rings[0], rings[-1])]
+        rings = [closed[0], *rings, closed[1]]
+    nodes = np.arange(len(rings) * len(_AROUND)).reshape(len(rings), -1)
+    low, high = (nodes, np.roll(nodes, -1, axis=0)) if hole else (nodes[:-1], nodes[1:])
+    after, high_after = np.roll(low, -1, axis=1), np.roll(high, -1, axis=1)
+    facets = np.stack([[low, after, high_after], [low, high_after, high]]).transpose(2, 0, 3, 1)
+    return Trimesh(np.vstack(rings), facets.reshape(-1, 3), validate=True)
 
 
 def _ellipse(half_x: float, half_y: float) -> Floats:
