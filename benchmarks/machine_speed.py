@@ -14,10 +14,9 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from scipy.stats import t
 
 from dragchain.quantities.document import MEASURED_FILE, RunQuantities
-from dragchain.statistics.estimate import flattened
+from dragchain.statistics.estimate import flattened, student_quantile
 from dragdeck.outlook.timestep import stability_forecast
 from dragdeck.project import Project
 from dragdeck.records.run import RunRecord
@@ -47,7 +46,7 @@ def law(runs: pd.DataFrame) -> pd.DataFrame:
     """Drag at rest, N, and its rise with the square of the speed, N s2/m2, with 95 % intervals."""
     drag, half = runs["drag_n"].abs(), runs["drag_n_ci95_high"] - runs["drag_n"]
     values, covariance = np.polyfit(runs["speed_m_s"] ** 2, drag, 1, w=1 / half, cov=True)
-    halves = t.ppf(0.975, len(runs) - 2) * np.sqrt(np.diag(covariance))
+    halves = student_quantile(len(runs) - 2) * np.sqrt(np.diag(covariance))
     names = ("rise_n_s2_m2", "at_rest_n")
     columns = {"value": values, "ci95_low": values - halves, "ci95_high": values + halves}
     return pd.DataFrame({"name": names, **columns})

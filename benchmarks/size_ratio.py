@@ -1,14 +1,13 @@
 """Small particles between large ones (docs/development/liggghts.md#small-and-large-particles).
 
-    python benchmarks/size_ratio.py docs/data/liggghts [--folder results/size_ratio]
+    python benchmarks/size_ratio.py docs/data/liggghts
 
 Writes plain input scripts, runs each once, and makes three records of them: ``groove.csv``, a
 small particle that rolls down the groove between two large ones at rest; ``groove_wall.csv``, the
 same between a large one and a wall; and ``mixed_beds.csv``, beds of two sizes that are filled,
-tilted and left to rest. A run that is there already is not repeated.
+tilted and left to rest. A run that is in ``results/size_ratio`` already is not repeated.
 """
 
-import argparse
 import math
 import re
 import shutil
@@ -20,9 +19,9 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from scipy.spatial import cKDTree
 
 from dragdeck.physics.contact_mechanics import effective_modulus, rayleigh_time, wedge_ratio
+from dragdeck.physics.contact_network import touching
 from dragdeck.physics.packing import pour
 from dragdeck.physics.walls import round_container
 from dragdeck.study.workpiece import Material
@@ -194,17 +193,14 @@ def bed(folder: Path, ratio: float, friction: float, fraction: float) -> dict[st
     run_particles(folder, script, rows, (across, across, (-_BOWL_M, 2 * particles.top_m)))
     last = np.loadtxt(folder / "bed.txt", skiprows=9)
     places, radii = last[:, 1:4], last[:, 4]
-    pairs = cKDTree(places).query_pairs(2 * radii.max(), output_type="ndarray")
-    gaps = np.linalg.norm(places[pairs[:, 0]] - places[pairs[:, 1]], axis=1)
-    overlap = radii[pairs].sum(axis=1) - gaps
-    pairs, overlap = pairs[overlap > 0], overlap[overlap > 0]
+    pairs, _, overlap = touching(places, radii)
     modulus = effective_modulus(CERAMIC, CERAMIC, 1e-3)
-    force = 4 / 3 * modulus * np.sqrt(1 / (1 / radii[pairs]).sum(axis=1)) * overlap**1.5
-    of_large = (radii[pairs] > 0.99 * large).all(axis=1)
+    force = 4 / 3 * modulus * np.sqrt(1 / (1 / radii[pairs]).sum(axis=0)) * overlap**1.5
+    of_large = (radii[pairs] > 0.99 * large).all(axis=0)
     strongest, deepest = np.zeros(len(radii)), np.zeros(len(radii))
-    for side in (0, 1):
-        np.maximum.at(strongest, pairs[:, side], force)
-        np.maximum.at(deepest, pairs[:, side], overlap)
+    for bodies in pairs:
+        np.maximum.at(strongest, bodies, force)
+        np.maximum.at(deepest, bodies, overlap)
     loaded = (radii < 0.99 * large) & (strongest > 0)
     thermo = re.findall(
         r"^ *\d+ +([\d.e+-]+) *$", (folder / "log").read_text("utf-8"), re.MULTILINE
@@ -242,23 +238,15 @@ def beds(folder: Path) -> Iterator[dict[str, float]]:
         yield bed(folder / f"bed-{ratio:g}-{friction:g}-{fraction:g}", ratio, friction, fraction)
 
 
-def main() -> int:
+def main(out: Path, folder: Path = Path("results/size_ratio")) -> None:
     """Make the records."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("out", type=Path)
-    parser.add_argument("--folder", type=Path, default=Path("results/size_ratio"))
-    asked = parser.parse_args()
     for name, rows in (
-        ("groove", grooves(asked.folder, wall=False)),
-        ("groove_wall", grooves(asked.folder, wall=True)),
-        ("mixed_beds", beds(asked.folder)),
+        ("groove", grooves(folder, wall=False)),
+        ("groove_wall", grooves(folder, wall=True)),
+        ("mixed_beds", beds(folder)),
     ):
-        table = []
-        for row in rows:
-            table.append(row)
-            pd.DataFrame(table).to_csv(asked.out / f"{name}.csv", index=False, float_format="%.4g")
-    return 0
+        pd.DataFrame(rows).to_csv(out / f"{name}.csv", index=False, float_format="%.4g")
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main(Path(sys.argv[1]))

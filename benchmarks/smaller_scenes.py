@@ -11,8 +11,9 @@ change of the drag by the cut-outs; and ``true_size.csv``, what follows from the
 for the true size.
 """
 
-import argparse
 import math
+import sys
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -37,24 +38,18 @@ _NEAR_M, _BINS = 0.02, 8
 """Surface beside the path to either side, m, and its bins."""
 
 
-def main() -> None:
+def main(out: Path, *results: Path) -> None:
     """Read the runs of studies and write the records."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("out", type=Path)
-    parser.add_argument("results", type=Path, nargs="+")
-    chosen = parser.parse_args()
     rows, lines = [], []
-    machines: dict[str, dict[Path, RunQuantities]] = {}
-    for study in chosen.results:
-        of_study = machines.setdefault(
-            study.name.removesuffix("_coarse").removesuffix("_whole"), {}
-        )
+    machines = defaultdict[str, dict[Path, RunQuantities]](dict)
+    for study in results:
+        machine = study.name.removesuffix("_coarse").removesuffix("_whole")
         for file in sorted(study.glob(f"process/*/{MEASURED_FILE}")):
-            of_study.setdefault(file.parents[1], RunQuantities.read(file))
+            machines[machine][file.parents[1]] = RunQuantities.read(file)
     for machine, runs in machines.items():
-        groups: dict[tuple[str, float], list[Path]] = {}
+        groups = defaultdict[tuple[str, float], list[Path]](list)
         for folder, run in runs.items():
-            groups.setdefault(_kind(run), []).append(folder)
+            groups[_kind(run)].append(folder)
         rows += [_row(machine, *kind, of, runs) for kind, of in sorted(groups.items())]
         for scene in sorted({scene for scene, _ in groups}):
             of_scene = [run for run in runs.values() if _kind(run)[0] == scene]
@@ -67,11 +62,13 @@ def main() -> None:
     whole = table[table["scene"] == "whole"].sort_values("factor").drop_duplicates("study")
     cost = table["study"].map(whole.set_index("study")["cpu_time_s"])
     table["relative_cpu_time"] = table["cpu_time_s"] / cost
-    pd.DataFrame(_changes(table)).to_csv(
-        chosen.out / "cut_out_change.csv", index=False, float_format="%.6g"
-    )
-    table.to_csv(chosen.out / "smaller_scenes.csv", index=False, float_format="%.6g")
-    pd.DataFrame(lines).to_csv(chosen.out / "true_size.csv", index=False, float_format="%.6g")
+    records = {
+        "cut_out_change": pd.DataFrame(_changes(table)),
+        "smaller_scenes": table,
+        "true_size": pd.DataFrame(lines),
+    }
+    for name, record in records.items():
+        record.to_csv(out / f"{name}.csv", index=False, float_format="%.6g")
 
 
 def _changes(table: pd.DataFrame) -> Iterator[dict[str, object]]:
@@ -122,10 +119,7 @@ def _row(
 
 def _cpu_time(folder: Path, run: RunQuantities) -> float:
     """Of the filling and of the process, s."""
-    (filling,) = (
-        place for name, place in upstream_folders(folder, load_case(folder)).items()
-        if name == "filling"
-    )  # fmt: skip
+    filling = upstream_folders(folder, load_case(folder))["filling"]
     return run.cost.cpu_time_s + float(RunRecord.read(filling / "run.json").cpu_time_s or math.nan)
 
 
@@ -159,4 +153,4 @@ def _tilt_deg(folder: Path, run: RunQuantities) -> float:
 
 
 if __name__ == "__main__":
-    main()
+    main(*map(Path, sys.argv[1:]))

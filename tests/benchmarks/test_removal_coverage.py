@@ -45,8 +45,8 @@ def test_only_percentiles_are_ever_not_available() -> None:
 
 def test_a_small_repetition_agrees_with_the_record() -> None:
     """About 80 quantities, 8 times each; what is not available is known to be so."""
-    found = removal_coverage(8, seed=7)
-    assert found["quantity"].tolist() == RECORD["quantity"].tolist()
-    assert 0.90 <= found["coverage"].mean() <= 0.985
+    few = removal_coverage(8, seed=7)
+    assert few["quantity"].tolist() == RECORD["quantity"].tolist()
+    assert 0.90 <= few["coverage"].mean() <= 0.985
     always = RECORD["available"] > 0.99
-    assert (found["available"][always] == 1).mean() > 0.9
+    assert (few["available"][always] == 1).mean() > 0.9
