@@ -79,24 +79,19 @@ def _rows(part: Any, keys: Sequence[str] = ()) -> Iterator[dict[str, JsonValue]]
         for name, item in part.items():
             yield from ({"name": name, **row} for row in _rows(item, keys))
     elif keys:
-        above = {key: value for key, value in part.items() if key != keys[0]}
+        other = {key: value for key, value in part.items() if key != keys[0]}
+        above = {key: value for key, value in _flat(other).items() if not isinstance(value, list)}
         for row in _rows(part[keys[0]], keys[1:]):
-            yield {**_flat(above, lists=False), **row}
+            yield {**above, **row}
     elif part and all(isinstance(entry, list) for entry in part.values()):
         yield from pd.DataFrame(part).to_dict("records")
     else:
         yield _flat(part)
 
 
-def _flat(part: Json, lists: bool = True) -> dict[str, JsonValue]:
+def _flat(part: Json) -> dict[str, JsonValue]:
     """The values of nested objects, their keys joined by ``_``."""
-    flat: dict[str, JsonValue] = {}
-    for key, entry in part.items():
-        if isinstance(entry, dict):
-            flat |= {f"{key}_{inner}": value for inner, value in _flat(entry, lists).items()}
-        elif lists or not isinstance(entry, list):
-            flat[key] = entry
-    return flat
+    return pd.json_normalize(dict(part), sep="_").to_dict("records")[0]
 
 
 class Join(TypedDict):

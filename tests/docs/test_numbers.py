@@ -34,7 +34,7 @@ def test_the_numbers_of_the_papers_study_are_those_of_the_code() -> None:
     study, law = Project(ROOT).cases("uhlmann2015")[0].study, stable_step_law()
     media, motion, spread = study.media, study.motion, study.media.radius_std_m
     particle, own = study.materials[str(media.material)], study.pair(*[str(media.material)] * 2)
-    found = []
+    computed = []
     for name, fidelity in BUILT_IN_FIDELITIES.items():
         scaled = study.model_copy(update={"fidelity": fidelity})
         step, scale = bed_timestep(scaled, "timestep_fraction"), fidelity.youngs_modulus_scale
@@ -42,13 +42,13 @@ def test_the_numbers_of_the_papers_study_are_those_of_the_code() -> None:
         unstable = law.largest_fraction(stiffness, own.restitution, spread / media.radius_mean_m)
         steps = motion.path_length_m / motion.nominal_speed_m_s / step
         times = 1e6 * bed_rayleigh_time(scaled), 1e6 * step, steps / 1e6
-        found.append([name, scale, fidelity.timestep_fraction, *times, unstable])
+        computed.append([name, scale, fidelity.timestep_fraction, *times, unstable])
     known = record_table("paper/presets")
-    assert found == [[row[0], *map(pytest.approx, row[1:])] for row in known.to_numpy().tolist()]
+    assert computed == [[row[0], *map(pytest.approx, row[1:])] for row in known.to_numpy().tolist()]
     for _, pair, dashpot, stiffness in record_table("paper/contacts").itertuples():
         partner = study.materials[pair.split("-")[1]]
         shear = mechanics.effective_shear(particle, partner)
-        both = [mechanics.shear_modulus(one) for one in (particle, partner)]
+        both = [mechanics.shear_modulus(material) for material in (particle, partner)]
         ratio = (particle.poissons_ratio + partner.poissons_ratio) / 2
         assert dashpot == pytest.approx(
             math.sqrt(4 * shear / mechanics.effective_modulus(particle, partner))

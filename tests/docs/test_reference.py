@@ -106,20 +106,20 @@ def test_every_source_is_cited_and_every_cited_one_known() -> None:
     assert [key for key, name in authors.items() if str(name).strip("{}") not in text] == []
 
 
-@pytest.mark.parametrize("found", read_scalings(), ids=lambda found: found.study)
-def test_the_scalings_are_those_of_the_studies_and_on_the_page(found: ScalingFile) -> None:
-    exponent, rest = said(found).removeprefix(f"{found.field}: ").replace(MINUS, "-").split("; ")
+@pytest.mark.parametrize("law", read_scalings(), ids=lambda law: law.study)
+def test_the_scalings_are_those_of_the_studies_and_on_the_page(law: ScalingFile) -> None:
+    exponent, rest = said(law).removeprefix(f"{law.field}: ").replace(MINUS, "-").split("; ")
     expected, _ = rest.rsplit(": ", 1)
     lines = text_of("evidence/scaling.md").splitlines()
-    (line,) = (line for line in lines if f"{found.verdict}: {exponent}, " in line)
+    (line,) = (line for line in lines if f"{law.verdict}: {exponent}, " in line)
     assert expected in line
-    cases = Project(ROOT).cases(found.study)
+    cases = Project(ROOT).cases(law.study)
     scaling = cases[0].study.scaling
     assert scaling is not None and scaling.fit_range is None
     assert (scaling.field, scaling.expected_exponent, scaling.source) == (
-        *(found.field, found.expected.exponent, found.expected.source),
+        *(law.field, law.expected.exponent, law.expected.source),
     )
-    assert {run.run for run in found.runs} == {PROCESS.run_id(case) for case in cases}
+    assert {run.run for run in law.runs} == {PROCESS.run_id(case) for case in cases}
 
 
 @pytest.mark.parametrize("file", NOTEBOOKS, ids=lambda file: file.stem)
@@ -129,8 +129,8 @@ def test_a_notebook_names_its_study_first_and_is_stored_with_its_output(file: Pa
     study = re.fullmatch(r'study_name = "([\w-]+)"', first.source)
     assert study is not None and Project(ROOT).cases(study[1])
     assert not any(study[1] in cell.source or not cell.outputs for cell in cells)
-    texts = [one.get("text", "") + one.get("data", {}).get("text/plain", "")
-             for cell in cells for one in cell.outputs]  # fmt: skip
+    texts = [output.get("text", "") + output.get("data", {}).get("text/plain", "")
+             for cell in cells for output in cell.outputs]  # fmt: skip
     assert not re.search(r"(^|[\s'\"(])/\w+/", "\n".join(texts))
     assert not any("execution" in cell.metadata for cell in cells)
     links = re.findall(r"\]\(([^)#:]+)", file.read_text())

@@ -35,16 +35,16 @@ def test_sphinx_builds_the_site_without_a_warning(tmp_path: Path) -> None:
 
 def anchors(page: Path) -> set[str]:
     """Anchors of the headings of a page, as code hosting sites and Sphinx make them."""
-    found: set[str] = set()
+    slugs: set[str] = set()
     text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.M | re.S)
     for heading in re.findall(r"^#+ (.*)$", text, re.M):
         heading = re.sub(r"<!--.*?-->", "", heading)
         words = re.sub(r"[^\w\- ]", "", re.sub(r"\]\([^)]*\)", "", heading).lower())
         slug, count = words.strip().replace(" ", "-"), 0
-        while (name := f"{slug}-{count}" if count else slug) in found:
+        while (name := f"{slug}-{count}" if count else slug) in slugs:
             count += 1
-        found.add(name)
-    return found
+        slugs.add(name)
+    return slugs
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)

@@ -65,9 +65,9 @@ def test_spelling_is_british_and_terms_are_those_of_the_glossary(
     for dictionary in ("-", str(british), str(TERMS)):
         words += ["--dictionary", dictionary]
     ran = subprocess.run([*words, "."], cwd=texts, capture_output=True, text=True)
-    found = [line.removeprefix("./") for line in ran.stdout.splitlines()]
-    checked = [line for line in found if line.startswith("check:")]
+    listed = [line.removeprefix("./") for line in ran.stdout.splitlines()]
+    checked = [line for line in listed if line.startswith("check:")]
     assert len(checked) == 3, ran.stderr  # the check finds what it is for
-    quoted = [line for line in found for page, words in QUOTED.items()
+    quoted = [line for line in listed for page, words in QUOTED.items()
               if line.startswith(page) and line.split()[1] in words]  # fmt: skip
-    assert sorted(set(found) - set(checked) - set(quoted)) == []
+    assert sorted(set(listed) - set(checked) - set(quoted)) == []

@@ -1,14 +1,12 @@
 """Figures of numbers: each is a function that draws it from records."""
 
-from typing import Any
-
 import matplotlib
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 from records import chosen, record_table
 
-from dragchain.figures.panels import interval_rows, key, log_ticks, row_mark, row_names
+from dragchain.figures.panels import interval_rows, key, log_ticks, new_panels, row_mark, row_names
 from dragchain.figures.style import (
     ABOVE_SCALE,
     BLUE,
@@ -30,12 +28,6 @@ from evidence.stability.report import draw_regime
 from evidence.validation.report import MEAN_DRAG, effect_bar
 
 
-def _panels(width: float, height: float, count: int = 1, **options: bool) -> tuple[Figure, Any]:
-    """A figure, in inches, with its axes: several of them side by side."""
-    figure = Figure(figsize=(width, height), layout="constrained")
-    return figure, figure.subplots(1, count, **options)
-
-
 def _draw_calibration() -> Figure:
     """Effective minus entered restitution by fidelity and limitForce; range of single impacts."""
     kinds = {
@@ -43,7 +35,7 @@ def _draw_calibration() -> Figure:
         "draft": ("production", "draft", ORANGE),
         "physical modulus, small step": ("reference", "standard", GREY),
     }
-    figure, panels = _panels(7.6, 3.1, 2, sharey=True)
+    figure, panels = new_panels(3.1, 2, sharey=True)
     for axes, limited in zip(panels, (True, False), strict=True):
         for label, (purpose, fidelity, colour) in kinds.items():
             rows = f"limit_force == {limited} and purpose == {purpose!r} and fidelity == "
@@ -67,7 +59,7 @@ def _draw_forces() -> Figure:
     force, run = record_table("validation/run_force"), record_table("validation/run").iloc[0]
     paper, colour = record_table("study/uhlmann2015").iloc[0], COLOURS["experiment"]
     mean, std = paper["reference_experiment_drag_mean_n"], paper["reference_experiment_drag_std_n"]
-    figure, axes = _panels(7.6, 3.2)
+    figure, (axes,) = new_panels(3.2)
     label = "experiment, mean ± standard deviation"
     axes.axhspan(mean - std, mean + std, color=colour, alpha=0.15, lw=0, label=label)
     axes.axhline(mean, color=colour, ls="--", lw=1.6, zorder=3)
@@ -100,7 +92,7 @@ def _draw_load_map() -> Figure:
         np.histogram2d(turn, depth_m - side["centre_z_m"], edges, weights=weights)[0]
         for weights in (side["force_slide_pa"] * side["area_m2"], side["area_m2"])
     )
-    figure, axes = _panels(7.6, 3.4)
+    figure, (axes,) = new_panels(3.4)
     values = np.divide(load, area, out=np.zeros_like(load), where=area > 0)
     top = top_of_scale(values, area)
     shown = axes.pcolormesh(edges[0], 1e3 * edges[1], values.T, cmap=force_map(), vmin=0, vmax=top)
@@ -126,7 +118,7 @@ def _draw_scaling() -> Figure:
 def _draw_machine_speed() -> Figure:
     """Mean drag, and number of contacts, over the speed of the workpiece."""
     rows = record_table("scaling/machine_speed")
-    figure, (drags, contacts) = _panels(7.6, 2.8, 2)
+    figure, (drags, contacts) = new_panels(2.8, 2)
     for axes, name in ((drags, "drag_n"), (contacts, "contacts")):
         value, low, high = (rows[f"{name}{end}"].abs() for end in ("", *_ENDS))
         sides = value - np.minimum(low, high), np.maximum(low, high) - value
@@ -158,7 +150,7 @@ def _draw_simplifications() -> Figure:
 def _draw_spin() -> Figure:
     """Mean drag and torque over the spin ratio, with 95 % confidence intervals."""
     rows = record_table("motion/spin")
-    figure, panels = _panels(7.6, 2.8, 2)
+    figure, panels = new_panels(2.8, 2)
     shown = (
         ("drag_n", "drag_half_n", "mean drag (N)", COLOURS["drag"]),
         ("torque_mn_m", "torque_half_mn_m", "mean torque (mN m)", GREEN),
@@ -192,19 +184,16 @@ def _draw_tradeoff(tolerance: float = 0.1) -> Figure:
     """Signed error of the mean drag against CPU time; Pareto-optimal settings are numbered."""
     rows = chosen("tradeoff/settings/errors", "name == 'drag_mean' and not breaks")
     rows = rows[(rows["failed"] == 0) & (rows["runs"] > 1)].sort_values("relative_cost")
-    figure, axes = _panels(7.2, 4.2)
+    figure, (axes,) = new_panels(4.2, 1, 7.2)
     axes.axhspan(-100 * tolerance, 100 * tolerance, color=LIGHT, alpha=0.35, lw=0)
     axes.axhline(0, color="black", lw=0.7)
     levels = sorted(rows["youngs_modulus_scale"].unique(), reverse=True)
     shades = matplotlib.colormaps["viridis"](np.linspace(0, 0.85, len(levels)))
     for level, shade, mark in zip(levels, shades, MARKERS, strict=False):
         settings = rows[rows["youngs_modulus_scale"] == level]
-        sides = [
-            settings["value"] - settings["ci95_low"],
-            settings["ci95_high"] - settings["value"],
-        ]
+        error, low, high = 100 * settings[["value", *_CI]].to_numpy().T
         axes.errorbar(
-            1 / settings["relative_cost"], 100 * settings["value"], [100 * side for side in sides],
+            1 / settings["relative_cost"], error, [error - low, high - error],
             fmt=mark, color=shade, capsize=2, lw=1, label=f"Young's modulus \u00d7 {level:g}",
         )  # fmt: skip
     best = rows[rows["bound"] < rows["bound"].cummin().shift(fill_value=np.inf)]
@@ -251,20 +240,19 @@ def _draw_validation() -> Figure:
 def _draw_published() -> Figure:
     """Predictions over published values, and those of which the sign was published."""
     rows = record_table("published/comparison").dropna(subset=["predicted", "published"])
-    figure, panels = _panels(8.6, 2.6, 3)
-    for axes, kind, result, label in zip(
-        panels,
-        ("value", "sign", "sign"),
-        ("", "lift", "spin"),
-        ("predicted / published", "lift (N)", "difference of the reduction"),
-        strict=True,
-    ):
-        part = rows[(rows["kind"] == kind) & (rows["result"] == result if result else True)]
+    figure, panels = new_panels(2.6, 3, 8.6)
+    shown = (
+        ("kind == 'value'", "predicted / published", 1.0),
+        ("kind == 'sign' and result == 'lift'", "lift (N)", 0.0),
+        ("kind == 'sign' and result == 'spin'", "difference of the reduction", 0.0),
+    )
+    for axes, (chosen_rows, label, null) in zip(panels, shown, strict=True):
+        part = rows.query(chosen_rows)
         for place, row in enumerate(part.itertuples()):
             known = Estimate(row.predicted, row.low, row.high)
-            row_mark(axes, place, known.over(1.0 if result else row.published), BLUE)
+            row_mark(axes, place, known.over(row.published if null else 1.0), BLUE)
         row_names(axes, [f"{row.no}: {row.short}" for row in part.itertuples()])
-        axes.axvline(0.0 if result else 1.0, color=RED, ls="--")
+        axes.axvline(null, color=RED, ls="--")
         axes.set_xlabel(label)
     return figure
 
@@ -276,7 +264,7 @@ def _draw_verification(smallest: float = 1e-12) -> Figure:
     rows = rows.dropna(subset=["tolerance"])
     ratio = (rows["largest_error"] / rows["tolerance"]).clip(lower=smallest)
     names = [f"{row.test} {row.subject}: {row.quantity}" for row in rows.itertuples()]
-    figure, axes = _panels(8.6, 0.21 * len(rows) + 0.9)
+    figure, (axes,) = new_panels(0.21 * len(rows) + 0.9, 1, 8.6)
     places = range(len(rows), 0, -1)
     axes.hlines(places, smallest, ratio, color=BLUE, lw=1)
     axes.plot(ratio, places, "o", color=BLUE)
@@ -290,7 +278,7 @@ def _draw_verification(smallest: float = 1e-12) -> Figure:
 def _draw_windows() -> Figure:
     """Soft run and windows in the scene of the paper, relative to a run with the physical E."""
     rows = record_table("windows/paper").dropna(subset=["stiff"]).reset_index()
-    figure, axes = _panels(7.6, 3.0)
+    figure, (axes,) = new_panels(3.0)
     widths = 100 * rows["stiff_half_width"]
     axes.barh(rows.index, 2 * widths, left=-widths, color=LIGHT, label="reference, 95 % CI")
     ratios = rows[["soft", "value", *_CI]].div(rows["stiff"], axis=0).sub(1).mul(100)
@@ -311,7 +299,7 @@ _CI = ("ci95_low", "ci95_high")
 
 def _draw_ways() -> Figure:
     """Half-width to be expected against CPU time, of the ways to drag and to contacts."""
-    figure, panels = _panels(7.6, 3.2, 2, sharey=True)
+    figure, panels = new_panels(3.2, 2, sharey=True)
     table = record_table("ways")
     titles = {"drag_mean": "mean drag", "workpiece_contacts": "contacts on the workpiece"}
     for axes, (asked, title) in zip(panels, titles.items(), strict=True):
