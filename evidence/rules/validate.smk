@@ -7,7 +7,7 @@ rule write_validation:
         templates=WORK.page_templates("validation/validation.html.j2", package="evidence"),
     output:
         page=shown(WORK.of_study("validation", "report.html"), "validation", "Validation"),
-        found=WORK.of_study("validation", "validation.json"),
+        numbers=WORK.of_study("validation", "validation.json"),
         tables=multiext(
             WORK.of_study("validation", ""),
             "packings.parquet",

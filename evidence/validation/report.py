@@ -164,7 +164,7 @@ def write_validation(out_dir: Path, run_dirs: Sequence[Path], command: str) -> N
         },
         documents={"validation": result},
         package="evidence",
-        found=result,
+        result=result,
         packings=packings.to_dict("records"),
         assumptions=case.assumptions,
     )

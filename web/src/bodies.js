@@ -88,7 +88,7 @@ export class Media {
   constructor(frames) {
     this.frames = frames;
     const { clumps = [] } = frames.head;
-    this.spheres = new Bodies(frames.most.particles * Math.max(1, ...clumps.map((one) => one.spheres.length)));
+    this.spheres = new Bodies(frames.most.particles * Math.max(1, ...clumps.map(({ spheres }) => spheres.length)));
   }
 
   /** Show a frame; `look` is the state of the controls. */
@@ -108,7 +108,7 @@ export class Media {
         own = look.colour === "media" ? ofClass(k) : onPath.has(k) ? path : plain,
         tint = measure ? colourOf(measure[k] / look.top) : own;
       for (const [place, radius] of this.frames.spheres(frame, k)) {
-        const at = centre.map((one, axis) => one + size * place[axis]);
+        const at = centre.map((middle, axis) => middle + size * place[axis]);
         this.spheres.add(k, at, at, size * radius, tint);
       }
     }

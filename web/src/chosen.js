@@ -21,7 +21,7 @@ export function underRay(caster, near, frame, { frames, media, contacts, workpie
       { ...workpiece.hit(caster), choice: (row) => ({ facet: row }) },
     ]
       .filter(({ distance }) => distance !== undefined)
-      .sort((one, other) => one.distance - other.distance);
+      .sort((a, b) => a.distance - b.distance);
     if (first) return first.choice(first.row);
   }
   return null;

@@ -22,8 +22,8 @@ export function colourMap(hexes) {
     const at = Math.min(Math.max(value, 0), 1) * last,
       k = Math.min(Math.floor(at), last - 1),
       part = at - k;
-    return table[k].map((channel, c) => channel + part * (table[k + 1][c] - channel));
+    return blend(table[k], table[k + 1], part);
   };
 }
 
-export const blend = (one, other, part) => one.map((channel, c) => channel + part * (other[c] - channel));
+export const blend = (from, to, part) => from.map((channel, c) => channel + part * (to[c] - channel));

@@ -73,7 +73,7 @@ export class Frames {
 
   /** Places, from its centre, and radii of the spheres of a particle, mm: of a clump, those turned as it is. */
   spheres({ id, radius, turn }, k) {
-    const clump = (this.head.clumps ?? []).findLast((one) => one.first <= id[k]);
+    const clump = (this.head.clumps ?? []).findLast(({ first }) => first <= id[k]);
     if (!clump) return [[[0, 0, 0], radius[k]]];
     const [w, x, y, z] = turn.subarray(4 * k, 4 * k + 4);
     const turned = new Quaternion(x, y, z, w);
@@ -134,17 +134,17 @@ export class Frames {
 
   /** The contact of a particle with another one or a body by name; -1 if they do not touch. */
   find(frame, ...wanted) {
-    let found = -1;
+    let strongest = -1;
     for (let k = 0; k < frame.a.length; k++) {
       const pair = this.pair(frame, k),
         same = wanted[0] !== wanted[1] && wanted.every((body) => pair.includes(body));
-      if (same && (found < 0 || frame.normal[k] > frame.normal[found])) found = k;
+      if (same && (strongest < 0 || frame.normal[k] > frame.normal[strongest])) strongest = k;
     }
-    return found;
+    return strongest;
   }
 }
 
-const distance = (one, other) => Math.hypot(...[0, 1, 2].map((axis) => other[axis] - one[axis]));
+const distance = (from, to) => Math.hypot(...[0, 1, 2].map((axis) => to[axis] - from[axis]));
 
 function starts(counts) {
   const sums = [0];

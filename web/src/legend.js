@@ -44,7 +44,7 @@ function list(title, names, colourOf) {
 export function showScale(bar, label, millimetresPerPixel) {
   const rough = 110 * millimetresPerPixel,
     power = 10 ** Math.floor(Math.log10(rough));
-  const length = [5, 2, 1].map((factor) => factor * power).find((one) => one <= rough) ?? power;
+  const length = [5, 2, 1].map((factor) => factor * power).find((candidate) => candidate <= rough) ?? power;
   bar.style.width = `${length / millimetresPerPixel}px`;
   label.textContent = `${Number(length.toPrecision(1))} mm`;
 }

@@ -39,7 +39,7 @@ class Page {
     document.documentElement.classList.add("with-curve");
     const { curve, peaks } = this.head,
       { times } = this.frames;
-    const away = (time) => times.map((one) => Math.abs(one - time)),
+    const away = (time) => times.map((moment) => Math.abs(moment - time)),
       nearest = (time) => away(time).indexOf(Math.min(...away(time)));
     this.curve = new ForceCurve(
       byId("curve"),

@@ -15,7 +15,6 @@ import {
 import { COLOURS, STEEL, rgb } from "./colours.js";
 import { facetMaterial } from "./shading.js";
 
-
 /** A geometry of this colour. */
 export function tinted(geometry, colour) {
   const tints = Array(geometry.attributes.position.count).fill(rgb(colour)).flat();
@@ -72,7 +71,7 @@ export class Workpiece {
   /** The facet with the largest value of a load. */
   highest(name) {
     const values = this.columns[name];
-    return values.indexOf(values.reduce((one, other) => Math.max(one, other)));
+    return values.indexOf(values.reduce((most, value) => Math.max(most, value)));
   }
 
   /** Centre of a facet in the workpiece's own frame, its depth below the surface and its azimuth. */
@@ -112,16 +111,12 @@ function arrow(radius) {
 export function outline({ bowl, surface, workpieces }) {
   const line = (points, color) =>
     new Line(new BufferGeometry().setFromPoints(points), new LineBasicMaterial({ color }));
+  const onSurface = (points) => line(points.map(([x, y]) => new Vector3(x, y, surface)), STEEL);
   const lines = [
     ...bowl.lines.map((points) => line(points.map((point) => new Vector3(...point)), COLOURS.bowl)),
-    ...bowl.surface.map((points) => line(points.map(([x, y]) => new Vector3(x, y, surface)), STEEL)),
-    ...workpieces.map(({ poses }) =>
-      line(
-        poses.map(([x, y]) => new Vector3(x, y, surface)),
-        STEEL,
-      ),
-    ),
+    ...bowl.surface.map(onSurface),
+    ...workpieces.map(({ poses }) => onSurface(poses)),
   ];
-  for (const one of lines) one.frustumCulled = false;
+  for (const drawn of lines) drawn.frustumCulled = false;
   return new Group().add(...lines);
 }

@@ -59,32 +59,34 @@ def folders(tmp_path: Path) -> list[Path]:
 
 
 @pytest.fixture
-def found(tiny_run: Path, folders: list[Path]) -> Validation:
+def validation(tiny_run: Path, folders: list[Path]) -> Validation:
     case = load_case(tiny_run)
     case = changed(case, study=changed(study_of(case), reference=PUBLISHED))
     read = read_plan_runs([folder / MEASURED_FILE for folder in folders], folders[0])
     return validation_of(*read, case, "./run validate")
 
 
-def test_the_mean_is_that_over_the_packings_at_the_reference(found: Validation) -> None:
-    means = {of.name: of.mean for of in found.means}
-    assert (found.runs, found.packings) == (11, 4)
+def test_the_mean_is_that_over_the_packings_at_the_reference(validation: Validation) -> None:
+    means = {of.name: of.mean for of in validation.means}
+    assert (validation.runs, validation.packings) == (11, 4)
     for name in ("drag_mean", "drag_std", "workpiece_contacts"):
         assert means[name].value == pytest.approx(VALUES[name], rel=0.03)
         assert means[name].contains(VALUES[name])
 
 
-def test_the_comparison_has_the_sign_of_more_drag(found: Validation) -> None:
-    experiment, simulation = found.comparison
-    drag = next(of.mean for of in found.means if of.name == "drag_mean")
+def test_the_comparison_has_the_sign_of_more_drag(validation: Validation) -> None:
+    experiment, simulation = validation.comparison
+    drag = next(of.mean for of in validation.means if of.name == "drag_mean")
     assert experiment.difference.value == pytest.approx(drag.value / -2.5 - 1)
     assert simulation.difference.value == pytest.approx(drag.value / -2.0 - 1)
     assert experiment.std_ratio is not None and simulation.std_ratio is None
     assert experiment.std_ratio.value == pytest.approx(VALUES["drag_std"] / 0.5, rel=0.03)
 
 
-def test_effects_are_stated_against_what_they_change(found: Validation) -> None:
-    control, soft, wide = (effect for effect in found.effects if effect.quantity == "drag_mean")
+def test_effects_are_stated_against_what_they_change(validation: Validation) -> None:
+    control, soft, wide = (
+        effect for effect in validation.effects if effect.quantity == "drag_mean"
+    )
     assert (control.timestep_fraction, control.field, control.runs) == (0.2, "", 1)
     assert (soft.youngs_modulus_scale, soft.field, soft.runs) == (1e-3, "", 3)
     assert (wide.field, wide.value, wide.runs) == ("bowl.radius_m", "0.08", 3)
