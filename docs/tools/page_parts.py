@@ -17,15 +17,15 @@ Names are those of ``docs/values.csv``, of ``docs/tables.yaml`` and of `referenc
 """
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import NotRequired, TypedDict
+from typing import Any
 
 import pandas as pd
 import yaml
-from records import ROOT, Join, chosen, pivoted, texts
+from records import ROOT, chosen, pivoted, texts
 from reference import TEXTS, markdown_table
 
 VALUES, TABLES = ROOT / "docs/values.csv", ROOT / "docs/tables.yaml"
@@ -122,35 +122,34 @@ def _value(row: Mapping[str, str]) -> str:
     return shown.pop()
 
 
-class Pivot(TypedDict):
-    """Columns that name a row, and those whose values go side by side."""
-
-    index: list[str]
-    by: list[str]
-
-
-class Recipe(TypedDict):
-    """How a table is made: from which rows, and the format of each column by its heading."""
-
-    record: str | list[str]
-    rows: NotRequired[str]
-    join: NotRequired[Join]
-    pivot: NotRequired[Pivot]
-    columns: dict[str, str]
-
-
-def table_recipes() -> dict[str, Recipe]:
-    """The recipe of each table."""
+def table_recipes() -> dict[str, dict[str, Any]]:
+    """The recipe of each table: the parameters of `made_table`."""
     return yaml.safe_load(TABLES.read_text(encoding="utf-8"))
 
 
-def made_table(recipe: Recipe) -> str:
-    """A table in Markdown from its recipe."""
-    table = chosen(recipe["record"], recipe.get("rows", ""), recipe.get("join"))
-    if "pivot" in recipe:
-        table = pivoted(table, **recipe["pivot"])
-    cells = [texts(table, form) for form in recipe["columns"].values()]
-    return markdown_table(list(recipe["columns"]), list(zip(*cells, strict=True)))
+def made_table(
+    columns: Mapping[str, str],
+    record: str | Sequence[str],
+    rows: str = "",
+    join: Mapping[str, Any] | None = None,
+    pivot: Mapping[str, list[str]] | None = None,
+) -> str:
+    """A table in Markdown.
+
+    Parameters
+    ----------
+    columns : mapping of str to str
+        The format of each column by its heading.
+    record, rows, join
+        As of `records.chosen`.
+    pivot : mapping, optional
+        ``index``: columns that name a row, and ``by``: those whose values go side by side.
+    """
+    table = chosen(record, rows, join)
+    if pivot:
+        table = pivoted(table, **pivot)
+    cells = [texts(table, form) for form in columns.values()]
+    return markdown_table(list(columns), list(zip(*cells, strict=True)))
 
 
 def stale_files() -> Iterator[tuple[Path, str]]:
@@ -161,7 +160,7 @@ def stale_files() -> Iterator[tuple[Path, str]]:
     parts = Parts(
         dict(old[["name", "value"]].to_numpy()),
         dict(new[["name", "value"]].to_numpy()),
-        table=lambda name: made_table(recipes[name]),
+        table=lambda name: made_table(**recipes[name]),
         text=lambda name: TEXTS[name](),
     )
     for page in pages():

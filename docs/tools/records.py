@@ -11,11 +11,11 @@ expression over the columns::
 
 import json
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from string import Formatter
-from typing import Any, TypedDict
+from typing import Any
 
 import pandas as pd
 from pydantic import JsonValue
@@ -28,15 +28,10 @@ ROOT = Path(__file__).resolve().parents[2]
 DATA = ROOT / "docs/data"
 
 RECORDS = {
-    **{
-        name: ROOT / f"workflow/dragdeck/data/{name}.json"
-        for name in ("tradeoff", "stability", "stable_step")
-    },
-    "kept_by_windows": ROOT / "workflow/dragdeck/data/windows.json",
     "quantities": ROOT / "workflow/dragdeck/study/quantities.csv",
+    **{file.stem: file for file in ROOT.glob("workflow/dragdeck/data/*.json")},
     **{
-        f"scaling/{file.stem}": file
-        for file in (ROOT / "analysis/dragchain/scaling/data").glob("*.json")
+        f"scaling/{file.stem}": file for file in ROOT.glob("analysis/dragchain/scaling/data/*.json")
     },
     **{
         str(file.relative_to(DATA).with_suffix("")): file
@@ -94,15 +89,13 @@ def _flat(part: Json) -> dict[str, JsonValue]:
     return pd.json_normalize(dict(part), sep="_").to_dict("records")[0]
 
 
-class Join(TypedDict):
-    """Another record, and the column or columns by which its columns are added."""
+def chosen(
+    records: str | Sequence[str], rows: str = "", join: Mapping[str, Any] | None = None
+) -> pd.DataFrame:
+    """Rows of a record, or of several below each other; ValueError if there is none.
 
-    record: str | list[str]
-    by: str | list[str]
-
-
-def chosen(records: str | Sequence[str], rows: str = "", join: Join | None = None) -> pd.DataFrame:
-    """Rows of a record, or of several below each other; ValueError if there is none."""
+    A join has another ``record``, and the column or columns ``by`` which its columns are added.
+    """
     names = [records] if isinstance(records, str) else records
     table = pd.concat([record_table(name) for name in names], ignore_index=True)
     if join is not None:
