@@ -23,6 +23,7 @@ from worked_examples import EXAMPLES, study_text
 
 from dragchain.cli import PROGRAM as DRAGCHAIN
 from dragdeck.cli import PROGRAM as DRAGDECK
+from dragdeck.command_line import Program
 from dragdeck.script.findings import rules
 from dragdeck.study.fidelity import BUILT_IN_FIDELITIES, Fidelity
 from dragdeck.study.model import Study
@@ -45,12 +46,16 @@ OPTIONAL = re.compile(r"\[-(?:[^][]|\[[^]]*\])*\]")
 """An optional argument in a usage, such as ``[--var NAME [VALUE ...]]``."""
 
 
-def command_sections(parser: argparse.ArgumentParser) -> str:
-    """The commands of a program in a sentence each, and their options, each described once."""
+def command_sections(program: Program) -> str:
+    """The commands of a program in a sentence each, and their options, each described once.
+
+    Steps, which only rules call, are left out.
+    """
     rows: list[list[str]] = []
     arguments: dict[tuple[str, str], list[str]] = {}
-    for command in _commands(parser):
-        name = command.prog.partition(" ")[2]
+    *_, parsers = program.parser()._actions
+    for name in (command.name for command in program.commands):
+        command = parsers.choices[name]
         usage = _cell(" ".join(OPTIONAL.sub("", command.format_usage()).split()[2:]))
         about = re.split(r"\. (?=[A-Z])", command.description or "")[0]
         rows.append([f"`{usage}`", about[:1].upper() + about[1:].removesuffix(".") + "."])
@@ -63,16 +68,6 @@ def command_sections(parser: argparse.ArgumentParser) -> str:
     ]
     table = markdown_table(["command", "effect"], rows)
     return f"{table}\n\n{markdown_table(['option', 'commands', 'meaning'], described)}"
-
-
-def _commands(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
-    for action in parser._actions:
-        if isinstance(action, argparse._SubParsersAction):
-            for name, command in action.choices.items():
-                if name != "step":  # what only rules call
-                    yield from _commands(command)
-            return
-    yield parser
 
 
 def _help(action: argparse.Action) -> str:
@@ -348,8 +343,8 @@ def audit_rules() -> str:
 TEXTS: dict[str, Callable[[], str]] = {
     **{f"fields_{name}": partial(fields().__getitem__, name) for name in fields()},
     "fidelities": fidelities,
-    "dragdeck": lambda: command_sections(DRAGDECK.parser()),
-    "dragchain": lambda: command_sections(DRAGCHAIN.parser()),
+    "dragdeck": lambda: command_sections(DRAGDECK),
+    "dragchain": lambda: command_sections(DRAGCHAIN),
     "columns": columns,
     "bibliography": bibliography,
     "rules": audit_rules,
