@@ -61,6 +61,11 @@ def settled(batch: Batch, name: str, filling: AnyScene) -> Path:
     return batch.folder / name / "tables" / "packing.json"
 
 
+def filled(batch: Batch, case: Case) -> Path:
+    """Settle the bed of a case if it is not there yet; see `settled`."""
+    return settled(batch, FILLING.run_id(case), FILLING.build(case, None))
+
+
 def dragged(batch: Batch, name: str, case: Case) -> Path:
     """Drag through the bed of a case, which is settled first; the folder of the run.
 
@@ -73,9 +78,8 @@ def dragged(batch: Batch, name: str, case: Case) -> Path:
     RejectedRunError
         A check of the run or of its filling did not pass.
     """
-    bed = FILLING.run_id(case)
-    scene = process_scene(case, read_bed(settled(batch, bed, FILLING.build(case, None))))
-    deck = replace(scene.deck, source=f"../{bed}/{PACKING_FILE}")
+    scene = process_scene(case, read_bed(filled(batch, case)))
+    deck = replace(scene.deck, source=f"../{FILLING.run_id(case)}/{PACKING_FILE}")
     batch.result(name, replace(scene, deck=deck))
     write_tables(batch.folder / name)
     say(f"dragged: {name}")

@@ -36,7 +36,7 @@ from dragdeck.study.base import Json
 from dragdeck.study.model import Study
 from dragdeck.sweep.cases import settle_case
 from dragdeck.sweep.design import Design, Settings, Variation
-from evidence.beds import settled
+from evidence.beds import filled
 
 DESIGN = Path(__file__).with_suffix(".yaml")
 
@@ -266,7 +266,7 @@ def time_options(
     own_templates = environment(templates, study_templates(case))
     filling = Batch(folder / "filling", own_templates)
     beds = {
-        run: read_bed(settled(filling, run, FILLING.build(of_bed, None)))
+        run: read_bed(filled(filling, of_bed))
         for run, of_bed in by_run(cases.values(), FILLING).items()
     }
     scenes = {

@@ -14,8 +14,7 @@ from dragdeck.cases.bed import bed_radii, bed_volume, expected_surface
 from dragdeck.cases.case import Case
 from dragdeck.engine.reports import say
 from dragdeck.records.packing import Packing
-from dragdeck.scenes.filling import FILLING
-from evidence.beds import Repeated, batch_here, designed, settled
+from evidence.beds import Repeated, batch_here, designed, filled
 
 DESIGN = Path(__file__).with_suffix(".yaml")
 
@@ -48,8 +47,6 @@ def measure_beds(out: Path) -> None:
     """Make the beds that are missing, and write the record."""
     batch, rows = batch_here("solid_fraction"), []
     for block, case in designed(Beds, DESIGN, "beds"):
-        run = FILLING.run_id(case)
-        bed = Packing.read(settled(batch, run, FILLING.build(case, None)))
-        rows.append(row(block.shape, case, bed))
+        rows.append(row(block.shape, case, Packing.read(filled(batch, case))))
         say(f"{block.shape}: {rows[-1]['solid_fraction']:.3f}")
         pd.DataFrame(rows).to_csv(out, index=False, float_format="%.5g")
