@@ -53,9 +53,9 @@ def test_axe_finds_nothing(
     else:
         window.driver.get((pages / f"{name}.html").as_uri())
     window.run(AXE.read_text(encoding="utf-8"))
-    found = window.driver.execute_async_script(
+    violations = window.driver.execute_async_script(
         "const done = arguments[0]; axe.run(document, {iframes: false}).then(({violations}) => "
-        "done(violations.map(one => [one.id, one.nodes.map(node => node.html)])))"
+        "done(violations.map(rule => [rule.id, rule.nodes.map(node => node.html)])))"
     )
-    assert found == []
+    assert violations == []
     assert window.run("return document.documentElement.scrollWidth") <= width

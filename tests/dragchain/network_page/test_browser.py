@@ -67,7 +67,7 @@ def numbers(text: str) -> list[float]:
     """The numbers of a text."""
     raised = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
     text = text.replace(MINUS, "-").replace(f" {TIMES} 10", "e").translate(raised)
-    return [float(one) for one in re.findall(r"-?\d+(?:\.\d+)?(?:e-?\d+)?", text)]
+    return [float(number) for number in re.findall(r"-?\d+(?:\.\d+)?(?:e-?\d+)?", text)]
 
 
 def four_digits(value: object) -> object:
@@ -120,11 +120,11 @@ def test_a_click_on_a_particle_tells_its_numbers(page: Browser, run: Path) -> No
     forces = contacts["normal_force_n"][
         (contacts[["a_id", "b_id"]] == top["particle_id"]).any(axis=1)
     ]
-    found = chosen(page)
-    assert found["speed"] == four_digits(speed)
-    assert found["diameter"] == four_digits(2 * MEDIA_RADIUS_MM)
-    assert found["contacts"] == forces.size
-    assert found["largest normal force"] == four_digits(forces.max())
+    shown = chosen(page)
+    assert shown["speed"] == four_digits(speed)
+    assert shown["diameter"] == four_digits(2 * MEDIA_RADIUS_MM)
+    assert shown["contacts"] == forces.size
+    assert shown["largest normal force"] == four_digits(forces.max())
 
 
 def test_a_click_on_a_contact_tells_its_forces(page: Browser, run: Path) -> None:
@@ -188,7 +188,7 @@ def test_networks_side_by_side_have_one_scale_unless_each_is_to_have_its_own(
     factors = {"force": 0.5, "largest": 0.5, "speed": 3.0, "mean": 0.5}
     own = [head["scales"], {k: factors.get(k, 1.0) * v for k, v in head["scales"].items()}]
     loads = head["workpieces"][0]["loads"]
-    tops = [{one["name"]: one["top"] for one in loads}]
+    tops = [{load["name"]: load["top"] for load in loads}]
     tops.append({name: 3.0 * top for name, top in tops[0].items()})
     for load in loads:
         load["top"] = tops[1][load["name"]]
@@ -205,15 +205,17 @@ def test_networks_side_by_side_have_one_scale_unless_each_is_to_have_its_own(
     def scales(number: int) -> dict[str, Any]:
         window.driver.switch_to.frame(number)
         window.wait(lambda: window.run("return document.documentElement.dataset.ready"), "a page")
-        found = window.run("return {...networkPage.head.scales, ...networkPage.tops}")
-        found["said"] = window.text("#legend")
+        shown_now = window.run("return {...networkPage.head.scales, ...networkPage.tops}")
+        shown_now["said"] = window.text("#legend")
         window.driver.switch_to.default_content()
-        return dict(found)
+        return dict(shown_now)
 
     def expected(number: int, common: bool) -> dict[str, float]:
-        each = [{**own[k], **tops[k]} for k in range(2)]
-        found = {k: max(one[k] for one in each) for k in each[0]} if common else each[number]
-        return {**found, "mean": own[number]["mean"]}
+        of_pages = [{**own[k], **tops[k]} for k in range(2)]
+        if common:
+            largest = {name: max(of[name] for of in of_pages) for name in of_pages[0]}
+            return {**largest, "mean": own[number]["mean"]}
+        return {**of_pages[number], "mean": own[number]["mean"]}
 
     for common in (True, False, True):
         for number in range(2):

@@ -54,9 +54,9 @@ class Written:
         self.columns = decoded(self.head["columns"], self.element("data"))
 
     def element(self, name: str) -> str:
-        found = re.search(rf'<script [^>]*id="{name}">(.*?)</script>', self.text, re.DOTALL)
-        assert found
-        return found[1]
+        script = re.search(rf'<script [^>]*id="{name}">(.*?)</script>', self.text, re.DOTALL)
+        assert script
+        return script[1]
 
     def part(self, frame: int, name: str, kind: str = "contacts") -> np.ndarray:
         """A column of one frame."""
@@ -101,10 +101,10 @@ def test_columns_keep_what_they_promise(numbers: list[float], ids: list[int]) ->
     columns.add("numbers", "f24", np.array(numbers))
     columns.add("ids", "u32", np.array(ids, dtype=np.int64))
     columns.add("zero", "f24", np.zeros(1))
-    found = decoded(columns.entries, columns.text())
-    np.testing.assert_allclose(found["numbers"], numbers, rtol=1.01 * ROUNDING)
-    assert found["ids"].tolist() == ids
-    assert found["zero"].tolist() == [0.0]
+    read = decoded(columns.entries, columns.text())
+    np.testing.assert_allclose(read["numbers"], numbers, rtol=1.01 * ROUNDING)
+    assert read["ids"].tolist() == ids
+    assert read["zero"].tolist() == [0.0]
 
 
 def test_each_contact_is_that_of_the_table(run: Path, page: Written) -> None:
@@ -245,10 +245,10 @@ def test_loads_of_facets_are_those_of_the_table(run: Path, page: Written) -> Non
 def test_the_page_stands_alone(page: Written) -> None:
     shell = re.sub(r"<script.*?</script>", "", page.text, flags=re.DOTALL)
     assert not re.search(r"@import|url\(|<link|https?:", shell)
-    found = Page(re.sub(r"<input[^>]*>", "", shell))
-    assert found.open == []
-    assert not found.images
-    assert not re.search(r"\b(None|nan|Undefined)\b", found.words)
+    shown = Page(re.sub(r"<input[^>]*>", "", shell))
+    assert shown.open == []
+    assert not shown.images
+    assert not re.search(r"\b(None|nan|Undefined)\b", shown.words)
     assert page.text.count("</script>") == 3
 
 
@@ -289,8 +289,8 @@ def test_times_and_speeds_of_a_faster_run_are_those_of_the_process(
     for name in ("first", "interval", "counted", "window"):
         assert fast.head["curve"][name] == pytest.approx(4 * page.head["curve"][name])
     assert fast.head["times"] == pytest.approx([4 * time for time in page.head["times"]])
-    for one, other in zip(fast.head["peaks"], page.head["peaks"], strict=True):
-        assert one == other | {"time": pytest.approx(4 * other["time"])}
+    for peak, plain in zip(fast.head["peaks"], page.head["peaks"], strict=True):
+        assert peak == plain | {"time": pytest.approx(4 * plain["time"])}
     assert 4 * fast.head["scales"]["speed"] == pytest.approx(page.head["scales"]["speed"])
     speeds = 4 * fast.columns["speed"], page.columns["speed"]
     np.testing.assert_allclose(*speeds, rtol=3 * ROUNDING)

@@ -59,12 +59,12 @@ def test_a_listing_writes_each_column_in_its_form() -> None:
 {{ listing(rows, [("case", "0", {"a & b": "both"}), ("drag (N)", "1.mean", "measured:3")]) }}
 {{ listing(rows[:1], [("case", "0", ""), ("said", "1.said", "verdict"),
                        ("", "1", "estimate:2")]) }}"""
-    found = page_environment().from_string(text).render(rows=rows).replace("\n", "")
-    assert '<th>case</th><th class="n">drag (N)</th>' in found
-    assert '<td>both</td><td class="n">0.250</td>' in found
-    assert f'<td>both</td><td class="n">{DASH}</td>' in found
-    assert '<td>a &amp; b</td><td class="line good">confirmed</td>' in found
-    assert '<td class="n">1.5 <span class="interval">(1.0 to 2.0)</span></td>' in found
+    listed = page_environment().from_string(text).render(rows=rows).replace("\n", "")
+    assert '<th>case</th><th class="n">drag (N)</th>' in listed
+    assert '<td>both</td><td class="n">0.250</td>' in listed
+    assert f'<td>both</td><td class="n">{DASH}</td>' in listed
+    assert '<td>a &amp; b</td><td class="line good">confirmed</td>' in listed
+    assert '<td class="n">1.5 <span class="interval">(1.0 to 2.0)</span></td>' in listed
 
 
 def test_what_is_not_given_is_an_error() -> None:
@@ -123,4 +123,4 @@ def test_no_usual_number_is_shown_with_a_power_of_ten(value: float, digits: int)
 
 
 def test_a_number_that_rounds_up_to_more_digits() -> None:
-    assert [measured(one, 2) for one in (52.0, 99.4, 99.6, 99.96)] == ["52", "99", "100", "100"]
+    assert [measured(value, 2) for value in (52.0, 99.4, 99.6, 99.96)] == ["52", "99", "100", "100"]
