@@ -21,12 +21,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 import yaml
 from records import ROOT, chosen, pivoted, texts
 from reference import TEXTS, markdown_table
+
+from dragdeck.study.base import Json
 
 VALUES, TABLES = ROOT / "docs/values.csv", ROOT / "docs/tables.yaml"
 PLACES = ("*.md", "docs/**/*.md", "studies/**/*.md", "config/*.md")
@@ -122,7 +123,7 @@ def _value(row: Mapping[str, str]) -> str:
     return shown.pop()
 
 
-def table_recipes() -> dict[str, dict[str, Any]]:
+def table_recipes() -> dict[str, Json]:
     """The recipe of each table: the parameters of `made_table`."""
     return yaml.safe_load(TABLES.read_text(encoding="utf-8"))
 
@@ -131,7 +132,7 @@ def made_table(
     columns: Mapping[str, str],
     record: str | Sequence[str],
     rows: str = "",
-    join: Mapping[str, Any] | None = None,
+    join: Mapping[str, str | list[str]] | None = None,
     pivot: Mapping[str, list[str]] | None = None,
 ) -> str:
     """A table in Markdown.

@@ -90,7 +90,7 @@ def _flat(part: Json) -> dict[str, JsonValue]:
 
 
 def chosen(
-    records: str | Sequence[str], rows: str = "", join: Mapping[str, Any] | None = None
+    records: str | Sequence[str], rows: str = "", join: Mapping[str, str | list[str]] | None = None
 ) -> pd.DataFrame:
     """Rows of a record, or of several below each other; ValueError if there is none.
 
