@@ -30,10 +30,10 @@ class Repeated(Variation):
 Block = TypeVar("Block", bound=Repeated)
 
 
-def designed(kind: type[Block], file: Path, name: str) -> Iterator[tuple[Block, Case]]:
+def designed(kind: type[Design[Block]], file: Path, name: str) -> Iterator[tuple[Block, Case]]:
     """The cases of a design, packing by packing of each point, of the study in its file."""
     data: Any = read_yaml(file)
-    for block, values in Design[kind].read(file, name).settings():  # type: ignore[valid-type]
+    for block, values in kind.read(file, name).settings():
         for seed in range(1, block.packings + 1):
             numbered = {**values, "seed": values.get("seed", seed)}
             yield block, settle_case(file, data["study"], numbered)

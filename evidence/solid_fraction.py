@@ -14,6 +14,7 @@ from dragdeck.cases.bed import bed_radii, bed_volume, expected_surface
 from dragdeck.cases.case import Case
 from dragdeck.engine.reports import say
 from dragdeck.records.packing import Packing
+from dragdeck.sweep.design import Design
 from evidence.beds import Repeated, batch_here, designed, filled
 
 DESIGN = Path(__file__).with_suffix(".yaml")
@@ -46,7 +47,7 @@ def row(shape: str, case: Case, bed: Packing) -> dict[str, Any]:
 def measure_beds(out: Path) -> None:
     """Make the beds that are missing, and write the record."""
     batch, rows = batch_here("solid_fraction"), []
-    for block, case in designed(Beds, DESIGN, "beds"):
+    for block, case in designed(Design[Beds], DESIGN, "beds"):
         rows.append(row(block.shape, case, Packing.read(filled(batch, case))))
         say(f"{block.shape}: {rows[-1]['solid_fraction']:.3f}")
         pd.DataFrame(rows).to_csv(out, index=False, float_format="%.5g")

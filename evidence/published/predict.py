@@ -22,6 +22,7 @@ from dragdeck.records.case import load_case
 from dragdeck.records.run import RunRecord
 from dragdeck.scenes.angles import AngleRun, angle_scene
 from dragdeck.scenes.process import PROCESS
+from dragdeck.sweep.design import Design
 from evidence.beds import Repeated, batch_here, designed, dragged
 
 DESIGN = Path(__file__).with_name("design.yaml")
@@ -62,7 +63,7 @@ def predict_published(out_dir: Path) -> None:
     batch, rows = batch_here("published"), []
     out_dir.mkdir(parents=True, exist_ok=True)
     for result in RESULTS:
-        for _, case in designed(Repeated, DESIGN, result):
+        for _, case in designed(Design[Repeated], DESIGN, result):
             measure = _heap if result == "repose" else _drag
             rows.append({"result": result, **measure(batch, case)})
             say(f"{result}: {len(rows)} runs")

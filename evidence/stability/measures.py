@@ -103,7 +103,7 @@ _LAST_SAMPLES = 50
 """Samples at the end of a resting bed's run whose mean energy counts: a quarter of them."""
 
 
-def _measure_settled(run: Run, _: MapPoint) -> PointRow:
+def _measure_settled(run: Run, _point: MapPoint) -> PointRow:
     """A bed that settled, and its largest kinetic energy while it did."""
     *_, last = run.frames("particles")
     return {
@@ -113,7 +113,7 @@ def _measure_settled(run: Run, _: MapPoint) -> PointRow:
     }
 
 
-def _measure_resting(run: Run, _: MapPoint) -> PointRow:
+def _measure_resting(run: Run, _point: MapPoint) -> PointRow:
     """A bed at rest, and its kinetic energy at the end over N m g d.
 
     Its contacts are those before the step under test begins.
@@ -166,7 +166,7 @@ def _resting_energy(row: PointRow, fine: PointRow | None) -> float:
 # --- impacts, met at different moments within a step -------------------------------------------
 
 
-def _measure_impacts(run: Run, _: MapPoint) -> PointRow:
+def _measure_impacts(run: Run, _point: MapPoint) -> PointRow:
     """Mean, smallest and largest of the impacts of a run; speeds are over that of the impact."""
     assert isinstance(run.case, ImpactCase)
     impact = run.case.impact

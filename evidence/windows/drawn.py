@@ -69,7 +69,7 @@ def drawn(
     speed = math.exp(random.uniform(low, high)) * math.sqrt(_SOLID * _GRAVITY * depth * d)
     restitution, friction = random.uniform(0.5, 0.9), random.uniform(0.15, 0.5)
     on_tool = friction * random.uniform(0.6, 1.0)
-    scene = {
+    scene: dict[str, Any] = {
         "title": f"Drawn scene {number}: {name}",
         "materials": {"media": _material(*MATERIALS[name]), "tool": _material(210e9, 0.3, 7800.0)},
         "pairs": {
@@ -101,7 +101,8 @@ def drawn(
         },
         "seed": int(random.integers(1, 10_000)),
     }
-    return _short(scene)
+    short: dict[str, Any] = _short(scene)
+    return short
 
 
 def _material(modulus: float, poisson: float, density: float) -> dict[str, float]:

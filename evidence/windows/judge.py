@@ -29,6 +29,7 @@ from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.lead import with_leads
 from dragdeck.scenes.process import PROCESS
 from dragdeck.study.base import Json
+from dragdeck.sweep.design import Design
 from evidence.beds import Repeated, designed
 
 PLAIN = "-plain"
@@ -75,7 +76,7 @@ def write_pair(name: str, case: Case, fidelity: str, packings: int) -> None:
 def write_kinds(fidelity: str, packings: int) -> str:
     """Write both studies of each kind; return the names."""
     names = []
-    for block, case in designed(Kinds, KINDS, "kinds"):
+    for block, case in designed(Design[Kinds], KINDS, "kinds"):
         names.append(f"kind-{block.kind.replace(' ', '-')}")
         write_pair(names[-1], case, fidelity, packings)
     return "\n".join(names)

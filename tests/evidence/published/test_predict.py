@@ -9,6 +9,7 @@ import pytest
 
 from dragdeck.scenes.angles import AngleRun, angle_scene
 from dragdeck.scenes.process import process_scene
+from dragdeck.sweep.design import Design
 from evidence.beds import Repeated, designed
 from evidence.published.predict import DESIGN, LIFTED, RESULTS, compare, predictions, write_verdicts
 
@@ -112,7 +113,7 @@ def test_a_result_has_the_verdicts_of_its_quantities(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("result", RESULTS)
 def test_the_product_can_run_the_design(result: str) -> None:
-    cases = [case for _, case in designed(Repeated, DESIGN, result)]
+    cases = [case for _, case in designed(Design[Repeated], DESIGN, result)]
     for case in (case for case in cases if case.study.seed == 1):
         if result == "repose":
             run = AngleRun(rig="repose", friction=0.3, rolling_friction=0.1, seed=1)
