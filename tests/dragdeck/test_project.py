@@ -1,10 +1,15 @@
-"""Which files a study is described in."""
+"""Which files a study is described in, and which folders its runs have."""
 
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import pytest
+from made_study import put
+from soft_study import study_with_windows
+
 from dragdeck.project import Project, study_files
+from dragdeck.scenes.process import PROCESS
 from dragdeck.sweep.cases import load_cases
 
 
@@ -27,3 +32,51 @@ def test_files_of_a_study_are_those_of_its_folders_and_its_meshes(
         base,
         base.parent / "templates/process.in.j2",
     ]
+
+
+SETTINGS = {"youngs_modulus_scale": 1e-3, "timestep_fraction": 0.64, "ranks": 1}
+SOFT = {
+    "youngs_modulus_scale": 0.1, "timestep_fraction": 0.5,
+    "soft_start": {"youngs_modulus_scale": 0.01, "timestep_fraction": 0.4},
+}  # fmt: skip
+WINDOWS = study_with_windows()
+SEEDS, SPEED = {"sweep": {"seed": [1, 2]}}, "motion.speed_m_s"
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "same"),
+    [
+        ({}, SEEDS, 1),
+        (SEEDS, {"sweep": {}, "seed": 2}, 1),
+        (SEEDS, {"sweep": {"seed": [3, 2], SPEED: [0.05]}}, 1),
+        (SEEDS, SEEDS, 2),
+        ({"fidelity": "quick"}, {"fidelity": SETTINGS}, 1),
+        ({"fidelity": SOFT}, {"fidelity": SOFT, **SEEDS}, 2),
+        ({}, {"sweep": {"seed": [2, 3]}}, 0),
+        ({}, {"sweep": {"drop_test.impacts": [3, 4]}}, 0),
+        (WINDOWS, WINDOWS | SEEDS, 4),
+    ],
+)
+def test_a_run_is_used_again_whatever_the_sweep_calls_it(
+    project: Project,
+    small: dict[str, Any],
+    write_study: Callable[..., Path],
+    before: dict[str, Any],
+    after: dict[str, Any],
+    same: int,
+) -> None:
+    """Not where several cases have a process of the same content."""
+
+    def folders(changes: dict[str, Any]) -> set[Path]:
+        put(small, {SPEED: 0.05})
+        write_study(small | changes)
+        return set(project.run_folders(project.cases("small"), PROCESS))
+
+    first = folders(before)
+    for folder in first:
+        folder.mkdir(parents=True)
+    second = folders(after)
+    assert len(first & second) == same
+    for folder in second - first:
+        folder.mkdir()
+    assert folders(after) == second

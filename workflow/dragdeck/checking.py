@@ -31,6 +31,7 @@ from dragdeck.records.tradeoff import measured_tradeoff
 from dragdeck.scenes.process import SCENES
 from dragdeck.scenes.scene import SceneType, StudyScene
 from dragdeck.scenes.workpiece import remeshing
+from dragdeck.study.bowls.mesh import MeshBowl
 from dragdeck.study.recorded import recorded_file
 
 
@@ -71,12 +72,14 @@ def _check(study: str, fidelity: str | None, verbose: bool) -> None:
 
 
 def _records(case: Case) -> Iterator[str]:
-    """How the files that a study names are read: measured forces, and a surface meshed anew."""
+    """How the files that a study names are read: measured forces, surfaces and where they are."""
     from dragdeck.study.force_record import in_words
 
     study, file = case.study, case.file
     if deviation := remeshing(case):
         yield f"workpiece.shape: {deviation}"
+    if isinstance(study.bowl, MeshBowl) and study.bowl.aside:
+        yield f"bowl.file: {study.bowl.aside}"
     signal = study.reference.signal if study.reference else None
     if signal:
         record = recorded_file(signal.file, file, "reference.signal.file")

@@ -1,5 +1,6 @@
 """Where things are: the project's folders and the paths of a run."""
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -11,7 +12,7 @@ from dragdeck.cases.case import Case, digest, of_each_workpiece
 from dragdeck.errors import InputError, choices
 from dragdeck.outlook.timestep import check_timestep
 from dragdeck.records.tradeoff import TradeoffRecord
-from dragdeck.scenes.lead import FIRST_WINDOWS, LEAD, WHOLE_DRAG, with_leads
+from dragdeck.scenes.lead import FIRST_WINDOWS, LEAD, WHOLE_DRAG, with_lead, with_leads
 from dragdeck.scenes.process import PROCESS, SCENES
 from dragdeck.scenes.scene import SceneType
 from dragdeck.scenes.workpiece import workpiece_length
@@ -119,7 +120,26 @@ class Project:
                 _check_timesteps(case)
         except InputError as error:
             raise located(error) from None
-        return cases
+        left = self._left(study, cases)
+        return [replace(case, left=left) for case in cases] if left else cases
+
+    def _left(self, study: str, cases: Iterable[Case]) -> dict[str, str]:
+        """Runs by their digests that cases can use although the sweep names them otherwise now.
+
+        Not of a digest that several cases share, or whose run has the case's name already.
+        """
+        results, runs = self.results(study), f"*-{8 * '[0-9a-f]'}"
+        there = {
+            run.name for place in (PROCESS.name, WINDOWS) for run in (results / place).glob(runs)
+        }
+        if not there:
+            return {}
+        parts = (part for case in cases for part in (with_lead(case).lead, case) if part)
+        names = {PROCESS.run_id(part) for part in parts}
+        shared = Counter(name[-8:] for name in names)
+        taken = {tag for tag, count in shared.items() if count > 1}
+        taken |= {name[-8:] for name in names & there}
+        return {name[-8:]: name for name in sorted(there) if name[-8:] not in taken}
 
     def searched(self, study: str) -> Study:
         """A study with a search.

@@ -20,12 +20,14 @@ from dragdeck.outlook.timestep import (
     stable_fraction,
     stable_step_cautions,
     stable_step_note,
+    step_cautions,
+    timestep_notes,
 )
 from dragdeck.physics.contact_mechanics import effective_modulus, rayleigh_time
 from dragdeck.records.stability import RestitutionErrors, StableStepLaw, stable_step_law
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.numbers import describe
-from dragdeck.scenes.process import PROCESS
+from dragdeck.scenes.process import PROCESS, SCENES
 from dragdeck.scenes.workpiece import workpiece_radius
 from dragdeck.study.fidelity import Fidelity
 from dragdeck.sweep.cases import load_cases
@@ -133,12 +135,12 @@ def test_runs_far_beyond_are_refused_and_runs_far_below_pass_without_a_warning(
 
 
 @pytest.mark.parametrize(
-    ("restitution", "fraction", "rests"), [(0.3, 0.25, True), (0.3, 0.5, False), (0.86, 0.5, True)]
+    ("restitution", "fraction", "rests"), [(0.3, 0.25, True), (0.3, 0.5, False), (0.86, 0.45, True)]
 )
 def test_a_filling_that_may_never_rest_is_told(
     made: Made, restitution: float, fraction: float, rests: bool
 ) -> None:
-    """Three of the recorded fillings, about: docs/data/stability/settling.csv."""
+    """Recorded fillings, about: docs/data/stability/settling.csv."""
     fields = {"pairs.ceramic-ceramic.restitution": restitution}
     step = "fidelities.quick.filling_timestep_fraction"
     cautions = list(settling_cautions(made({**fields, step: fraction})))
@@ -159,3 +161,20 @@ def test_damping_softness_and_equal_radii_shorten_the_stable_step() -> None:
 
 def test_the_stable_step_of_a_case_depends_on_its_own_modulus() -> None:
     assert stable_fraction(paper(1e-4, 0.5)) < stable_fraction(paper(1e-2, 0.5))
+
+
+@pytest.mark.parametrize("kind", SCENES)
+@pytest.mark.parametrize("fraction", [0.01, 0.3, 0.5, 1.0])
+def test_a_step_above_what_is_safe_is_always_warned_of(
+    made: Made, kind: str, fraction: float
+) -> None:
+    """As the verdict of the notes says; of a drag, the note on the stable step."""
+    block = {"drop_test": "drop_test.", "filling": "fidelities.quick.filling_"}
+    field = block.get(kind, "fidelities.quick.")
+    scene, case = SCENES[kind], made({f"{field}timestep_fraction": fraction})
+    cautions = list(step_cautions(case, scene))
+    notes = dict(timestep_notes(case, scene, scene.build(case, None)))
+    if scene.needs_bed:
+        assert bool(cautions) >= ("NOT BELOW" in stable_step_note(case)[1])
+    else:
+        assert len(cautions) == ("ABOVE" in notes["safe step"])

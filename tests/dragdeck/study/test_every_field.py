@@ -144,3 +144,26 @@ def test_a_doubt_about_a_value_hides_no_contradiction(small: dict[str, Any]) -> 
     """Above 2 m a transient is unusual, and here longer than the path."""
     message = said(small, Place("motion.transient_m", "number", {}), 100)
     assert "motion.transient_m: no path is left for the statistics" in message
+
+
+@pytest.mark.parametrize(
+    ("field", "entries"),
+    [
+        ("fidelity", {"tolerance": 0.1, "quantity": ["drag_mean", "drag_mean"]}),
+        ("fidelity", {"youngs_modulus_scale": 0.1, "windows": {
+            "tolerance": 0.1, "quantities": ["drag_mean", "drag_std", "drag_mean"]}}),
+        ("sweep.seed", [1, 2, 1.0]),
+        ("sweep.workpiece", [{"material": "steel"}, {"material": "steel"}]),
+        ("assumptions", 2 * [{"field": "seed", "why": "any"}]),
+        ("reference", {"source": "any", "signal": {
+            "file": "any.csv", "low_pass_hz": 1, "column": ["fx_n", "fx_n"]}}),
+        ("reference", {"source": "any", "signal": {
+            "file": "any.csv", "low_pass_hz": 1, "column": "fx_n", "rest_s": [[0, 1], [0, 1.0]]}}),
+        ("search", {"vary": {"seed": [1, 2]}, "objective": {"quantity": "drag_mean"},
+                    "limits": 2 * [{"quantity": "drag_mean", "at_most": 5}]}),
+    ],
+)  # fmt: skip
+def test_an_entry_that_is_given_twice_is_refused(
+    small: dict[str, Any], field: str, entries: Any
+) -> None:
+    assert "is given twice: remove one" in said(small, Place(field, "", {}), entries)

@@ -27,6 +27,7 @@ from dragdeck.project import Project
 from dragdeck.scenes.bed_space import first_particles
 from dragdeck.scenes.filling import FILLING, filling_scene
 from dragdeck.scenes.process import PROCESS, process_scene
+from dragdeck.study.bowls.mesh import MeshBowl
 from dragdeck.study.model import Study
 
 AREA = 3 * 0.06**2 / (2 * math.sqrt(3))
@@ -112,6 +113,22 @@ def test_the_volume_is_that_of_the_body() -> None:
     assert inside.volume_m3(0.06) == pytest.approx(frustum + AREA * 0.045, rel=2e-3)
     assert inside.volume_m3(0.06) < whole
     assert inside.height_m(inside.volume_m3(0.03)) == pytest.approx(0.03, rel=1e-3)
+
+
+@pytest.mark.parametrize("corners", [hexagon(0.06, 0.06), ring(), trough(0.08, 0.05, 0.04)])
+@pytest.mark.parametrize("at", [(0.0, 0.0), (0.012, 0.0), (-0.013, 0.005), (1e-5, 0.0)])
+def test_where_a_bowl_stands_off_its_axis_is_said(
+    corners: np.ndarray, at: tuple[float, float]
+) -> None:
+    moved = corners + np.array([*at, 0.0])
+    if len(corners) == len(ring()):
+        moved = corners + np.array([*at, 0.0]) / 4  # the axis stays within the column
+    bowl = MeshBowl(kind="mesh", material="steel", height_m=float(corners[:, :, 2].max()),
+                    facets_m=moved.reshape(-1, 9).tolist())  # fmt: skip
+    places = moved[:, :, :2].reshape(-1, 2)
+    x, y = np.round(500 * (places.max(axis=0) + places.min(axis=0)), 1) + 0.0
+    said = f"x = {x:g}, y = {y:g} mm" if max(map(abs, at)) > 1e-3 else ""
+    assert said in bowl.aside and bool(said) is bool(bowl.aside)
 
 
 def test_a_bowl_around_a_column() -> None:

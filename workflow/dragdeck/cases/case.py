@@ -4,7 +4,7 @@ import hashlib
 import json
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -69,6 +69,8 @@ class Case:
         Of a window: when it is run, from 1; otherwise 0.
     machine : Study or None
         What `study` is a cut-out of.
+    left : mapping
+        Of runs that the study's sweep called otherwise before: digest to run id.
     """
 
     file: Path
@@ -84,6 +86,7 @@ class Case:
     part: str = ""
     rank_of_window: int = 0
     machine: Study | None = None
+    left: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def written(self) -> Study:

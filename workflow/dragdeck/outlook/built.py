@@ -66,6 +66,5 @@ def built_scene(kind: SceneType, case: Case, bed: Bed | None) -> StudyScene:
     except InputError as error:
         error.file = error.file or case.file
         raise located(error) from None
-    step = timesteps.stable_step_cautions if kind.needs_bed else timesteps.settling_cautions
-    more = () if kind.single_particle else step(case)
+    more = timesteps.step_cautions(case, kind)
     return replace(scene, warnings=[*warnings(case.study), *scene.warnings, *more])

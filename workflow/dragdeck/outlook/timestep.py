@@ -172,6 +172,8 @@ def timestep_notes(case: Case, kind: SceneType, scene: StudyScene) -> list[tuple
     )
     if kind.needs_bed:
         text += "; of a drag, the stable step decides"
+    elif not kind.single_particle:
+        text += f"; of a filling, {100 * settling_limit(case):.3g} % decides, by its restitution"
     return [*pairs, ("safe step", text)]
 
 
@@ -221,20 +223,41 @@ def _contacts(study: Study, pressure_pa: float) -> tuple[float, float, float]:
     return kappa, restitution, spread
 
 
-def settling_cautions(case: Case) -> Iterator[Caution]:
-    """A caution if the step of the filling keeps particles moving, with one that does not.
+def settling_limit(case: Case) -> float:
+    """Largest step of a case's filling over the Rayleigh time that gives no warning.
 
     Fillings with a forecast stability number above 1 under the weight of the bed may never come to
-    rest (measured: docs/evidence/stability.md).
+    rest (measured: docs/evidence/stability.md). That forecast knows the damping; beyond it, the
+    largest step of the map counts, of weak damping.
     """
-    step, study = case.study.chosen_fidelity().filling_timestep_fraction, case.study.at_filling()
-    limit = stable_step_law().largest_fraction(*_contacts(study, beds.floor_pressure(study)))
+    study = case.study.at_filling()
+    forecast = stable_step_law().largest_fraction(*_contacts(study, beds.floor_pressure(study)))
+    return min(forecast, largest_fraction("settle", 1.0))
+
+
+def settling_cautions(case: Case) -> Iterator[Caution]:
+    """A caution if the step of the filling may keep particles moving, with one that does not."""
+    step, limit = case.study.chosen_fidelity().filling_timestep_fraction, settling_limit(case)
     if step > limit * (1 + 1e-9):
         yield Caution(
             "stable_timestep",
             f"the filling's step of {100 * step:.2g} % of the Rayleigh time is above "
-            f"{100 * limit:.2g} %: damped contacts may keep particles from coming to rest",
+            f"{100 * limit:.2g} %: contacts may keep particles from coming to rest",
             {"filling_timestep_fraction": rounded(limit, up=False)},
+        )
+
+
+def step_cautions(case: Case, kind: SceneType) -> Iterator[Caution]:
+    """A caution if the step of a scene may be too long: of a drop test, what no setting changes."""
+    if not kind.single_particle:
+        yield from stable_step_cautions(case) if kind.needs_bed else settling_cautions(case)
+        return
+    step, limit = case.study.drop_test.timestep_fraction, largest_of_case(case, kind)
+    if step > limit * (1 + 1e-9):
+        yield Caution(
+            "stable_timestep",
+            f"drop_test.timestep_fraction is {step:.2g}; above {limit:.2g}, the restitution may be "
+            "wrong: use a smaller one",
         )
 
 

@@ -118,7 +118,8 @@ class SceneType:
         All workpieces share a run; what is made for each but the first is named by its number.
         """
         whole = case.all_workpieces
-        full_name = f"{slug(self.slug(whole))[:_LONGEST_SLUG]}-{digest(self.content(whole))}"
+        tag = digest(self.content(whole))
+        full_name = whole.left.get(tag) or f"{slug(self.slug(whole))[:_LONGEST_SLUG]}-{tag}"
         return f"{full_name}.{case.number}" if self.needs_bed and case.number > 1 else full_name
 
     def digest(self, case: Case) -> str:
@@ -133,6 +134,7 @@ class SceneType:
             values = without_fields(study.plain(), *_NOT_SAID)
             said |= {
                 **values,
+                "case": case.name,
                 "asked": asked,
                 "assumptions": [assumption.model_dump() for assumption in assumed(study)],
             }

@@ -1,10 +1,12 @@
 """What the models of a study file share: numbers as YAML writes them, and plain values."""
 
 import re
-from collections.abc import Mapping
-from typing import Annotated, Any
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, TypeVar
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, JsonValue
+
+V = TypeVar("V", bound=Sequence[Any])
 
 Json = Mapping[str, JsonValue]
 """Plain data, as JSON has it."""
@@ -75,6 +77,18 @@ def _whole(value: object) -> object:
         return int(number)
     return number
 
+
+def _distinct(values: V) -> V:
+    """Refuse an entry that stands in a list twice, however it is written."""
+    for number, value in enumerate(values):
+        if value in values[:number]:
+            shown = value.plain() if isinstance(value, Model) else value
+            raise ValueError(f"{shown} is given twice: remove one")
+    return values
+
+
+Distinct = AfterValidator(_distinct)
+"""Of a list in which no entry may stand twice."""
 
 Number = Annotated[float, BeforeValidator(_number), Field(allow_inf_nan=False)]
 Positive = Annotated[Number, Field(gt=0)]

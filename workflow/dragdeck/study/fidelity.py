@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, Self
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from dragdeck.parts import omitted
-from dragdeck.study.base import Model, Number, Positive, Whole
+from dragdeck.study.base import Distinct, Model, Number, Positive, Whole
 from dragdeck.study.quantities import QUANTITIES
 
 Ranks = Annotated[
@@ -36,7 +36,9 @@ class Windows(Model):
 
     tolerance: Annotated[Number, Field(ge=1e-4, lt=1)]
     """relative half-width of the 95 % confidence interval at which no further window is run"""
-    quantities: Annotated[list[Quantity], Field(min_length=1)] = Field(default=["drag_mean"])
+    quantities: Annotated[list[Quantity], Distinct, Field(min_length=1)] = Field(
+        default=["drag_mean"]
+    )
     """quantities to which the tolerance applies"""
     most: Annotated[Whole, Field(ge=2, le=64)] = 16
     """largest number of windows"""
@@ -134,7 +136,7 @@ class Tolerance(Model):
     """relative half-width of the 95 % confidence interval at the physical Young's modulus"""
     quantity: Annotated[
         Annotated[Quantity, Tag("a-name")]
-        | Annotated[list[Quantity], Field(min_length=1, max_length=8), Tag("a-list")],
+        | Annotated[list[Quantity], Distinct, Field(min_length=1, max_length=8), Tag("a-list")],
         Discriminator(lambda value: "a-list" if isinstance(value, list) else "a-name"),
     ] = "drag_mean"
     """quantity, or list of up to eight, to which the tolerance applies"""

@@ -11,6 +11,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from dragdeck.parts import omitted
 from dragdeck.study.base import (
+    Distinct,
     Json,
     Line,
     MaterialName,
@@ -195,11 +196,11 @@ class Study(Model):
     fidelities: dict[Name, Fidelity] = Field(default_factory=dict)
     seed: Annotated[Whole, Field(ge=0, lt=2**32)] = 1
     """random seed of the initial positions and velocities; one seed is one packing"""
-    sweep: dict[str, list[Any]] = Field(default_factory=dict)
+    sweep: dict[str, Annotated[list[Any], Distinct]] = Field(default_factory=dict)
     """dotted field name: list of values; every combination is a case"""
     scaling: Scaling | None = None
     accepted: Accepted = Accepted()
-    assumptions: list[Assumption] = Field(default_factory=list)
+    assumptions: Annotated[list[Assumption], Distinct] = Field(default_factory=list)
     reference: Reference | None = None
     removal: Removal | None = omitted(None)
     roughness: Roughness | None = omitted(None)

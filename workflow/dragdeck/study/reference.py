@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from dragdeck.parts import omitted
-from dragdeck.study.base import Line, Model, NonNegative, Number, Positive
+from dragdeck.study.base import Distinct, Line, Model, NonNegative, Number, Positive
 
 
 class Drag(Model):
@@ -29,7 +29,7 @@ class Signal(Model):
     """CSV file of force against time, <= 64 MB"""
     column: Annotated[
         Annotated[Line, Tag("a-name")]
-        | Annotated[list[Line], Field(min_length=2, max_length=3), Tag("a-list")],
+        | Annotated[list[Line], Distinct, Field(min_length=2, max_length=3), Tag("a-list")],
         Discriminator(lambda value: "a-list" if isinstance(value, list) else "a-name"),
     ]
     """name of the force column, which ends in `_n`, `_mn` or `_kn`; or a list of those along x, y
@@ -50,7 +50,7 @@ class Signal(Model):
     """axis of the force: along the motion, to its left, or upwards"""
     sign: Literal[1, -1] = 1
     """1: force on the workpiece along this axis; -1: resistance"""
-    rest_s: Annotated[tuple[Span, ...], Field(max_length=2)] = ()
+    rest_s: Annotated[tuple[Span, ...], Distinct, Field(max_length=2)] = ()
     """stretches without load, s: one for the offset, two for a drift too"""
     starts_at_s: Number | None = None
     """start of the drag, s; none: found after the first stretch of `rest_s`"""

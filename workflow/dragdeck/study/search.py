@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 
 from dragdeck.documents import Document
 from dragdeck.parts import Part
-from dragdeck.study.base import Model, Name, Number, Whole
+from dragdeck.study.base import Distinct, Model, Name, Number, Whole
 from dragdeck.study.quantities import QUANTITIES
 
 RECORD = Path("search/points.json")
@@ -126,7 +126,7 @@ class Search(Model):
     vary: dict[str, tuple[Number, Number]] = Field(min_length=1, max_length=8)
     """dotted field name: its lowest and highest value, in the unit of the field"""
     objective: Objective
-    limits: list[SearchLimit] = Field(default_factory=list)
+    limits: Annotated[list[SearchLimit], Distinct] = Field(default_factory=list)
     """limits on quantities"""
     runs: Annotated[Whole, Field(ge=4, le=200)] = 20
     """number of settings tried before the confirmation"""

@@ -26,6 +26,9 @@ _LEVELS = 60
 _SAME = 1e-3
 """Relative difference between the height of the mesh and that of the study."""
 
+_ASIDE = 0.01
+"""Distance of the middle from the axis that is mentioned, over the root of the opening's area."""
+
 _AROUND = 720
 """Points of an outline."""
 
@@ -126,6 +129,20 @@ class MeshBowl(Bowl):
     @property
     def _corners(self) -> Floats:
         return _inside(self.facets_m).corners_m
+
+    @property
+    def aside(self) -> str:
+        """Where the middle of its opening is, if not on the axis; otherwise empty."""
+        corners = self._corners
+        rim = facets.cut(corners, corners[:, :, 2].max() * (1 - 1e-6))
+        middle = facets.centroid(rim)
+        if np.linalg.norm(middle) < _ASIDE * math.sqrt(facets.area(rim)):
+            return ""
+        x, y = np.round(1e3 * middle, 1) + 0.0
+        return (
+            f"the middle of its opening is at x = {x:g}, y = {y:g} mm; paths and "
+            "rotations are about x = y = 0: if that is not meant, move it there in the file"
+        )
 
     @property
     def own_facet_size_m(self) -> float:
