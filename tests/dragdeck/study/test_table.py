@@ -118,6 +118,18 @@ EXPORTS: dict[str, tuple[str | bytes, str]] = {
     "no unit asked for": (
         "Time;Fx;Fy\ns;N;N\n" + ROWS.replace("\t", ";").replace("\n", ";1\n"), "Fx",
     ),
+    "LibreOffice, decimal commas in quotes": ("time_s,fx_n\n" + "".join(
+        f'"{time}","{force}"\n'.replace(".", ",") for time, force in zip(TIME, FORCE, strict=True)
+    ), "fx_n"),
+    "pandas": (",time_s,fx_n\n" + "".join(
+        f"{row},{time},{force}\n" for row, (time, force) in enumerate(zip(TIME, FORCE, strict=True))
+    ), "fx_n"),
+    "MTS": ("Axial test\nTime\tAxial Force\tStrain\nSec\tN\tmm/mm\n"
+            + ROWS.replace("\n", "\t1\n"), "Axial Force"),
+    "words for units": ("Time (seconds)\tForce x (Newton)\n" + ROWS, "Force x"),
+    "units that nobody asks for": (
+        "Time;Fx;M;U\ns;N;N.m;Volt\n" + ROWS.replace("\t", ";").replace("\n", ";1;2\n"), "Fx"),
+    "units at the end of names": ("Zeit_s\tKraft_N\n" + ROWS, "Kraft"),
     "UTF-16": (("time_s\tfx_n\n" + ROWS).encode("utf-16"), "fx_n"),
     "Latin-1": (("Prüfstand 3\ntime_s\tfx_n\n" + ROWS).encode("latin-1"), "fx_n"),
     "old line ends": (("time_s\tfx_n\n" + ROWS).replace("\n", "\r"), "fx_n"),
@@ -190,7 +202,8 @@ def test_no_digit_is_ever_lost(
 
 HEAD = "time_s,fx_n\n"
 REFUSED: dict[str, tuple[str | bytes, dict[str, Any], int | None, str]] = {
-    "decimal comma in quotes": (HEAD + '0,"1,5"\n', {}, 2, "'1,5' is text, not a number"),
+    "thousands in quotes": (HEAD + '0,"1,234"\n', {}, 2, "thousands"),
+    "both marks in quotes": (HEAD + '0.5,"1,5"\n', {}, 2, "line 2 has a decimal point"),
     "a nameless column": ("fx_n,\n-0,060\n", {"rate_hz": 200}, 2, "decimal comma"),
     "one number or two": ("fx_n\n-1,5\n0,42\n", {"rate_hz": 200}, 2, "decimal comma"),
     "two units": ("time_s;fx_n\nms;N\n0;1\n1;2\n", {}, 1, "has two units"),

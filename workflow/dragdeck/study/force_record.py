@@ -1,6 +1,7 @@
 """Measured forces over time as CSV files, of drop tests and of a process."""
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -152,7 +153,10 @@ def _unit(table: Table, column: str, units: Mapping[str, float]) -> tuple[str, f
     for end, unit in units.items():
         if name.endswith(end):
             return name, unit
-    known = [(f"{name}{end}", unit) for end, unit in units.items() if f"{name}{end}" in table.names]
+    plain = re.sub(r"\s+", "_", name)
+    known = [
+        (f"{plain}{end}", unit) for end, unit in units.items() if f"{plain}{end}" in table.names
+    ]
     if len(known) == 1:
         return known[0]
     limit = f"a name that ends in {', '.join(units)}"

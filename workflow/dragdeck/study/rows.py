@@ -191,7 +191,8 @@ class _Rows:
         cells = [read[order.index(place)] for place in self._places]
         lines = np.arange(line, line + len(cells[0]))
         settled = self._marks.keys() - ({","} if self._grouped else {})
-        if table.separator != "," and any(mark in text for mark in {*".,"} - settled):
+        unsure = table.separator != "," or '"' in text
+        if unsure and any(mark in text for mark in {*".,"} - settled):
             self._note(lines, [column.to_pylist() for column in cells])
         return self._plain(lines, cells)
 
@@ -270,8 +271,6 @@ class _Rows:
 
     def _note(self, lines: Ints, columns: Sequence[Sequence[str | None]]) -> None:
         """Note the decimal marks in cells; there is one in the whole table."""
-        if self.table.separator == ",":
-            return
         for mark in ".,":
             marked = [(int(lines[row]), cell) for cells in columns
                       for row, cell in enumerate(cells) if cell and mark in cell]  # fmt: skip

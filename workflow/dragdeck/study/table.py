@@ -19,19 +19,12 @@ from dragdeck.study.rows import BLANK, LINE, Table, cells_of, is_number, is_row,
 _MOST_BYTES = 64_000_000
 
 _UNITS = {
-    "s": "s", "sec": "s", "ms": "ms", "us": "us", "\u00b5s": "us", "\u03bcs": "us",
-    "N": "n", "mN": "mn", "kN": "kn", "m": "m", "mm": "mm", "kg": "kg", "g": "g",
+    "s": "s", "sec": "s", "Sec": "s", "seconds": "s", "ms": "ms",
+    "us": "us", "\u00b5s": "us", "\u03bcs": "us", "N": "n", "Newton": "n", "mN": "mn", "kN": "kn", "m": "m", "mm": "mm", "kg": "kg", "g": "g",
     "um": "um", "\u00b5m": "um", "\u03bcm": "um",
     "deg": "deg", "\u00b0": "deg", "rad": "rad",
 }  # fmt: skip
 """Units as programs write them, and as names of columns end with them."""
-
-_OTHER_UNITS = {
-    *("-", "%", "Nm", "Nmm", "kNm", "N/m", "V", "mV", "A", "mA", "W", "kW", "Hz", "kHz", "rpm"),
-    *("1/min", "U/min", "min", "h", "cm", "mm/s", "mm/min"),
-    *("m/s", "m/min", "m/s2", "m/s\u00b2", "bar", "Pa", "kPa", "MPa", "\u00b0C", "K", "J", ""),
-}  # fmt: skip
-"""Units of columns that no reader wants, in a line of units."""
 
 _BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]")
 _BEHIND = re.compile(r"(.*\S)\s*(?:/|,|\sin)\s*(\S+)")
@@ -42,6 +35,9 @@ _TIMES = ("time", "t", "zeit", "temps", _LABVIEW_TIME)
 
 _COMMENT = "comment"
 """The last column of LabVIEW, which its rows do not have."""
+
+_COUNTED = ["0", "1", "2"], ["1", "2", "3"]
+"""How pandas, Excel and others begin a column without a name, of the numbers of rows."""
 
 _LONGEST_HEAD = 1000
 """Lines within which the names of columns stand."""
@@ -93,6 +89,8 @@ def user_table(file: Path, most: int | None = None) -> Table:
         first = _cells(rows[0], separator) if rows else names
         if names[0].lower() == _LABVIEW_TIME and not first[0]:
             names[0] = ""  # its file has no times
+        elif not names[0] and [_cells(row, separator)[0] for row in rows[:3]] in _COUNTED:
+            names[0] = "row"
         units = without_ends(units, len(names))
         named = tuple(column_name(*column) for column in zip_longest(names, units, fillvalue=""))
     except csv.Error as error:
@@ -187,10 +185,11 @@ def column_name(name: str, unit: str = "") -> str:
         units.add(bracketed[2])
     if base == _LABVIEW_TIME and units == {""}:
         units.add("s")
-    base = "time" if base in _TIMES else base
-    end = base.rpartition("_")[2]
-    if end in _UNITS.values():
+    stem, _, end = base.rpartition("_")
+    if stem and end in _UNITS.values():
         units.add(end)
+        base = stem
+    base = "time" if base in _TIMES else base
     known = {_UNITS.get(text, text) for text in units if text}
     if not known & {*_UNITS.values()}:
         return name.strip().lower()
@@ -198,7 +197,7 @@ def column_name(name: str, unit: str = "") -> str:
         raise InputError(
             "a column has two units", field=name, value=" and ".join(sorted(known)), limit="one"
         )
-    return base if end in known else f"{base}_{known.pop()}"
+    return f"{base}_{known.pop()}"
 
 
 def _labview_units(texts: Sequence[str], head: Sequence[int]) -> list[str]:
@@ -235,7 +234,7 @@ def _head(texts: Sequence[str], used: Sequence[int]) -> tuple[int, bool]:
     usual = max(Counter(filter(None, widths)).items(), key=lambda item: item[1], default=(0, 0))[0]
     numeric = [bool(width) and width == usual for width in widths]
     first = next((k for k in range(len(used)) if all(numeric[k : k + 2])), 0)
-    units = first > 1 and _is_units(texts[used[first - 1]])
+    units = first > 1 and _is_units(*(texts[n] for n in used[first - 2 : first]))
     names = first - 1 - units
     if names > 0 and any(map(is_number, _cells(texts[used[names]]))):
         return 0, False
@@ -256,11 +255,11 @@ def _width(text: str) -> int:
     return len(cells) if all(is_number(cell) or not cell for cell in cells) else 0
 
 
-def _is_units(text: str) -> bool:
-    units = {cell.strip("[]() ") for cell in _cells(text)}
-    bracketed = all(re.fullmatch(r"[\[(].*[\])]|", cell) for cell in _cells(text))
-    known = units <= _UNITS.keys() | _OTHER_UNITS
-    return (known or bracketed) and not _UNITS.keys().isdisjoint(units)
+def _is_units(names: str, text: str) -> bool:
+    """Whether a unit that is known, and no number, stands below as many names."""
+    cells = [cell.strip("[]() ") for cell in _cells(text)]
+    numeric = any(map(is_number, cells))
+    return not numeric and len(cells) == len(_cells(names)) and not _UNITS.keys().isdisjoint(cells)
 
 
 def _text(file: Path) -> str:
