@@ -292,10 +292,11 @@ def test_an_inclined_rod_has_the_diameter_of_its_study(process: Path, tmp_path: 
 
 @pytest.fixture
 def packings(process: Path) -> list[Path]:
-    """Three runs that differ in their seeds alone, and one of another case."""
+    """Three runs that differ in their seeds and MPI ranks alone, and one of another case."""
     found = []
     for seed, drag in enumerate((-2.4, -2.5, -2.9), 1):
         case = case_json("process", f"run-{seed}", {"seed": seed}, case=f"draft_seed-{seed}")
+        case["fidelity"]["ranks"] = seed
         found.append(make_run(process.parents[2], case, process_findings(), PICTURES, drag))
     other = case_json("process", "run-9", {"media.count": 900}, case="other")
     return [*found, make_run(process.parents[2], other, process_findings(), PICTURES, -1.0)]

@@ -130,3 +130,12 @@ def test_templates_of_the_nearest_study_are_used(extend: Callable[..., Path]) ->
     assert study_templates(case) == case.file.parent / "templates"
     (middle.parent / "templates").mkdir()
     assert study_templates(case) == middle.parent / "templates"
+
+
+@pytest.mark.parametrize("block", ["sweep", "outputs", "contact", "assumptions", "removal"])
+def test_a_block_whose_lines_are_all_comments_is_not_there(
+    extend: Callable[..., Path], small: dict[str, Any], block: str
+) -> None:
+    file = extend(f"extends: small\n{block}:\n#  some: thing\n")
+    assert read_study(file) == small
+    assert len(load_cases(file)) == 1

@@ -56,13 +56,16 @@ def test_what_is_no_profile_is_refused(
 
 
 @pytest.mark.parametrize(
-    ("header", "x", "z"), [("x_mm,z_um", 1e3, 1e6), ("X [mm];Z [\u00b5m]", 1e3, 1e6)]
+    ("header", "x", "z"),
+    [("x_mm,z_um", 1e3, 1e6), ("X [mm];Z [\u00b5m]", 1e3, 1e6), (",x_cm,z_mm", 1e2, 1e3)],
 )
 def test_a_profile_may_have_other_units(
     header: str, x: float, z: float, small: dict[str, Any], write_study: Write
 ) -> None:
     mark = ";" if ";" in header else ","
     rows = [f"{x * 1e-6 * place:.6g}{mark}{z * height:.9g}" for place, height in enumerate(HEIGHTS)]
+    if not header.split(mark)[0]:
+        rows = [f"{number},{row}" for number, row in enumerate(rows)]
     small |= {"removal": REMOVAL, "roughness": {"profile": "profile.csv"}}
     file = write_study(small)
     file.with_name("profile.csv").write_text("\n".join([header, *rows]) + "\n")

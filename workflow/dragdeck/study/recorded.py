@@ -18,7 +18,7 @@ from dragdeck.study.base import Json
 from dragdeck.study.media import MOST_SIEVES, Sieve
 from dragdeck.study.paths.waypoints import MOST_POINTS, Waypoint
 from dragdeck.study.roughness import MOST_HEIGHTS, Height
-from dragdeck.study.table import user_table
+from dragdeck.study.table import ROW, user_table
 from dragdeck.study.workpiece import MeshShape
 from dragdeck.study.yaml import located, mesh_beside, study_folders
 
@@ -151,7 +151,8 @@ def _read(
     Of too long a file, no more is read than shows that it is.
     """
     columns, optional, table = row._fields, tuple(row._field_defaults), user_table(file, most)
-    header, scales = zip(*map(_in_si, table.names), strict=True)
+    names = [name for name in table.names if name != ROW]
+    header, scales = zip(*map(_in_si, names), strict=True)
     needed = columns[: len(columns) - len(optional)]
     if not set(needed) <= set(header) <= set(columns) or len(set(header)) < len(header):
         limit = ",".join(needed) + (f", optionally {', '.join(optional)}" if optional else "")
@@ -160,7 +161,7 @@ def _read(
         value = ",".join(table.names)[:200] if is_table else None
         line = table.header_line
         raise InputError(problem, file=file, line=line, value=value, limit=limit)
-    lines, numbers = table.numbers(table.names)
+    lines, numbers = table.numbers(names)
     scaled = map(np.multiply, scales, numbers)
     values, zero = dict(zip(header, scaled, strict=True)), np.zeros(len(lines))
     points = np.transpose([values.get(name, zero) for name in columns]).tolist()
@@ -173,7 +174,9 @@ def _read(
     return rows
 
 
-_SMALLER = {"mm": ("m", 1e-3), "um": ("m", 1e-6), "ms": ("s", 1e-3), "us": ("s", 1e-6)}
+_SMALLER = {
+    "cm": ("m", 1e-2), "mm": ("m", 1e-3), "um": ("m", 1e-6), "ms": ("s", 1e-3), "us": ("s", 1e-6),
+}  # fmt: skip
 """Units of columns, with that in which a study has them and its multiple."""
 
 

@@ -19,8 +19,9 @@ from dragdeck.study.rows import BLANK, LINE, Table, cells_of, is_number, is_row,
 _MOST_BYTES = 64_000_000
 
 _UNITS = {
-    "s": "s", "sec": "s", "Sec": "s", "seconds": "s", "ms": "ms",
-    "us": "us", "\u00b5s": "us", "\u03bcs": "us", "N": "n", "Newton": "n", "mN": "mn", "kN": "kn", "m": "m", "mm": "mm", "kg": "kg", "g": "g",
+    "s": "s", "sec": "s", "Sec": "s", "seconds": "s", "ms": "ms", "us": "us",
+    "\u00b5s": "us", "\u03bcs": "us", "N": "n", "Newton": "n", "mN": "mn", "kN": "kn",
+    "m": "m", "cm": "cm", "mm": "mm", "kg": "kg", "g": "g",
     "um": "um", "\u00b5m": "um", "\u03bcm": "um",
     "deg": "deg", "\u00b0": "deg", "rad": "rad",
 }  # fmt: skip
@@ -35,6 +36,9 @@ _TIMES = ("time", "t", "zeit", "temps", _LABVIEW_TIME)
 
 _COMMENT = "comment"
 """The last column of LabVIEW, which its rows do not have."""
+
+ROW = "row"
+"""Name that a first column without one gets if it counts the rows."""
 
 _COUNTED = ["0", "1", "2"], ["1", "2", "3"]
 """How pandas, Excel and others begin a column without a name, of the numbers of rows."""
@@ -90,7 +94,7 @@ def user_table(file: Path, most: int | None = None) -> Table:
         if names[0].lower() == _LABVIEW_TIME and not first[0]:
             names[0] = ""  # its file has no times
         elif not names[0] and [_cells(row, separator)[0] for row in rows[:3]] in _COUNTED:
-            names[0] = "row"
+            names[0] = ROW
         units = without_ends(units, len(names))
         named = tuple(column_name(*column) for column in zip_longest(names, units, fillvalue=""))
     except csv.Error as error:

@@ -132,6 +132,8 @@ def _studies_nearby(file: Path) -> str:
 def read_study(file: Path) -> dict[str, JsonValue]:
     """Read a study as plain data, with all that it takes from the studies it extends.
 
+    A block whose lines are all comments is not there.
+
     Raises
     ------
     InputError
@@ -141,7 +143,7 @@ def read_study(file: Path) -> dict[str, JsonValue]:
     for _, content in reversed(lineage(file)):
         data = _merged(data, content)
     data.pop("extends", None)
-    return data
+    return {key: value for key, value in data.items() if value is not None}
 
 
 def lineage(file: Path) -> list[tuple[Path, Json]]:
