@@ -112,13 +112,14 @@ class _Findings:
             self.errors.append(error)
             raise
         more = (*friction_unknown(used_templates), *used_templates["script_findings"])
+        cases = dict.fromkeys(other.name for other in runs.values())
         for text in (*map(str, scene.warnings), *more):
-            self.warnings.setdefault(text, {})[case.name] = None
+            self.warnings.setdefault(text, {}).update(cases)
         notes = [reduced(case), not_corrected(case)] if kind.needs_bed else []
         notes.append(changed_in_words(used_templates["changed_scripts"]))
         notes.append(forecasts.ways_in_words(case, measured_tradeoff()) if kind.needs_bed else "")
         for text in filter(None, notes):
-            self.reduced.setdefault(text, {})[case.name] = None
+            self.reduced.setdefault(text, {}).update(cases)
         lines = [f"time step: {scene.deck.timestep_s:.3g} s, about {scene.steps:,} steps"]
         lines += [f"{what}: {text}" for what, text in _expectations(case, kind, scene)]
         names = dict.fromkeys(f"{kind.name} {folder.name}" for folder in runs)

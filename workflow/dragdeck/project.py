@@ -344,9 +344,9 @@ def project_here() -> Project:
 
 
 def study_templates(case: Case) -> Path:
-    """A study's own templates, or those of the nearest study it extends; there need be none."""
+    """A study's own templates, or those of the nearest study it extends that has any."""
     folders = [folder / "templates" for folder in study_folders(case.file)]
-    return next((folder for folder in folders if folder.is_dir()), folders[0])
+    return next((folder for folder in folders if any(folder.glob("[!.]*"))), folders[0])
 
 
 def study_files(cases: Iterable[Case]) -> list[Path]:

@@ -128,7 +128,10 @@ def test_templates_of_the_nearest_study_are_used(extend: Callable[..., Path]) ->
     middle = extend("extends: small\n", "middle")
     (case,) = load_cases(extend("extends: middle\n"))
     assert study_templates(case) == case.file.parent / "templates"
-    (middle.parent / "templates").mkdir()
+    for place in (case.file, middle):
+        (place.parent / "templates").mkdir()
+        (place.parent / "templates/.gitkeep").touch()
+    (middle.parent / "templates/process.in.j2").touch()
     assert study_templates(case) == middle.parent / "templates"
 
 

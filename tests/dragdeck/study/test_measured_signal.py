@@ -115,6 +115,7 @@ def halted(time: Floats) -> Floats:
 
 WRONG: dict[str, tuple[Callable[[Floats], str], dict[str, Any], str, str]] = {
     "no unit": (lambda f: text(f, header="time_s,fx"), {"column": "fx"}, "columns", "no unit"),
+    "a column twice": (lambda f: text(f), {"column": ["fx", "Fx [N]"]}, "columns", "named twice"),
     "time stands still": (lambda f: text(f, halted(TIME)), {}, "time", "lines 501 and 502"),
     "time runs backwards": (lambda f: text(f, TIME[::-1]), {}, "time", "lines 2 and 3"),
     "clipped": (lambda f: text(clipped(f)), {}, "clipped", "wider range"),

@@ -62,6 +62,14 @@ def test_a_point_does_not_change_the_values_of_the_next(small: dict[str, Any]) -
     assert [pair.friction for pair in frictions] == [0.5, 0.3]
 
 
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_field_counts_beside_its_block_in_any_order(load: Load, order: int) -> None:
+    block = {"kind": "circle", "radius_m": 0.008, "revolutions": 0.2}
+    sweep = {"motion.path": [block], "motion.path.radius_m": [0.009]}
+    (case,) = load({"sweep": dict([*sweep.items()][::order])})
+    assert case.study.motion.path.radius_m == 0.009
+
+
 def test_many_cases_need_a_confirmation(small: dict[str, Any], load: Load) -> None:
     small["sweep"] = {"seed": list(range(201))}
     assert len(load({"accepted": {"cases": 201}})) == 201

@@ -241,8 +241,8 @@ def settling_cautions(case: Case) -> Iterator[Caution]:
     if step > limit * (1 + 1e-9):
         yield Caution(
             "stable_timestep",
-            f"the filling's step of {100 * step:.2g} % of the Rayleigh time is above "
-            f"{100 * limit:.2g} %: contacts may keep particles from coming to rest",
+            f"the filling's step of {100 * step:g} % of the Rayleigh time is above "
+            f"{rounded(100 * limit, up=False):g} %: contacts may keep particles moving for ever",
             {"filling_timestep_fraction": rounded(limit, up=False)},
         )
 
@@ -256,7 +256,7 @@ def step_cautions(case: Case, kind: SceneType) -> Iterator[Caution]:
     if step > limit * (1 + 1e-9):
         yield Caution(
             "stable_timestep",
-            f"drop_test.timestep_fraction is {step:.2g}; above {limit:.2g}, the restitution may be "
+            f"drop_test.timestep_fraction is {step:g}; above {limit:.2g}, the restitution may be "
             "wrong: use a smaller one",
         )
 

@@ -56,8 +56,8 @@ def _overlap_caution(study: Study) -> Iterator[Caution]:
     remedy = f"use a fidelity.youngs_modulus_scale of at least {stiffer:g}"
     yield Caution(
         "overlap",
-        f"the weight of the packing makes particles at the floor overlap by {100 * overlap:.2g} % "
-        f"of a diameter, more than {100 * MOST_OVERLAP:g} %: "
+        "the weight of the packing makes particles at the floor overlap by "
+        f"{rounded(100 * overlap, up=True):g} % of a diameter, more than {100 * MOST_OVERLAP:g} %: "
         + (f"the packing is too dense; {remedy}" if scale < 1 else "too much for Hertz's theory"),
         {"youngs_modulus_scale": stiffer} if scale < 1 else {},
     )
@@ -154,15 +154,16 @@ def _size_cautions(study: Study) -> Iterator[Caution]:
         part, ratio, partner = min(held)
         yield Caution(
             "size_ratio",
-            f"diameters differ by a factor of {ratio:.3g}; above {part * ratio:.3g}, friction can "
-            f"hold a small particle between a large one and {partner}, where the integration of "
-            "LIGGGHTS squeezes it in as it rolls (docs/development/liggghts.md): leave out the "
-            "fines, or compare with a run at a quarter of the fidelity.timestep_fraction",
+            f"diameters differ by a factor of {rounded(ratio, up=True):g}; above "
+            f"{rounded(part * ratio, up=False):g}, friction can hold a small particle between a "
+            f"large one and {partner}, where the integration of LIGGGHTS squeezes it in as it "
+            "rolls (docs/development/liggghts.md): leave out the fines, or compare with a run at "
+            "a quarter of the fidelity.timestep_fraction",
         )
     elif size_pairs and (widest := max(ratio for _, ratio, _ in size_pairs)) > _WIDEST:
         yield Caution(
             "size_ratio",
-            f"diameters differ by a factor of {widest:.3g}: above {_WIDEST:g}, nothing was "
-            "measured (docs/development/liggghts.md); leave out the fines, or compare with a run "
-            "at a quarter of the fidelity.timestep_fraction",
+            f"diameters differ by a factor of {rounded(widest, up=True):g}: above {_WIDEST:g}, "
+            "nothing was measured (docs/development/liggghts.md); leave out the fines, or compare "
+            "with a run at a quarter of the fidelity.timestep_fraction",
         )

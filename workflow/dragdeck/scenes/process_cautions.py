@@ -114,8 +114,8 @@ def process_cautions(case: Case) -> Iterator[Caution]:
     if gap < JAMMING_GAP:
         yield Caution(
             "gap",
-            f"the gap between workpiece and bowl is {gap:.2g} particle diameters, less than "
-            f"{JAMMING_GAP:g}: particles may jam there and cause very large forces",
+            f"the gap between workpiece and bowl is {rounded(gap, up=False):g} particle diameters, "
+            f"less than {JAMMING_GAP:g}: particles may jam there and cause very large forces",
         )
     yield from _little_room(case)
     fidelity = study.chosen_fidelity()
@@ -126,8 +126,8 @@ def process_cautions(case: Case) -> Iterator[Caution]:
         shorter = fidelity.timestep_fraction * steps / _FEWEST_STEPS_PER_CONTACT
         yield Caution(
             "steps_per_contact",
-            f"a contact at the workpiece's speed takes {steps:.1f} steps, fewer than "
-            f"{_FEWEST_STEPS_PER_CONTACT}: single impacts are not resolved; use a smaller "
+            f"a contact at the workpiece's speed takes {rounded(steps, up=False):g} steps, fewer "
+            f"than {_FEWEST_STEPS_PER_CONTACT}: single impacts are not resolved; use a smaller "
             "fidelity.timestep_fraction",
             {"timestep_fraction": rounded(shorter, up=False)},
         )

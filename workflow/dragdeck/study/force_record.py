@@ -139,6 +139,9 @@ def in_words(file: Path, signal: Signal | None = None) -> str:
 def _units(table: Table, columns: Sequence[str], angle: str | None) -> dict[str, float]:
     """Names of columns of forces, and of one of an angle at last, with their units in N or rad."""
     units = dict(_unit(table, name, FORCE_UNITS) for name in columns)
+    if len(units) < len(columns):
+        value, limit = ", ".join(columns), "columns that differ in more than how they are written"
+        raise RecordError("columns", "a column is named twice", value=value, limit=limit)
     if angle is not None:
         units |= [_unit(table, angle, ANGLE_UNITS)]
     return units

@@ -168,8 +168,8 @@ def settle_case(
         nothing measured can resolve, or where only settings can be used.
     """
     combined = copy.deepcopy(dict(data))
-    for field, value in values.items():
-        _set(combined, field, copy.deepcopy(value), named_in or file)
+    for field in sorted(values, key=lambda name: name.count(".")):  # a block before its fields
+        _set(combined, field, copy.deepcopy(values[field]), named_in or file)
     study = validate(combined, named_in or file)
     case = Case(file, values if shown is None else shown, study)
     if study.reduction is not None:
