@@ -128,18 +128,12 @@ class Project:
 
         Not of a digest that several cases share, or whose run has the case's name already.
         """
-        results, runs = self.results(study), f"*-{8 * '[0-9a-f]'}"
-        there = {
-            run.name for place in (PROCESS.name, WINDOWS) for run in (results / place).glob(runs)
-        }
-        if not there:
-            return {}
-        parts = (part for case in cases for part in (with_lead(case).lead, case) if part)
-        names = {PROCESS.run_id(part) for part in parts}
-        shared = Counter(name[-8:] for name in names)
-        taken = {tag for tag, count in shared.items() if count > 1}
-        taken |= {name[-8:] for name in names & there}
-        return {name[-8:]: name for name in sorted(there) if name[-8:] not in taken}
+        places = [self.results(study) / place for place in (PROCESS.name, WINDOWS)]
+        there = {run.name for place in places for run in place.glob(f"*-{8 * '[0-9a-f]'}")}
+        parts = (part for case in cases for part in (with_lead(case).lead, case) if part and there)
+        own = {PROCESS.run_id(part) for part in parts}
+        used = Counter(name[-8:] for name in (*own, *(own & there)))
+        return {name[-8:]: name for name in sorted(there) if used[name[-8:]] < 2}
 
     def searched(self, study: str) -> Study:
         """A study with a search.
@@ -316,12 +310,9 @@ def find_project(start: Path) -> Project:
     for folder in (start, *start.parents):
         if (folder / "studies").is_dir():
             return Project(folder)
-    raise InputError(
-        "not inside a dragdeck project",
-        file=start,
-        limit="a folder with studies/",
-        remedy="change into the project's folder, or make one: dragdeck init FOLDER",
-    )
+    remedy = "change into the project's folder, or make one: dragdeck init FOLDER"
+    limit = "a folder with studies/"
+    raise InputError("not inside a dragdeck project", file=start, limit=limit, remedy=remedy)
 
 
 def project_here() -> Project:
@@ -334,12 +325,9 @@ def project_here() -> Project:
     """
     project = find_project(Path.cwd())
     if project.root != Path.cwd():
-        raise InputError(
-            "Snakemake does not work in the project's own folder",
-            file=Path.cwd(),
-            limit=str(project.root),
-            remedy=f"change into it, or add --directory {project.root}",
-        )
+        problem = "Snakemake does not work in the project's own folder"
+        remedy = f"change into it, or add --directory {project.root}"
+        raise InputError(problem, file=Path.cwd(), limit=str(project.root), remedy=remedy)
     return project
 
 

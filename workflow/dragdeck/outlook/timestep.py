@@ -309,9 +309,7 @@ def check_timestep(case: Case, block: str = "fidelity") -> None:
         raise InputError(
             f"the contacts are not stable at this time step with E x "
             f"{chosen.youngs_modulus_scale:g}",
-            file=case.file,
-            field=f"{block}.timestep_fraction",
-            value=chosen.timestep_fraction,
+            file=case.file, field=f"{block}.timestep_fraction", value=chosen.timestep_fraction,
             limit=f"{stable:g} of the Rayleigh time (docs/evidence/stability.md)",
             remedy="choose a smaller one, or give a reason in accepted.unsafe_timestep",
-        )
+        )  # fmt: skip

@@ -120,13 +120,6 @@ def area(lines_m: Floats) -> float:
     return abs(float((ax * by - ay * bx).sum())) / 2
 
 
-def centroid(lines_m: Floats) -> Floats:
-    """Centre of the area within closed lines of segments, (S, 2, 2): x and y, m."""
-    (ax, ay), (bx, by) = lines_m.transpose(1, 2, 0)
-    doubled = ax * by - ay * bx
-    return np.asarray(doubled @ lines_m.sum(axis=1) / (3 * doubled.sum()))
-
-
 def outlines(lines_m: Floats, count: int) -> list[Floats]:
     """Closed lines of segments, (S, 2, 2), each as so many points, (count, 2); longest first.
 

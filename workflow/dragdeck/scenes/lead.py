@@ -138,14 +138,13 @@ def _too_short(case: Case) -> InputError:
     before, sample = _before_s(study) * speed, _sample_s(study) * speed
     least = max(before, study.motion.uncounted_m) + _FEWEST * sample
     return InputError(
-        f"the path is too short for {_FEWEST} windows",
-        file=case.file,
+        f"the path is too short for {_FEWEST} windows", file=case.file,
         field=f"motion.path.{study.motion.path.length_field}",
         value=f"{1e3 * study.motion.path_length_m:.4g} mm of path",
         limit=f"at least {1e3 * least:.4g} mm: a window needs {1e3 * before:.3g} mm to raise the "
         f"moduli and to settle, and {1e3 * sample:.3g} mm to sample",
         remedy="use a longer path, or fidelity: {youngs_modulus_scale: 1}",
-    )
+    )  # fmt: skip
 
 
 def window_count(study: Study) -> int:

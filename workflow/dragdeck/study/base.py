@@ -1,12 +1,10 @@
 """What the models of a study file share: numbers as YAML writes them, and plain values."""
 
 import re
-from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, TypeVar
+from collections.abc import Mapping
+from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, JsonValue
-
-V = TypeVar("V", bound=Sequence[Any])
 
 Json = Mapping[str, JsonValue]
 """Plain data, as JSON has it."""
@@ -78,12 +76,10 @@ def _whole(value: object) -> object:
     return number
 
 
-def _distinct(values: V) -> V:
+def _distinct(values: Any) -> Any:
     """Refuse an entry that stands in a list twice, however it is written."""
-    for number, value in enumerate(values):
-        if value in values[:number]:
-            shown = value.plain() if isinstance(value, Model) else value
-            raise ValueError(f"{shown} is given twice: remove one")
+    if twice := [value for place, value in enumerate(values) if value in values[:place]]:
+        raise ValueError(f"{twice[0]} is given twice: remove one")
     return values
 
 

@@ -36,9 +36,7 @@ class Windows(Model):
 
     tolerance: Annotated[Number, Field(ge=1e-4, lt=1)]
     """relative half-width of the 95 % confidence interval at which no further window is run"""
-    quantities: Annotated[list[Quantity], Distinct, Field(min_length=1)] = Field(
-        default=["drag_mean"]
-    )
+    quantities: Annotated[list[Quantity], Distinct] = Field(default=["drag_mean"], min_length=1)
     """quantities to which the tolerance applies"""
     most: Annotated[Whole, Field(ge=2, le=64)] = 16
     """largest number of windows"""

@@ -1,7 +1,6 @@
 """Measured forces over time as CSV files, of drop tests and of a process."""
 
 import math
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -140,8 +139,7 @@ def _units(table: Table, columns: Sequence[str], angle: str | None) -> dict[str,
     """Names of columns of forces, and of one of an angle at last, with their units in N or rad."""
     units = dict(_unit(table, name, FORCE_UNITS) for name in columns)
     if len(units) < len(columns):
-        value, limit = ", ".join(columns), "columns that differ in more than how they are written"
-        raise RecordError("columns", "a column is named twice", value=value, limit=limit)
+        raise RecordError("columns", "a column is named twice", value=", ".join(columns))
     if angle is not None:
         units |= [_unit(table, angle, ANGLE_UNITS)]
     return units
@@ -156,10 +154,7 @@ def _unit(table: Table, column: str, units: Mapping[str, float]) -> tuple[str, f
     for end, unit in units.items():
         if name.endswith(end):
             return name, unit
-    plain = re.sub(r"\s+", "_", name)
-    known = [
-        (f"{plain}{end}", unit) for end, unit in units.items() if f"{plain}{end}" in table.names
-    ]
+    known = [(f"{name}{end}", unit) for end, unit in units.items() if f"{name}{end}" in table.names]
     if len(known) == 1:
         return known[0]
     limit = f"a name that ends in {', '.join(units)}"
@@ -177,13 +172,10 @@ def _column(table: Table, known: Mapping[str, float]) -> str:
         names, remedy = table.names, "name the columns in the first line, such as time_s,force_n"
         quoted = {*names} & {*TIME_COLUMNS, *FORCE_COLUMNS, *known}
         raise InputError(
-            f"{len(columns) or 'no'} column(s) with a recognised name",
-            file=table.file,
-            line=table.header_line,
-            value=", ".join(names)[:200] if quoted else None,
-            limit=f"one of {', '.join(known)}",
-            remedy=remedy,
-        )
+            f"{len(columns) or 'no'} column(s) with a recognised name", file=table.file,
+            line=table.header_line, value=", ".join(names)[:200] if quoted else None,
+            limit=f"one of {', '.join(known)}", remedy=remedy,
+        )  # fmt: skip
     return columns[0]
 
 
@@ -216,11 +208,10 @@ def check_samples(time_s: Floats, force_n: Floats, lines: Ints | None = None) ->
     bad = np.flatnonzero(~(np.isfinite(time_s) & np.isfinite(force_n)))
     if len(bad):
         raise RecordError(
-            "numbers",
-            "a sample is not a finite number",
+            "numbers", "a sample is not a finite number",
             value=f"{len(bad)} samples, the first is {word} {places[bad[0]]}",
             remedy="remove these samples, or record again",
-        )
+        )  # fmt: skip
     even, interval = even_times(time_s, lines)
     rest = force_n - np.polyval(quiet_line(even, force_n), even)
     if -float(rest.min()) > float(rest.max()):
@@ -245,24 +236,20 @@ def even_times(time_s: Floats, lines: Ints | None) -> tuple[Floats, float]:
         row = int(back[0])
         verb = "stands still" if time_s[row + 1] == time_s[row] else "runs backwards"
         times = f"{time_s[row]:.9g} s then {time_s[row + 1]:.9g} s"
-        raise RecordError(
-            "time",
-            f"time {verb}",
-            value=f"{times}, {word}s {places[row]} and {places[row + 1]}",
-            remedy="export a single trigger, with enough decimals in the time",
-        )
+        value = f"{times}, {word}s {places[row]} and {places[row + 1]}"
+        remedy = "export a single trigger, with enough decimals in the time"
+        raise RecordError("time", f"time {verb}", value=value, remedy=remedy)
     interval = float((time_s[-1] - time_s[0]) / (len(time_s) - 1))
     even = time_s[0] + interval * np.arange(len(time_s))
     off = np.abs(time_s - even)
     if float(off.max()) > JITTER * interval:
         row = int(np.argmax(off))
         raise RecordError(
-            "uneven",
-            "the sampling interval is not constant",
+            "uneven", "the sampling interval is not constant",
             value=f"{word} {places[row]} is {off[row] / interval:.2g} intervals off",
             limit=f"{JITTER:g} intervals of {interval:.3g} s",
             remedy="export every sample at the sampling rate of the sensor",
-        )
+        )  # fmt: skip
     return even, interval
 
 

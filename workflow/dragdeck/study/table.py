@@ -196,7 +196,7 @@ def column_name(name: str, unit: str = "") -> str:
     base = "time" if base in _TIMES else base
     known = {_UNITS.get(text, text) for text in units if text}
     if not known & {*_UNITS.values()}:
-        return name.strip().lower()
+        return re.sub(r"\s+", "_", name.strip().lower())
     if len(known) > 1:
         raise InputError(
             "a column has two units", field=name, value=" and ".join(sorted(known)), limit="one"

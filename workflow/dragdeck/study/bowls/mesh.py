@@ -26,8 +26,8 @@ _LEVELS = 60
 _SAME = 1e-3
 """Relative difference between the height of the mesh and that of the study."""
 
-_ASIDE = 0.01
-"""Distance of the middle from the axis that is mentioned, over the root of the opening's area."""
+_ASIDE = 0.003
+"""Distance of the middle from the axis that is mentioned, over the length of the rim."""
 
 _AROUND = 720
 """Points of an outline."""
@@ -133,16 +133,13 @@ class MeshBowl(Bowl):
     @property
     def aside(self) -> str:
         """Where the middle of its opening is, if not on the axis; otherwise empty."""
-        corners = self._corners
-        rim = facets.cut(corners, corners[:, :, 2].max() * (1 - 1e-6))
-        middle = facets.centroid(rim)
-        if np.linalg.norm(middle) < _ASIDE * math.sqrt(facets.area(rim)):
+        rim = facets.cut(self._corners, self._corners[:, :, 2].max() * (1 - 1e-6))
+        lengths = np.linalg.norm(rim[:, 1] - rim[:, 0], axis=1)
+        x, y = np.round(1e3 * np.average(rim.mean(axis=1), axis=0, weights=lengths), 1) + 0.0
+        if 1e-3 * math.hypot(x, y) < _ASIDE * lengths.sum():
             return ""
-        x, y = np.round(1e3 * middle, 1) + 0.0
-        return (
-            f"the middle of its opening is at x = {x:g}, y = {y:g} mm; paths and "
-            "rotations are about x = y = 0: if that is not meant, move it there in the file"
-        )
+        said = f"the middle of its opening is at x = {x:g}, y = {y:g} mm; paths and rotations are"
+        return f"{said} about x = y = 0: if that is not meant, move it there in the file"
 
     @property
     def own_facet_size_m(self) -> float:
