@@ -101,7 +101,16 @@ def synthetic_record(drops: Drops, sensor: Sensor, seed: int) -> str:
     return "\n".join([*head, *(f"{t:.{stamps}f},{f:.{digits}f}" for t, f in samples)]) + "\n"
 
 
-def make_record(folder: Path, out: Path, seed: int, **sensor: float) -> None:
+def make_record(
+    folder: Path,
+    out: Path,
+    seed: int,
+    rate_hz: float,
+    noise_n: float,
+    offset_n: float,
+    drift_n_per_s: float,
+    resolution_n: float,
+) -> None:
     """Run a drop of the study ``droptest`` in a folder, and write its record.
 
     Parameters
@@ -110,11 +119,12 @@ def make_record(folder: Path, out: Path, seed: int, **sensor: float) -> None:
         Of the drop, and the CSV file.
     seed : int
         Of the drop and of the noise.
-    **sensor
-        Fields of `Sensor`.
+    rate_hz, noise_n, offset_n, drift_n_per_s, resolution_n : float
+        As of `Sensor`.
     """
     project = project_here()
     case = project.cases("droptest")[0]
     batch = Batch(folder, environment(project.templates, study_templates(case)))
     drops = run_drops(case, [drop_of(case, seed)], batch, say)
-    out.write_text(synthetic_record(drops, Sensor(**sensor), seed), encoding="utf-8")
+    sensor = Sensor(rate_hz, noise_n, offset_n, drift_n_per_s, resolution_n)
+    out.write_text(synthetic_record(drops, sensor, seed), encoding="utf-8")

@@ -131,8 +131,8 @@ class Project:
         places = [self.results(study) / place for place in (PROCESS.name, WINDOWS)]
         there = {run.name for place in places for run in place.glob(f"*-{8 * '[0-9a-f]'}")}
         parts = (part for case in cases for part in (with_lead(case).lead, case) if part and there)
-        own = {PROCESS.run_id(part) for part in parts}
-        used = Counter(name[-8:] for name in (*own, *(own & there)))
+        names = {PROCESS.run_id(part) for part in parts}
+        used = Counter(name[-8:] for name in (*names, *(names & there)))
         return {name[-8:]: name for name in sorted(there) if used[name[-8:]] < 2}
 
     def searched(self, study: str) -> Study:
