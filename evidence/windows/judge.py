@@ -142,8 +142,9 @@ def _rows(project: Project, study: str) -> Iterator[dict[str, Any]]:
             for run in plain
             if run.number == case.number
         ]
+        values = result.values or RunQuantities.read(folder / MEASURED_FILE).values_of_run
         for name in result.tolerance.asked:
-            value, (mean, error) = result.values[name], _reference(beside, name)
+            value, (mean, error) = values[name], _reference(beside, name)
             soft = _estimate(folder, name)
             yield {
                 "study": study,

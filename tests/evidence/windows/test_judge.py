@@ -32,9 +32,10 @@ def test_each_kind_can_be_run_with_a_tolerance_and_plain(kinds: Project, kind: s
     assert asked.study.model_dump(exclude=scene) == plain[0].study.model_dump(exclude=scene)
 
 
+@pytest.mark.parametrize("of_windows", [True, False])
 @pytest.mark.parametrize(("value", "reached", "covered"), [(-2.1, True, True), (-3.0, True, False)])
 def test_errors_are_those_against_the_plain_runs(
-    kinds: Project, value: float, reached: bool, covered: bool
+    kinds: Project, value: float, reached: bool, covered: bool, of_windows: bool
 ) -> None:
     (asked,) = kinds.cases("kind-circle")
     asked_for = Reached(tolerance=0.2, asked=("drag_mean",), reached=True, needed=Need(3, 1),
@@ -42,9 +43,12 @@ def test_errors_are_those_against_the_plain_runs(
     drag = Estimate.around(value, 0.15 * abs(value))
     folder = kinds.run_folder(asked, PROCESS)
     (folder / EXTRAPOLATED).parent.mkdir(parents=True)
-    Extrapolated(values={"drag_mean": drag}, tolerance=asked_for).write(folder / EXTRAPOLATED)
+    values = {"drag_mean": drag}
+    result = Extrapolated(values=values if of_windows else {}, tolerance=asked_for)
+    result.write(folder / EXTRAPOLATED)
     process_scene(asked).case.write(folder / "case.json")
-    made_run(0, 1.0, 7).write(folder / MEASURED_FILE)
+    run = made_run(0, 1.0, 7).model_copy(update={"values_of_run": {} if of_windows else values})
+    run.write(folder / MEASURED_FILE)
     for seed, case in enumerate(kinds.cases("kind-circle-plain")):
         folder = kinds.run_folder(case, PROCESS)
         (folder / MEASURED_FILE).parent.mkdir(parents=True)
