@@ -9,6 +9,7 @@ from made_study import put
 from soft_study import study_with_windows
 
 from dragdeck.project import Project, study_files
+from dragdeck.scenes.lead import FIRST_WINDOWS, whole_drag, windows_of
 from dragdeck.scenes.process import PROCESS
 from dragdeck.sweep.cases import load_cases
 
@@ -80,3 +81,20 @@ def test_a_run_is_used_again_whatever_the_sweep_calls_it(
     for folder in second - first:
         folder.mkdir()
     assert folders(after) == second
+
+
+def test_windows_are_not_expected_beside_the_whole_drag(
+    project: Project, small: dict[str, Any], write_study: Callable[..., Path]
+) -> None:
+    windows = {"tolerance": 0.1, "quantities": ["drag_mean"], "most": 6}
+    small["fidelity"] = {"youngs_modulus_scale": 0.01, "ranks": 1, "windows": windows}
+    small["motion"]["path"]["revolutions"] = 1
+    write_study(small)
+    cases = project.cases("small")
+    (drag,) = whole_drag(cases[0])
+    assert len(project.run_folders(cases, PROCESS)) == 1 + FIRST_WINDOWS
+    begun = project.run_folder(windows_of(cases[0])[0], PROCESS)
+    for folder in (begun, project.run_folder(drag, PROCESS)):
+        folder.mkdir(parents=True)
+    expected = {project.run_folder(run, PROCESS) for run in (cases[0], drag)} | {begun}
+    assert {*project.run_folders(cases, PROCESS)} == expected
