@@ -88,18 +88,18 @@ def judge_tolerances(out: Path, studies: Sequence[str]) -> None:
     Parameters
     ----------
     out : Path
-        CSV file; beside it, NAME_summary.csv has what `summary` makes of it.
+        CSV file; beside it, NAME_summary.csv has what `promises_of` makes of it.
     studies : sequence of str
         Those with a tolerance; the plain runs of NAME are of the study NAME-plain.
     """
     project = project_here()
     table = pd.DataFrame([row for study in studies for row in _rows(project, study)])
     table.to_csv(out, index=False, float_format="%.5g")
-    of_all = summary(table)
+    of_all = promises_of(table)
     of_all.to_csv(out.with_name(f"{out.stem}_summary.csv"), index=False, float_format="%.5g")
 
 
-def summary(table: pd.DataFrame) -> pd.DataFrame:
+def promises_of(table: pd.DataFrame) -> pd.DataFrame:
     """Of each quantity, and of all: promises, how many were kept, and how far values are off.
 
     A tolerance that was reached is a promise, which is kept if the error is within it. By chance
