@@ -23,7 +23,7 @@ import pandas as pd
 from dragchain.quantities.document import MEASURED_FILE, RunQuantities
 from dragchain.report.coarse_grained import coarse_grained, mean_of_runs
 from dragchain.run.case import upstream_folders
-from dragchain.statistics.estimate import Estimate, flattened
+from dragchain.statistics.estimate import NOT_KNOWN, Estimate, flattened
 from dragchain.tables.by_step import read_table
 from dragdeck.records.case import load_case
 from dragdeck.records.run import RunRecord
@@ -32,7 +32,6 @@ from dragdeck.study.paths.path import AroundBowl
 QUANTITIES = {"drag_n": "drag_mean", "contacts": "workpiece_contacts",
               "contact_force_n": "contact_force_mean", "load_n": "normal_load",
               "sliding_load_n_m_per_m": "force_slide", "vertical_n": "vertical_mean"}  # fmt: skip
-UNKNOWN = Estimate(math.nan, math.nan, math.nan)
 
 _NEAR_M, _BINS = 0.02, 8
 """Surface beside the path to either side, m, and its bins."""
@@ -56,7 +55,7 @@ def main(out: Path, *results: Path) -> None:
             for line in coarse_grained(of_scene):
                 if line.value is not None:
                     row = {**vars(line), "scene": scene, "study": machine}
-                    row["at_true_size"] = line.at_true_size or UNKNOWN
+                    row["at_true_size"] = line.at_true_size or NOT_KNOWN
                     lines.append(flattened(row))
     table = pd.DataFrame(rows)
     whole = table[table["scene"] == "whole"].sort_values("factor").drop_duplicates("study")
@@ -102,7 +101,7 @@ def _row(
     study: str, scene: str, factor: float, folders: Sequence[Path], runs: dict[Path, RunQuantities]
 ) -> dict[str, object]:
     of_scene = [runs[folder] for folder in folders]
-    values = {name: mean_of_runs(of_scene, key) or UNKNOWN for name, key in QUANTITIES.items()}
+    values = {name: mean_of_runs(of_scene, key) or NOT_KNOWN for name, key in QUANTITIES.items()}
     return flattened(
         {
             "study": study,

@@ -19,7 +19,7 @@ from scipy.stats import binomtest, norm
 from dragchain.quantities.document import EXTRAPOLATED, MEASURED_FILE, Extrapolated, RunQuantities
 from dragchain.quantities.other_scenes import other_scenes
 from dragchain.quantities.registry import MEASURED
-from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate
+from dragchain.statistics.estimate import NORMAL_QUANTILE, NOT_KNOWN, Estimate
 from dragdeck.advice.advise import plain_option
 from dragdeck.cases.case import Case, of_each_workpiece
 from dragdeck.project import Project, by_run, project_here
@@ -178,7 +178,7 @@ def _estimate(folder: Path, name: str) -> Estimate:
     (quantity,) = (quantity for quantity in MEASURED if quantity.name == name)
     others = other_scenes(quantity, load_case(folder))
     if others is None:
-        return Estimate(math.nan, math.nan, math.nan)
+        return NOT_KNOWN
     return others.estimate(RunQuantities.read(folder / MEASURED_FILE).estimates({})[name])
 
 

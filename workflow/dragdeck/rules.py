@@ -291,9 +291,8 @@ class Workflow:
                 cases.setdefault(place, {})[folder] = self.case_of(place, job.wildcards)
             elif job.rule.name == "judge_windows" and job.wildcards.round == "1":
                 for window in windows_of(self.case_of("process", job.wildcards))[:FIRST_WINDOWS]:
-                    name = PROCESS.run_id(window)
-                    path = projects.run_path(job.wildcards.study, projects.WINDOWS, name)
-                    cases.setdefault(projects.WINDOWS, {})[self.project.root / path] = window
+                    folder = self.project.run_folder(window, PROCESS)
+                    cases.setdefault(projects.WINDOWS, {})[folder] = window
         several = (
             expected_runs(projects.PLACES[place], folders) for place, folders in cases.items()
         )

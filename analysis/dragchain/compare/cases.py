@@ -13,7 +13,7 @@ from dragchain.quantities.along import MAP_AZIMUTHS, MAP_DEPTHS
 from dragchain.quantities.basis import Standing
 from dragchain.quantities.registry import REPORTED, Quantity
 from dragchain.report.cases import ReportedCase, StudyRuns
-from dragchain.statistics.estimate import Estimate, mean_of
+from dragchain.statistics.estimate import NOT_KNOWN, Estimate, mean_of
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class CaseDifference:
     def relative(self) -> Estimate:
         """The difference over the value in the first case: positive where this one is larger."""
         size = self.first.value
-        return self.difference.over(size) if size else Estimate(math.nan, math.nan, math.nan)
+        return self.difference.over(size) if size else NOT_KNOWN
 
     @property
     def verdict(self) -> str:

@@ -19,7 +19,13 @@ from scipy.stats import chi2
 from dragchain.arrays import Floats
 from dragchain.quantities.document import RunQuantities
 from dragchain.quantities.registry import REPORTED, Quantity
-from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate, birge_factor, flattened
+from dragchain.statistics.estimate import (
+    NORMAL_QUANTILE,
+    NOT_KNOWN,
+    Estimate,
+    birge_factor,
+    flattened,
+)
 
 NO_RULE, TOO_FEW = "no rule is known", "fewer than two sizes with intervals"
 _UNTESTED = "not tested: two sizes fit any line"
@@ -140,8 +146,7 @@ def _scene(run: RunQuantities) -> str:
 
 def _series(runs: Sequence[RunQuantities], name: str) -> tuple[Floats, Floats]:
     """Values and standard errors of a quantity, NaN where a run has none."""
-    missing = Estimate(math.nan, math.nan, math.nan)
-    every = [run.values_of_run.get(name, missing) for run in runs]
+    every = [run.values_of_run.get(name, NOT_KNOWN) for run in runs]
     errors = [estimate.half_width / NORMAL_QUANTILE for estimate in every]
     return np.array([estimate.value for estimate in every]), np.array(errors)
 

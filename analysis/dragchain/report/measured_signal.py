@@ -26,7 +26,7 @@ from dragchain.report.cases import ReportedCase, ReportedRun
 from dragchain.report.findings import ProcessFindings
 from dragchain.run.kinematics import needed, process_time
 from dragchain.statistics.correlated import MIN_SAMPLES, estimate_mean, estimates
-from dragchain.statistics.estimate import Estimate, flattened, t_interval
+from dragchain.statistics.estimate import NOT_KNOWN, Estimate, flattened, t_interval
 from dragdeck.errors import DragdeckError
 from dragdeck.study.driven import directions
 from dragdeck.study.process_signal import RATES_PER_BANDWIDTH as PER_HZ
@@ -148,7 +148,7 @@ def _described(force: Floats, rate_hz: float, separation_s: float) -> list[Estim
 def _mean(series: Floats) -> Estimate:
     """The mean of a series in the order of time, not known if it is too short."""
     if len(series) < MIN_SAMPLES:
-        return Estimate(math.nan, math.nan, math.nan)
+        return NOT_KNOWN
     return estimate_mean(series).estimate
 
 

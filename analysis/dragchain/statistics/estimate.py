@@ -111,6 +111,9 @@ class Estimate:
         return Estimate(value, low, high, reliable=self.reliable)
 
 
+NOT_KNOWN = Estimate(math.nan, math.nan, math.nan)
+
+
 @dataclass(frozen=True)
 class EstimateColumns:
     """Estimates of a document as columns, NaN in Python and null in JSON where not known."""

@@ -149,11 +149,16 @@ def expected(stretches: Floats, known: Known) -> Paired:
         As for `paired`.
     known : Known
     """
-    soft, count = float(stretches.mean()), len(stretches)
-    of_stretch = float(np.var(stretches / soft, ddof=1)) if count > 1 else 0.0
+    of_stretch, count = _relative_variance(stretches), len(stretches)
     about, of_path = known.variance_ratio * of_stretch, known.slope**2 * of_stretch / count
     of_whole = about / count + of_path
-    return Paired(soft, about, of_path, known.packing_std**2, known.degrees, of_whole)
+    packing = known.packing_std**2
+    return Paired(float(stretches.mean()), about, of_path, packing, known.degrees, of_whole)
+
+
+def _relative_variance(stretches: Floats) -> float:
+    """Variance of a stretch, relative to the square of their mean; 0 of a single one."""
+    return float(np.var(stretches / stretches.mean(), ddof=1)) if len(stretches) > 1 else 0.0
 
 
 def paired(windows: Floats, beside: Floats, stretches: Floats, known: Known) -> Paired:
@@ -173,7 +178,7 @@ def paired(windows: Floats, beside: Floats, stretches: Floats, known: Known) -> 
     count, mean, soft = len(windows), float(windows.mean()), float(stretches.mean())
     here = float(beside.mean())
     away, of_soft = windows / mean - 1.0, beside / here - 1.0
-    of_stretch = float(np.var(stretches / soft, ddof=1)) if len(stretches) > 1 else 0.0
+    of_stretch = _relative_variance(stretches)
     degrees = known.degrees + count - 1
 
     def about(slope: float) -> float:

@@ -17,7 +17,7 @@ from dragchain.quantities.document import (
     RunQuantities,
 )
 from dragchain.quantities.registry import MEASURED, Quantity
-from dragchain.statistics.estimate import Estimate
+from dragchain.statistics.estimate import NOT_KNOWN, Estimate
 from dragchain.tables.by_step import read_table
 from dragchain.windows.estimate import (
     Paired,
@@ -40,8 +40,6 @@ _MOST_MORE = 2.0
 _DOUBT = 0.8
 """Scatter along the path, over that found so far, with which a forecast must meet the tolerance for
 more to be run: a first round knows it to some 20 %."""
-
-_NONE = Estimate(math.nan, math.nan, math.nan)
 
 _PLATEAU = 0.15
 """Largest relative difference of the coordination number in the first third of a sample from that
@@ -221,7 +219,7 @@ def reached_by(run: RunQuantities, asked: Asked) -> Reached:
 def _load_map(
     soft: PathQuantities, windows: Sequence[WindowOfRun], values: Mapping[str, Estimate]
 ) -> LoadMap | None:
-    total = values.get("normal_load", _NONE)
+    total = values.get("normal_load", NOT_KNOWN)
     runs = soft.arc_m / windows[0].arc_m if windows else math.nan
     return corrected_map(soft.load_map, [window.load_map for window in windows], total, runs)
 

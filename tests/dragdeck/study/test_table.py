@@ -127,7 +127,7 @@ EXPORTS: dict[str, tuple[str | bytes, str]] = {
     "MTS": ("Axial test\nTime\tAxial Force\tStrain\nSec\tN\tmm/mm\n"
             + ROWS.replace("\n", "\t1\n"), "Axial Force"),
     "words for units": ("Time (seconds)\tForce x (Newton)\n" + ROWS, "Force x"),
-    "units that nobody asks for": (
+    "other units": (
         "Time;Fx;M;U\ns;N;N.m;Volt\n" + ROWS.replace("\t", ";").replace("\n", ";1;2\n"), "Fx"),
     "units at the end of names": ("Zeit_s\tKraft_N\n" + ROWS, "Kraft"),
     "UTF-16": (("time_s\tfx_n\n" + ROWS).encode("utf-16"), "fx_n"),

@@ -227,8 +227,8 @@ def settling_limit(case: Case) -> float:
     """Largest step of a case's filling over the Rayleigh time that gives no warning.
 
     Fillings with a forecast stability number above 1 under the weight of the bed may never come to
-    rest (measured: docs/evidence/stability.md). That forecast knows the damping; beyond it, the
-    largest step of the map counts, of weak damping.
+    rest (measured: docs/evidence/stability.md). The limit is the smaller of that forecast, which
+    depends on the damping, and of the largest step of the map, which was measured at weak damping.
     """
     study = case.study.at_filling()
     forecast = stable_step_law().largest_fraction(*_contacts(study, beds.floor_pressure(study)))
@@ -242,7 +242,7 @@ def settling_cautions(case: Case) -> Iterator[Caution]:
         yield Caution(
             "stable_timestep",
             f"the filling's step of {100 * step:g} % of the Rayleigh time is above "
-            f"{rounded(100 * limit, up=False):g} %: contacts may keep particles moving for ever",
+            f"{rounded(100 * limit, up=False):g} %: contacts may keep particles moving",
             {"filling_timestep_fraction": rounded(limit, up=False)},
         )
 
