@@ -249,6 +249,24 @@ def test_a_queue_that_signals_the_engine_too_stops_the_run(made: Made, project: 
     assert not (folder / "archive").exists()
 
 
+def test_an_engine_that_is_killed_after_its_last_line_goes_on(
+    filling: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wrapper, once = tmp_path / "killed_once", tmp_path / "once"
+    wrapper.write_text(f"""#!/bin/sh
+{find_engine().path} "$@"
+[ "$1" = -h ] || [ -e {once} ] || {{ touch {once}; kill -9 $$; }}
+""")
+    wrapper.chmod(0o755)
+    monkeypatch.setenv(ENGINE_VARIABLE, str(wrapper))
+    with pytest.raises(EngineError, match="was killed"):
+        run(filling, silent)
+    assert state(filling).state == "stopped"
+    record = run(filling, silent)
+    assert record.state == "complete"
+    assert [part.exit_status for part in record.parts] == [-signal.SIGKILL, 0]
+
+
 def test_what_a_launcher_said_that_refused_is_shown(
     filling: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -162,7 +162,8 @@ class PartOfRun:
     def _conclude(self, ending: Ending) -> RunRecord:
         screen = self._screen.read_text(errors="replace")
         asked = checkpoints.take_forced_restarts(self.folder) or ending.asked
-        why = None if log.reached_end(screen) else self._interruption(screen, asked, ending)
+        whole = log.reached_end(screen) and not ending.was_killed
+        why = None if whole else self._interruption(screen, asked, ending)
         if why is not None:
             raise self._stopped(why)
         self.record = self._record.model_copy(update={"decomposition": log.decomposition(screen)})
@@ -194,13 +195,13 @@ class PartOfRun:
             return f"the disk is full, or a file cannot be written ({said}); {left}"
         if errors or log.never_settled(screen):
             return None
-        killed = ending.exit_status < 0 or _SIGNALS[0] < ending.exit_status < _SIGNALS[1]
-        how = "was killed" if killed else "ended prematurely without a message"
-        if not killed and not keeps_last_words():
+        died = ending.exit_status < 0 or _SIGNALS[0] < ending.exit_status < _SIGNALS[1]
+        how = "was killed" if died else "ended prematurely without a message"
+        if not died and not keeps_last_words():
             how += ": stdbuf of GNU coreutils, which would have kept it, is missing"
         if ending.exit_status == 0:  # a signal between two runs of a script leaves no other trace
             how = "was stopped on request, or its script ends early"
-        said = "" if killed else f"; the last lines: {last_words(screen) or 'none'}"
+        said = "" if died else f"; the last lines: {last_words(screen) or 'none'}"
         return f"LIGGGHTS {how} (exit status {ending.exit_status}){said}"
 
     def _refuse_new_gap(self, checks: list[AcceptanceCheck]) -> None:

@@ -77,6 +77,11 @@ class Ending:
     wall_time_s: float
     cpu_time_s: float
 
+    @property
+    def was_killed(self) -> bool:
+        """From outside: it may have written all, or not; a launcher adds 128 to the signal."""
+        return self.exit_status in (-signal.SIGKILL, 128 + signal.SIGKILL)
+
 
 def find_engine() -> Engine:
     """Find LIGGGHTS and its version.
