@@ -54,7 +54,7 @@ def other_scenes(quantity: Quantity, case: CaseOfRun) -> OtherScenes | None:
     number = case.numbers.get("stiffness_number")
     if scale == 1.0 or fidelity.speed_factor != 1.0 or not math.isfinite(known.per_softness_std):
         return None
-    if number is None or case.added_forces or case.changed_law or _clumps(case):
+    if number is None or case.changed_law or _attracts(case) or _wet_or_shaped(case):
         return None
     difference = softening(number, scale)
     return OtherScenes(
@@ -62,6 +62,11 @@ def other_scenes(quantity: Quantity, case: CaseOfRun) -> OtherScenes | None:
     )
 
 
-def _clumps(case: CaseOfRun) -> bool:
+def _attracts(case: CaseOfRun) -> bool:
+    parts = (case.attractive, *(class_.attractive for class_ in case.classes))
+    return bool(case.added_forces) or any(parts)
+
+
+def _wet_or_shaped(case: CaseOfRun) -> bool:
     study = study_of(case)
-    return study.sphere_count != study.particle_count
+    return study.compound is not None or study.sphere_count != study.particle_count
