@@ -33,7 +33,7 @@ D = 0.004
 """Diameter of the particles; the rod's is 1.5 times as large."""
 
 RADIUS = 0.003
-SIDE = max(6 * D, 4 * 2 * RADIUS)
+SIDE = max(6.7 * D, 4 * 2 * RADIUS)
 BELOW = 4 * D
 WIDE: dict[str, Any] = {
     "media": {"material": "ceramic", "radius_mean_m": D / 2, "radius_std_m": 0.0,
@@ -80,7 +80,7 @@ def test_a_wide_machine_gives_a_trough_of_the_sizes_of_the_laws(cut: Made) -> No
     motion, bowl, path = case.study.motion, case.study.bowl, case.study.motion.path
     assert isinstance(bowl, TroughBowl) and isinstance(path, LinePath)
     reach = workpiece_radius(case)
-    side = max(6 * D, 8 * reach)
+    side = max(6.7 * D, 8 * reach)
     assert sides(case) == pytest.approx((side, side), abs=2e-6)
     assert tip_of(case) == pytest.approx(BELOW, rel=0.01)
     assert path.start_m[0] + bowl.length_m / 2 - reach == pytest.approx(side, abs=2e-6)
@@ -246,12 +246,12 @@ def test_a_plan_changes_the_machine_and_cuts_again(cut: Made) -> None:
 
 
 def test_studies_of_the_project_are_cut_out() -> None:
-    """Each fits: no error, and less than half of the particles."""
+    """Each fits: no error, and fewer particles."""
     for name in ("drag_finisher", "stream_finisher"):
         cases = load_cases(ROOT / "studies" / name / "study.yaml")
         cut = [case for case in cases if case.study.bowl.kind == "trough"]
         assert cut and len(cut) < len(cases)
         scene = process_scene(cut[0])
-        assert scene.case.media.count < 0.7 * cut[0].written.particle_count
+        assert scene.case.media.count < 0.75 * cut[0].written.particle_count
         planes = [Wall.model_validate(dict(wall)) for wall in scene.case.bowl.walls]
         assert np.all([wall.shape.endswith("plane") for wall in planes])
