@@ -20,11 +20,12 @@ from dragchain.quantities.document import EXTRAPOLATED, MEASURED_FILE, Extrapola
 from dragchain.quantities.other_scenes import other_scenes
 from dragchain.quantities.registry import MEASURED
 from dragchain.statistics.estimate import NORMAL_QUANTILE, NOT_KNOWN, Estimate
-from dragdeck.advice.advise import plain_option
+from dragdeck.advice.advise import plain_option, ways_of
 from dragdeck.cases.case import Case, of_each_workpiece
 from dragdeck.project import Project, by_run, project_here
 from dragdeck.records.case import load_case
 from dragdeck.records.run import RunRecord
+from dragdeck.records.tradeoff import measured_tradeoff
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.lead import with_leads
 from dragdeck.scenes.process import PROCESS
@@ -136,7 +137,11 @@ def _rows(project: Project, study: str) -> Iterator[dict[str, Any]]:
     for case in (workpiece for whole in asked for workpiece in of_each_workpiece(whole)):
         folder = project.run_folder(case, PROCESS)
         result = Extrapolated.read(folder / EXTRAPOLATED)
-        assert result.tolerance is not None
+        assert result.tolerance is not None and case.requested is not None
+        windows = len(result.tolerance.runs)
+        whole = result.tolerance.whole or not windows
+        ways = ways_of(case, case.requested, measured_tradeoff())
+        way = ways and (ways.whole if whole else ways.with_windows(windows))
         beside = [
             RunQuantities.read(project.run_folder(run, PROCESS) / MEASURED_FILE)
             for run in plain
@@ -150,8 +155,8 @@ def _rows(project: Project, study: str) -> Iterator[dict[str, Any]]:
                 "study": study,
                 "workpiece": case.number,
                 "quantity": name,
-                "windows": len(result.tolerance.runs),
-                "whole_drag": result.tolerance.whole or not result.tolerance.runs,
+                "windows": windows,
+                "whole_drag": whole,
                 "tolerance": result.tolerance.tolerance,
                 "reached": value.relative_half_width <= result.tolerance.tolerance,
                 "value": value.value,
@@ -165,6 +170,7 @@ def _rows(project: Project, study: str) -> Iterator[dict[str, Any]]:
                 "estimate_covered": _agree(soft, mean, error) if soft.known else None,
                 "cpu_time_s": cpu,
                 "plain_cpu_time_s": plain_cpu,
+                "forecast_cost": way and way.relative_cost,
             }
 
 
