@@ -199,11 +199,15 @@ def paired(windows: Floats, beside: Floats, stretches: Floats, known: Known) -> 
 
 
 def windows_needed(value: Paired, windows: int, tolerance: float, most: int) -> Need:
-    """How many windows, at most so many, or else packings bring the half-width to a tolerance."""
+    """How many windows, at most so many, bring the half-width to a tolerance.
+
+    If none do, it takes several packings, with as many windows or with the whole drag in each.
+    """
     enough = next(
         (n for n in range(1, most + 1) if value.relative_half_width(n) <= tolerance), most
     )
-    packings = math.ceil((value.relative_half_width(enough) / tolerance) ** 2)
+    narrowest = min(value.relative_half_width(enough), value.whole_half_width())
+    packings = math.ceil((narrowest / tolerance) ** 2)
     packings = min(max(packings, 1), _MOST_PACKINGS)
     return Need(max(enough, windows), packings)
 

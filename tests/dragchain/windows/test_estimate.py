@@ -1,10 +1,12 @@
 """Values at physical stiffness from windows of which the truth is known."""
 
+import math
+
 import numpy as np
 import pytest
 
 from dragchain.statistics.estimate import Estimate, student_quantile
-from dragchain.windows.estimate import corrected_map, paired, windows_needed
+from dragchain.windows.estimate import Paired, corrected_map, paired, windows_needed
 from dragdeck.records.windows import UNKNOWN
 
 KNOWN = UNKNOWN.model_copy(update={"slope": 0.5, "variance_ratio": 1.0, "degrees": 10.0})
@@ -74,6 +76,12 @@ def test_as_many_windows_as_needed_bring_the_half_width_inside() -> None:
     assert need.packings == 1
     enough, fewer = map(value.relative_half_width, (need.windows, need.windows - 1))
     assert enough <= 0.05 < fewer
+
+
+def test_packings_have_the_whole_drag_where_that_says_more() -> None:
+    value = Paired(1.0, 0.04, 0.0, 0.0, 10, whole_variance=0.05**2)
+    assert value.relative_half_width(4) > 0.2
+    assert windows_needed(value, 3, 0.05, 4).packings == math.ceil((1.96 * 0.05 / 0.05) ** 2)
 
 
 BINS, WINDOWS, LENGTH, TRIALS = 48, 3, 12, 200
