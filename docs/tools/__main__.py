@@ -44,11 +44,14 @@ def main() -> int:
 
 
 def store_outputs() -> None:
-    """Run the notebooks on the results here and store what they show, without times and places."""
+    """Run the notebooks on the results here and store what they show, without warnings and times."""
     for file in sorted((ROOT / "docs/examples").glob("*.ipynb")):
         notebook = nbformat.read(file, as_version=4)
         folder = {"metadata": {"path": str(ROOT / "studies")}}
         NotebookClient(notebook, record_timing=False, resources=folder).execute()
+        for cell in notebook.cells:
+            if cell.cell_type == "code":
+                cell.outputs = [part for part in cell.outputs if part.get("name") != "stderr"]
         notebook.metadata = {"kernelspec": notebook.metadata["kernelspec"]}
         nbformat.write(notebook, file)
 
