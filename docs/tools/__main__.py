@@ -44,7 +44,7 @@ def main() -> int:
 
 
 def store_outputs() -> None:
-    """Run the notebooks on the results here and store what they show, without warnings and times."""
+    """Run the notebooks on the results here and store what they show, warnings left out."""
     for file in sorted((ROOT / "docs/examples").glob("*.ipynb")):
         notebook = nbformat.read(file, as_version=4)
         folder = {"metadata": {"path": str(ROOT / "studies")}}
