@@ -191,3 +191,49 @@ def test_exit_status_and_choice_of_rules(
     capsys.readouterr()
     assert audit(None, explain="DK104") == 0
     assert "408 rad/s" in capsys.readouterr().out
+
+
+WITHOUT_RADIUS = "ITEM: TIMESTEP\n0\nITEM: NUMBER OF ATOMS\n0\nITEM: BOX BOUNDS ff ff ff\n" + (
+    "0 1\n" * 3 + "ITEM: ATOMS id x y z\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words", "says"),
+    [
+        ("study.yaml", "title: a\nseed: 1\n", [], "no command of LIGGGHTS"),
+        ("part.stl", "solid a\nendsolid a\n", [], "no command of LIGGGHTS"),
+        ("log", DECK, ["--log"], "no log of LIGGGHTS"),
+        ("log", "", ["--log"], "no log of LIGGGHTS"),
+        ("", "", ["--log"], "is a directory"),
+        ("none", None, ["--log"], "no such file"),
+        ("", "", ["--dump"], "no such file"),
+        ("dump", WITHOUT_RADIUS, ["--dump"], "no radius"),
+        ("dump", WITHOUT_RADIUS[:-24], ["--dump"], "no whole frame"),
+        ("pairs", "", ["--contacts"], "with --dump"),
+        ("a=1", None, ["--var"], "--var NAME VALUE"),
+    ],
+)
+def test_what_is_not_what_it_is_given_as(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
+    name: str, text: str | None, words: list[str], says: str,
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    write(tmp_path)
+    if name and text is not None:
+        Path(name).write_text(text)
+    given = ["in.deck", *words, name or "."] if words else [name]
+    assert main(["audit", *given]) == 2
+    assert says.lower() in capsys.readouterr().err.lower()
+
+
+def test_a_frame_that_a_killed_run_began_is_left_out(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    dump(tmp_path, rows(REST), rows(REST))
+    cut = tmp_path / "post/spheres_2000.dump"
+    whole = (tmp_path / "post/spheres_1000.dump").read_text().replace("1000", "2000")
+    for length in (0, 20, 100, len(whole) - 30):
+        cut.write_text(whole[:length])
+        known = report(tmp_path, capsys)["known"]
+        assert (known["frames"], known["ends within a frame"]) == (2, str(cut))

@@ -32,7 +32,7 @@ def test_no_script_takes_long(tmp_path: Path, begin: str, part: str, times: int,
 
 @pytest.mark.parametrize("lines", [*cases("hostile"), f"include {'x' * 5000}"])
 def test_commands_without_sense(tmp_path: Path, lines: str) -> None:
-    for text in (lines, DECK + lines, PRESS + lines):
+    for text in (f"run 0\n{lines}", DECK + lines, PRESS + lines):
         script_findings(followed(tmp_path, text))
 
 

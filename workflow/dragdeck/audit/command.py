@@ -9,7 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dragdeck.errors import DragdeckError, InputError
+from dragdeck.errors import DragdeckError, InputError, TruncatedDumpError
 from dragdeck.script.commands import words_of
 from dragdeck.script.facts import Facts
 from dragdeck.script.findings import (
@@ -61,6 +61,12 @@ def audit(
         check_ids(id for ids in chosen for id in ids)
         wanted = {id for id in rules() if id.startswith(chosen[0])
                   and not (chosen[1] and id.startswith(chosen[1]))}  # fmt: skip
+        if contacts and not dump:
+            raise InputError("--contacts is read only with --dump", remedy="give --dump, too")
+        for name, *values in var:
+            if not values:
+                raise InputError("a variable without a value", field="--var", value=name,
+                                 remedy="write --var NAME VALUE")  # fmt: skip
         followed = read_script(script, {name: values for name, *values in var}, after=after)
         report = Report(followed, wanted, str(after))
         report.add(script_findings(followed), "DK1")
@@ -73,7 +79,10 @@ def audit(
         if log is not None:
             report.add_log(log)
         print(json.dumps(report.document, indent=2) if format == "json" else report.text)
-    except (DragdeckError, OSError) as error:
+    except OSError as error:
+        print(f"dragdeck: {error.filename}: cannot be read: {error.strerror}", file=sys.stderr)
+        return 2
+    except DragdeckError as error:
         print(f"dragdeck: {error}", file=sys.stderr)
         return 2
     return int(any(finding.severity != "note" for finding in report.judged[0]))
@@ -155,9 +164,9 @@ class Report:
             if pair is not None and pair.step == frame.step:
                 run.add_contacts(pair, columns[:2], columns[2:])
         if not run.frames:
-            names = ", ".join(sorted(lacking)) or "frame"
-            self.add(as_findings("DK201", [unknown(f"{source} has no {names}")]))
-            return
+            names = ", ".join(sorted(lacking)) or "whole frame"
+            raise InputError(f"the dump has no {names}", file=source,
+                             remedy="give the dump of the particles")  # fmt: skip
         run.left_out = self._left_out(dump)
         for rule, measure in RULES.items():
             self.add(as_findings(rule, measure(run), source), rule)
@@ -175,11 +184,14 @@ class Report:
 
         files: list[Path] = []
         for pattern in patterns:
-            matching = [*Path(pattern).parent.glob(Path(pattern).name)] or dump_files(pattern)
-            files += sorted(matching, key=_order)
+            paths = Path(pattern).parent.glob(Path(pattern).name or "none")
+            files += sorted(filter(Path.is_file, paths), key=_order) or dump_files(pattern)
         for file in files:
             words = self._dump_of(file.name) if ".bin" in file.suffixes[-2:] else []
-            yield from read_frames([file], layout_of(file, words[6:] or None))
+            try:  # a run that was killed leaves part of a frame
+                yield from read_frames([file], layout_of(file, words[6:] or None))
+            except TruncatedDumpError as error:
+                self.known["ends within a frame"] = str(error.file)
 
     def _dump_of(self, name: str) -> list[str]:
         """The words of the last dump of the script that writes files of such a name."""

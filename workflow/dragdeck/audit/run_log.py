@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 from dragdeck.audit.measures import is_clumped, removal
+from dragdeck.errors import InputError
 from dragdeck.engine.log import engine_errors, never_settled
 from dragdeck.files import text_of
 from dragdeck.script.facts import Facts, as_numbers
@@ -48,6 +49,10 @@ class RunLog:
                 self.expected += last if self.last is None else inserted
                 counts = as_numbers([row[name] for name in self.outlets if name in row])
                 self.last, inserted, self.counted = last, 0, round(sum(counts or ()))
+        begins = re.search(r"^\s*(LIGGGHTS \(|Step )", self.text, re.MULTILINE)
+        if not (begins or engine_errors(self.text)):
+            raise InputError("the file is no log of LIGGGHTS", file=file,
+                             remedy="give log.liggghts, or the output on the screen")  # fmt: skip
 
     def warnings(self) -> Hits:
         """Errors and warnings of LIGGGHTS (DK208)."""

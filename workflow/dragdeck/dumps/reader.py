@@ -12,7 +12,7 @@ from dragdeck.dumps.content import Cursor
 from dragdeck.dumps.frame import Columns, Frame, Layout
 from dragdeck.dumps.grammar import binary_names, frame_columns, print_rows
 from dragdeck.dumps.numbers import WrongRow, first_rows, named_columns, whole_numbers
-from dragdeck.errors import DumpError
+from dragdeck.errors import DumpError, TruncatedDumpError
 
 _KINDS = {"ENTRIES": "local", "ATOMS": "custom"}
 _HEADER_LINES = 14
@@ -227,7 +227,8 @@ def _header(file: Path) -> tuple[str, list[str]]:
     named = [line for line in lines if line.startswith((b"ITEM: ATOMS ", b"ITEM: ENTRIES "))]
     words = [word.decode("ascii", "replace") for word in named[0].split()] if named else []
     if len(words) < 3:
-        raise DumpError(
+        begun = not lines[0] or lines[0].startswith(b"ITEM: ")
+        raise (TruncatedDumpError if begun else DumpError)(
             file,
             f"found {lines[0][:60]!r}, but no names of columns",
             frame=0,

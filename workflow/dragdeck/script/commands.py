@@ -8,7 +8,7 @@ from itertools import pairwise
 _PROGRAMS = ("include", "partition", "python", "shell")
 """Commands that start programs or scripts, or carry other commands."""
 
-_WORD = re.compile(r'"""(.*?)"""|"([^"]*)"|\'([^\']*)\'|(\S+)', re.DOTALL)
+_WORD = re.compile(r'"""(.*?)"""|"([^"]*)"|\'([^\']*)\'|(\S+)', re.DOTALL | re.ASCII)
 
 _COMMENT = re.compile(r"""((?:[^#'"]|'[^']*'|"[^"]*")*)#.*""", re.DOTALL)
 """A line up to the first ``#`` that is in no quotation marks, and the rest."""

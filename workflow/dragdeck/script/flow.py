@@ -58,8 +58,8 @@ class Script:
     not_followed : dict of str
         What could not be followed, in order.
     missing : list of (EngineCommand, str, str)
-        First command that uses each ``variable`` that nothing defines, or ``script`` that is not
-        there, which of the two, and its name.
+        First command that uses each ``variable`` that nothing defines, ``script`` or ``label`` that
+        is not there, or that ends within ``quotes``; which of these, and its name or text.
     changes_files : bool
         Whether it makes or moves files itself, so that nobody knows which are there.
     """
@@ -76,6 +76,13 @@ class Script:
         """Note what could not be followed, and where."""
         self.not_followed[f"{command.file}:{command.line}: {what}"] = None
 
+
+_COMMANDS = {
+    "atom_style", "clear", "compute", "dump", "echo", "fix", "group", "if", "include", "jump", "label",
+    "log", "pair_style", "print", "read_data", "read_restart", "region", "run", "thermo",
+    "timestep", "units", "variable",
+}  # fmt: skip
+"""Some of LIGGGHTS: a file without any of them is no input script."""
 
 _UNKNOWN: tuple[str, list[str]] = ("unknown", [])
 """Style and values of a variable; the first value is the present one."""
@@ -106,11 +113,14 @@ def read_script(
     """
     script = Script(file, text is not None)
     for source in filter(None, (after, file)):
-        name, before = str(source), len(script.commands) + len(script.not_followed)
+        name, before = str(source), len(script.commands)
         script.texts[name] = text if text is not None and source is file else script_text(source)
         _Reader(script, source.parent, variables or {}).follow(name)
-        if len(script.commands) + len(script.not_followed) == before and text is None:
-            raise InputError("the file contains no command", file=source,
+        known = script.missing or script.not_followed or _COMMANDS.intersection(
+            command.words[0] for command in script.commands[before:]
+        )
+        if not known and text is None:
+            raise InputError("the file contains no command of LIGGGHTS", file=source,
                              remedy="give the input script of LIGGGHTS")  # fmt: skip
         if source is after:
             script.commands.append(EngineCommand("clear", ["clear"]))
@@ -186,8 +196,8 @@ class _Reader:
                     self._file(file, label)
                     break
                 if label not in labels:
-                    command = EngineCommand("", [], line=at, file=name)
-                    self.script.note(command, f"jump to the label {label}, which is not there")
+                    command = EngineCommand("", [], line=at, file=name, uncertain="$" in label)
+                    self._miss(command, "label", label)
                 at = labels.get(label, at)
             else:
                 command = EngineCommand(lines[at][1], [], line=lines[at][0], file=name)
@@ -216,6 +226,12 @@ class _Reader:
             self.script.note(command, f"{command.words[0]} {name}: {problem}")
         return "" if problem else str(file)
 
+    def _miss(self, command: EngineCommand, kind: str, name: str) -> None:
+        if command.uncertain:
+            self.script.note(command, f"{kind}: {name}")
+        else:
+            self.script.missing.append((command, kind, name))
+
     def _execute(self, command: EngineCommand) -> None:
         """Do a command; its words are those of its text with values in place of variables."""
         self.count += 1 + len(command.text) // 200
@@ -223,7 +239,7 @@ class _Reader:
             self.script.note(command, f"the commands after the first {_MOST:,}")
             self.ended = True
         elif not is_quoted_in_full(command.text):
-            self.script.note(command, "quotation marks that are not closed")
+            self._miss(command, "quotes", command.text.strip()[:80])
             return
         words = words_of(self._resolved(command.text, command))
         if not words or self.ended:

@@ -167,7 +167,7 @@ def _refused_value(facts: Facts) -> Hits:
 def _absent(facts: Facts) -> Hits:
     """Variables that nothing defines, and files that are not there."""
     script = facts.script
-    for kind in ("variable", "script"):
+    for kind in ("variable", "script", "label", "quotes"):
         missing = [(command, name) for command, of_kind, name in script.missing if of_kind == kind]
         for command, _ in missing[:1]:
             yield hit(kind, command, what=", ".join(name for _, name in missing))
