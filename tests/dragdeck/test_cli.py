@@ -165,6 +165,25 @@ def test_check_ends_with_its_verdict_whatever_is_wrong(
         assert ("did you mean 'spin.rpm'?" in said) == (motion is spun)
 
 
+@pytest.mark.parametrize(
+    ("times", "reason"),
+    [
+        ([], "(short)"),
+        ([0, 1, *range(1, 200)], "(time)"),
+        ([*range(99), *range(100, 300)], "(uneven)"),
+    ],
+)
+def test_check_refuses_a_record_that_no_calibration_can_use(
+    case: Case, capsys: pytest.CaptureFixture[str], times: list[int], reason: str
+) -> None:
+    rows = "".join(f"{time},{time % 7}\n" for time in times)
+    (case.file.parent / "record.csv").write_text(f"Zeit [s],Kraft [N]\n{rows}")
+    edited(case, calibration={"record": "record.csv"})
+    assert main(["check", "small"]) == 1
+    said = capsys.readouterr().err
+    assert re.search(rf"study.yaml:\d+: calibration.record: {re.escape(reason)}", said)
+
+
 @pytest.mark.engine
 @pytest.mark.parametrize(
     ("fidelity", "warned"),

@@ -15,7 +15,7 @@ from dragdeck.decks import render as rendering
 from dragdeck.decks.templates import environment
 from dragdeck.engine.process import find_engine
 from dragdeck.engine.reports import say
-from dragdeck.errors import DragdeckError, InputError, together
+from dragdeck.errors import DragdeckError, InputError, RecordError, together
 from dragdeck.outlook import timestep as timesteps
 from dragdeck.outlook.built import built_scene, friction_unknown, refuse_tolerance
 from dragdeck.outlook.process import (
@@ -33,6 +33,7 @@ from dragdeck.scenes.scene import SceneType, StudyScene
 from dragdeck.scenes.workpiece import remeshing
 from dragdeck.study.bowls.mesh import MeshBowl
 from dragdeck.study.recorded import recorded_file
+from dragdeck.study.yaml import located
 
 
 def check_study(study: str, fidelity: str | None, verbose: bool) -> None:
@@ -73,7 +74,7 @@ def _check(study: str, fidelity: str | None, verbose: bool) -> None:
 
 def _records(case: Case) -> Iterator[str]:
     """How the files that a study names are read: measured forces, surfaces and where they are."""
-    from dragdeck.study.force_record import in_words
+    from dragdeck.study.force_record import in_words, read_record
 
     study, file = case.study, case.file
     if deviation := remeshing(case):
@@ -85,7 +86,12 @@ def _records(case: Case) -> Iterator[str]:
         record = recorded_file(signal.file, file, "reference.signal.file")
         yield f"reference.signal: {in_words(record, signal)}"
     if study.calibration and study.calibration.record:
-        record = recorded_file(study.calibration.record, file, "calibration.record")
+        field, name = "calibration.record", study.calibration.record
+        record = recorded_file(name, file, field)
+        try:
+            read_record(record)
+        except RecordError as error:
+            raise located(replace(error.of_field(field, name), file=file)) from None
         yield f"calibration.record: {in_words(record)}"
 
 

@@ -119,6 +119,11 @@ class RecordError(DragdeckError):
         said = f"the record cannot be used ({self.reason}): {self.problem}"
         return rendered(said, value=self.value, limit=self.limit, remedy=self.remedy)
 
+    def of_field(self, field: str, name: str) -> InputError:
+        """The same as an error of the field of a study that names the record."""
+        problem, value = f"({self.reason}) {self.problem}", self.value or name
+        return InputError(problem, field=field, value=value, limit=self.limit, remedy=self.remedy)
+
 
 class EngineError(DragdeckError):
     """LIGGGHTS is missing or too old, rejected the input script, or was stopped."""

@@ -296,7 +296,8 @@ def _check_tops(
         high = samples[samples >= samples.max() - 0.5 * force[first : last + 1].max()]
         flat = int(np.sum(high >= samples.max() - 0.01 * force[first : last + 1].max()))
         equal = max(len(list(run)) for top, run in groupby(samples == samples.max()) if top)
-        if (equal >= 4 and fine) or (flat >= 4 and flat > _FLAT_TOP * len(high)):
+        least = 3 if len(high) <= 4 else 4  # of so few, no three are near the top of an impact
+        if (equal >= 4 and fine) or (flat >= least and flat > _FLAT_TOP * len(high)):
             raise _clipped(f"impact {number} has {max(flat, equal)} samples at its top", largest)
     if largest[0] == largest[1]:
         raise _clipped("impacts 1 and 2 have the same largest value", largest)

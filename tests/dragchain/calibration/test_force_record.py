@@ -233,6 +233,14 @@ def test_a_clipped_amplifier_is_refused(rate: float) -> None:
     assert refused.value.reason == "clipped"
 
 
+def test_a_fast_impact_that_is_clipped_has_three_samples_at_its_top() -> None:
+    """As many as a stiff particle's impact has at 250 kHz."""
+    time, force = samples(28e3, phase=0.4)
+    found(time, force)
+    with pytest.raises(RecordError, match="clipped"):
+        found(time, np.minimum(force, 16.5))
+
+
 @settings(max_examples=25)
 @example(rate=122453.0, phase=0.0, bits=10, noise=0.015, seed=742)  # noise of two steps
 @given(
@@ -249,3 +257,22 @@ def test_a_whole_record_is_never_called_clipped(
     time, force = samples(rate, phase=phase, noise_n=noise, power=1.5, seed=seed)
     quantum = 50.0 / 2**bits
     assert len(found(time, np.round(force / quantum) * quantum).impacts) == 3
+
+
+@pytest.mark.parametrize(
+    ("names", "force"),
+    [("Zeit [s],Kraft [N]", 1), ("t / s,F / N", 1), ("time_s,fz_kn", 1e3), ("time_s,fz_n,force_n", 2),
+     ("time_s,fx_n,fz_n", None), ("time_s,fz", None)],
+)  # fmt: skip
+def test_the_only_column_with_a_unit_of_force_is_the_force(
+    tmp_path: Path, names: str, force: float | None
+) -> None:
+    file = tmp_path / "record.csv"
+    file.write_text(
+        f"{names}\n" + "".join(f"0.{n},1,2\n"[: 2 * names.count(",") + 4] + "\n" for n in (1, 2))
+    )
+    if force is None:
+        with pytest.raises(InputError, match="recognised name"):
+            read_samples(file)
+    else:
+        assert read_samples(file)[1].tolist() == [force, force]

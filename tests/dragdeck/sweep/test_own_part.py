@@ -141,6 +141,9 @@ def test_defects_that_no_facet_size_mends_are_all_named(project: Project) -> Non
         new_study(project.studies, "mine", str(project.root / "open.stl"))
     with pytest.raises(InputError, match="no such mesh file"):
         new_study(project.studies, "mine", str(project.root / "none.stl"))
+    (project.root / "part.iges").write_text("a part\n")
+    with pytest.raises(InputError, match="unknown mesh format"):
+        new_study(project.studies, "mine", str(project.root / "part.iges"))
     assert not (project.studies / "mine").exists()
 
 

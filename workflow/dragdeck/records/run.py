@@ -114,7 +114,7 @@ class CaseFile(Document):
         particles may be squeezed out between workpiece and bowl.
     """
 
-    remedy = "write it with: ./run dragdeck step render"
+    remedy = "give the folder of a run, or write it with: ./run dragdeck step render"
 
     study_name: str
     title: str

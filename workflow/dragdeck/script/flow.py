@@ -116,8 +116,10 @@ def read_script(
         name, before = str(source), len(script.commands)
         script.texts[name] = text if text is not None and source is file else script_text(source)
         _Reader(script, source.parent, variables or {}).follow(name)
-        known = script.missing or script.not_followed or _COMMANDS.intersection(
-            command.words[0] for command in script.commands[before:]
+        known = (
+            script.missing
+            or script.not_followed
+            or _COMMANDS.intersection(command.words[0] for command in script.commands[before:])
         )
         if not known and text is None:
             raise InputError("the file contains no command of LIGGGHTS", file=source,

@@ -365,8 +365,7 @@ def signal_problems(study: Study, file: Path) -> Iterator[InputError]:
             transient_s,
         )
     except RecordError as error:
-        problem, value = f"({error.reason}) {error.problem}", error.value or signal.file
-        yield InputError(problem, field=field, value=value, limit=error.limit, remedy=error.remedy)
+        yield error.of_field(field, signal.file)
     except InputError as error:
         yield error
 

@@ -61,8 +61,8 @@ def read_record(file: Path) -> Record:
     Parameters
     ----------
     file : Path
-        As for `user_table`: one column of `TIME_COLUMNS` and one of `FORCE_COLUMNS`; others are
-        left alone.
+        As for `user_table`: one column of `TIME_COLUMNS`, and a single one with a unit of
+        force, or one of `FORCE_COLUMNS`; others are left alone.
 
     Raises
     ------
@@ -82,7 +82,7 @@ def read_samples(
     `column` names the force where it is not one of `FORCE_COLUMNS`; `rate_hz` stands in for times.
     """
     table = user_table(file)
-    name = _column(table, FORCE_COLUMNS) if column is None else column
+    name = _force(table) if column is None else column
     lines, time, forces = force_series(table, [name], rate_hz)
     return time, forces[0], lines
 
@@ -118,7 +118,7 @@ def in_words(file: Path, signal: Signal | None = None) -> str:
     """How a record is read: columns, rate, first and last row, and what is missing of it."""
     table, gaps = user_table(file), signal is not None
     angle, rate_hz = (signal.angle_column, signal.rate_hz) if signal else (None, None)
-    columns = signal.columns if signal else [_column(table, FORCE_COLUMNS)]
+    columns = signal.columns if signal else [_force(table)]
     lines, time, values = force_series(table, columns, rate_hz, angle, gaps=gaps)
     rate = (len(time) - 1) / (time[-1] - time[0]) if len(time) > 1 else math.nan
     forces = values[: len(columns)]
@@ -164,6 +164,12 @@ def _unit(table: Table, column: str, units: Mapping[str, float]) -> tuple[str, f
         limit += f"; line {table.header_line} has {', '.join(table.names)[:200]}"
     remedy = "give the column its unit in the file, as in Fx [N]"
     raise RecordError("columns", "the column has no unit", value=column, limit=limit, remedy=remedy)
+
+
+def _force(table: Table) -> str:
+    """The only column whose unit is one of forces, or else that which is named a force."""
+    forces = [name for name in table.names if name.endswith(tuple(FORCE_UNITS))]
+    return forces[0] if len(forces) == 1 else _column(table, FORCE_COLUMNS)
 
 
 def _column(table: Table, known: Mapping[str, float]) -> str:

@@ -234,7 +234,8 @@ def new_study(studies: Path, name: str, base: str) -> Path:
         be used.
     """
     part = Path(base)
-    of_part = part.suffix.lower() in FORMATS and not studies_called(studies, base)
+    is_mesh = part.suffix.lower() in FORMATS or part.is_file()
+    of_part = is_mesh and not studies_called(studies, base)
     if not of_part:
         study_file(studies, base)
     folder, problem = studies / name, None
