@@ -4,8 +4,8 @@ import re
 from pathlib import Path
 
 from dragdeck.audit.measures import is_clumped, removal
-from dragdeck.errors import InputError
 from dragdeck.engine.log import engine_errors, never_settled
+from dragdeck.errors import InputError
 from dragdeck.files import text_of
 from dragdeck.script.facts import Facts, as_numbers
 from dragdeck.script.findings import Hits, hit, unknown
