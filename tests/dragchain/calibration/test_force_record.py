@@ -261,8 +261,8 @@ def test_a_whole_record_is_never_called_clipped(
 
 @pytest.mark.parametrize(
     ("names", "force"),
-    [("Zeit [s],Kraft [N]", 1), ("t / s,F / N", 1), ("time_s,fz_kn", 1e3), ("time_s,fz_n,force_n", 2),
-     ("time_s,fx_n,fz_n", None), ("time_s,fz", None)],
+    [("Zeit [s],Kraft [N]", 1), ("t / s,F / N", 1), ("time_s,fz_kn", 1e3),
+     ("time_s,fz_n,force_n", 2), ("time_s,fx_n,fz_n", None), ("time_s,fz", None)],
 )  # fmt: skip
 def test_the_only_column_with_a_unit_of_force_is_the_force(
     tmp_path: Path, names: str, force: float | None

@@ -78,8 +78,8 @@ class Script:
 
 
 _COMMANDS = {
-    "atom_style", "clear", "compute", "dump", "echo", "fix", "group", "if", "include", "jump", "label",
-    "log", "pair_style", "print", "read_data", "read_restart", "region", "run", "thermo",
+    "atom_style", "clear", "compute", "dump", "echo", "fix", "group", "if", "include", "jump",
+    "label", "log", "pair_style", "print", "read_data", "read_restart", "region", "run", "thermo",
     "timestep", "units", "variable",
 }  # fmt: skip
 """Some of LIGGGHTS: a file without any of them is no input script."""
