@@ -207,6 +207,10 @@ def test_neither_file_nor_points(small: dict[str, Any], write_study: Any) -> Non
             {"path": {"kind": "waypoints", "points": TURNING}, "spin": {"rpm": 9}},
             "spin and waypoints that turn cannot be combined",
         ),
+        (
+            {"path": {"kind": "waypoints", "points": [[0, 0, 0], [1, 0.01, 0, 0, 0, 360, 0]]}},
+            "turns by 360 degrees from one waypoint to the next",
+        ),
     ],
 )
 def test_fields_beside_it_that_cannot_be(made: Made, motion: Any, words: str) -> None:

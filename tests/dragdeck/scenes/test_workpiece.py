@@ -17,9 +17,16 @@ from dragdeck.mesh.contacts import gap_fraction
 from dragdeck.mesh.files import stl_text
 from dragdeck.mesh.shapes import prism
 from dragdeck.mesh.surface import surface
+from dragdeck.scenes.bed_space import expected_bed
 from dragdeck.scenes.fit import clearances
+from dragdeck.scenes.motion import course
 from dragdeck.scenes.process import PROCESS, process_scene
-from dragdeck.scenes.workpiece import fastest_surface, workpiece_mesh, workpiece_radius
+from dragdeck.scenes.workpiece import (
+    fastest_surface,
+    reference_height,
+    workpiece_mesh,
+    workpiece_radius,
+)
 from dragdeck.sweep.cases import load_cases
 
 Dragged = Callable[..., Case]
@@ -191,21 +198,41 @@ def test_a_part_that_is_wide_in_the_bed_is_refused(with_part: Callable[..., Case
     assert workpiece_radius(deep) == pytest.approx(np.hypot(*2 * [0.004 + 0.1 * 0.0185]))
 
 
-@pytest.mark.parametrize("tilt_deg", [None, 5])
+TROUGH = {"kind": "trough", "material": "steel", "length_m": 0.06, "width_m": 0.04, "height_m": 0.05}
+LINE = {"path": {"kind": "line", "start_m": [-0.01, 0], "length_m": 0.02}, "plunge_at_m": None}
+LEANING = [[0, -0.003, 0], [0.5, 0.003, 0, 0, 0, 8, 0], [1, 0.006, 0, 0, 0, -8, 0]]
+
+
+@pytest.mark.parametrize(
+    ("bowl", "motion"),
+    [
+        ({}, {}),
+        ({}, {"tilt_deg": 5}),
+        ({}, {"tilt_deg": 8, "spin": {"rpm": 60}}),
+        ({}, {"path": {"kind": "waypoints", "points": LEANING}, "speed_m_s": None}),
+        (TROUGH, LINE),
+    ],
+)
 def test_facets_that_would_leave_the_box_are_not_written(
-    with_part: Callable[..., Case], tilt_deg: float | None
+    with_part: Callable[..., Case], small: dict[str, Any], bowl: Any, motion: Any
 ) -> None:
-    """LIGGGHTS ends a run if the centre of a facet leaves its box."""
-    case = with_part(flared(0.09, above_m=0.02), tilt_deg=tilt_deg)
-    lines = [line.split() for line in process_scene(case).files["workpiece.stl"]().splitlines()]
+    """LIGGGHTS ends a run if the centre of a facet leaves its box, as it leans and spins too."""
+    small["bowl"] = bowl or small["bowl"]
+    case = with_part(flared(0.09, above_m=0.04), **motion)
+    scene = process_scene(case)
+    lines = [line.split() for line in scene.files["workpiece.stl"]().splitlines()]
     corners = np.array([line[1:] for line in lines if line[0] == "vertex"], float)
     whole = workpiece_mesh(case)
     written = surface(corners, np.arange(len(corners)).reshape(-1, 3))
     assert 0 < len(written.faces) < len(whole.faces)
-    reach = np.hypot(*written.triangles_center[:, :2].T) + 0.01
-    assert reach.max() <= box_half_widths(case.study)[0]
     in_bed = [(mesh.triangles[:, :, 2].min(axis=1) < 0.015).sum() for mesh in (whole, written)]
     assert in_bed[0] == in_bed[1] > 0
+    way = course(case.study, expected_bed(case.study), reference_height(case))
+    for leg in way.legs:
+        places, turns = way.poses(leg, np.linspace(0, leg.steps, 50))
+        turned = np.einsum("nij,fj->nfi", turns.matrices, written.triangles_center)
+        farthest = np.abs(places[:, None] + turned).max(axis=(0, 1))[:2]
+        assert (farthest <= box_half_widths(case.study)).all()
 
 
 def test_a_facet_from_the_bed_out_of_the_box_is_refused(with_part: Callable[..., Case]) -> None:

@@ -105,10 +105,11 @@ def process_cautions(case: Case) -> Iterator[Caution]:
     of_file = isinstance(study.workpiece.shape, MeshShape)
     left_out = workpiece_facets(case) - len(simulated_mesh(case).faces) if of_file else 0
     if left_out:
+        x, y = box_half_widths(study)
         yield Caution(
             "mesh",
-            f"{left_out:,} facets above the bed would leave the simulation box, "
-            f"{box_half_widths(study)[0]:.3g} m from the axis of the bowl: the run leaves them out",
+            f"{left_out:,} facets above the bed would leave the simulation box, {x:.3g} by {y:.3g} "
+            "m from the axis of the bowl: the run leaves them out",
         )
     gap = in_diameters(case, wall_gap(case))
     if gap < JAMMING_GAP:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from dragdeck.cases.bed import bed_timestep
+from dragdeck.cases.bed import bed_timestep, box_half_widths
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
 from dragdeck.mesh import surface as surfaces
@@ -18,6 +18,7 @@ from dragdeck.mesh.files import read
 from dragdeck.mesh.shapes import cylinder, cylinder_facets, cylinder_radius
 from dragdeck.physics.rounding import round_to
 from dragdeck.study.driven import DrivenMotion
+from dragdeck.study.paths.path import AroundBowl
 from dragdeck.study.rotations import by_vector
 from dragdeck.study.workpiece import CylinderShape, MeshShape
 from dragdeck.study.yaml import mesh_beside
@@ -34,8 +35,9 @@ FACET_STEP_S = 3e-7
 """Time of a step for each facet of a workpiece, s, one rank (docs/data/benchmarks/facets.csv)."""
 
 
-_LOOKS = 100
-"""How often it is looked how a workpiece leans on its path."""
+_LOOKS, _BETWEEN_POSTURES = 100, 1.01
+"""How often it is looked how a workpiece leans on its path; by how much farther from the axis a
+facet may be in between, of 24 angles of a spin."""
 
 
 _FREEBOARD_DIAMETERS = 4
@@ -127,16 +129,22 @@ def simulated_mesh(case: Case) -> "Trimesh":
         A facet reaches from the bed out of the box.
     """
     mesh, motion = workpiece_mesh(case), case.study.motion
-    if motion.path.inclined or motion.turns_about_inclined_axis:
-        return mesh
-    box = case.study.bowl.container.reach_m + 2 * case.study.media.typical_radius_m
-    outside = np.hypot(*mesh.triangles_center[:, :2].T) + motion.farthest_m > box
-    if (outside & (mesh.triangles[:, :, 2].min(axis=1) < motion.deepest_m)).any():
+    around = isinstance(motion.path, AroundBowl)
+    places = [motion.plunge_point, *motion.path.corners[:, :2].tolist()]
+    axis = np.full(2, motion.farthest_m) if around else np.abs(places).max(axis=0)
+    room = float((np.array(box_half_widths(case.study)) - axis).min())
+    far, low = np.zeros(len(mesh.faces)), np.full(len(mesh.faces), np.inf)
+    for corners in _postures(case):
+        facets = corners[mesh.faces]
+        far = np.maximum(far, np.hypot(*facets.mean(axis=1)[:, :2].T))
+        low = np.minimum(low, facets[:, :, 2].min(axis=1))
+    outside = far * (_BETWEEN_POSTURES if motion.inclined else 1.0) > room
+    if (outside & (low < motion.deepest_m - reference_height(case))).any():
         raise InputError(
             "a facet of the workpiece reaches from the bed out of the simulation box",
             file=case.file,
             field="workpiece.shape",
-            limit=f"a centre within {box:.4g} m from the axis of the bowl",
+            limit=f"a centre within {room:.4g} m from the axis of the workpiece",
             remedy="mesh the part with smaller facets, or cut it off above the bed",
         )
     return surfaces.surface(mesh.vertices, mesh.faces[~outside]) if outside.any() else mesh

@@ -230,8 +230,8 @@ def _merged(base: Json, changes: Json, top: bool = True) -> dict[str, JsonValue]
     merged = {key: value for key, value in base.items() if key not in replaced}
     for key, value in changes.items():
         there = merged.get(key)
-        if value is None and key in merged:
-            del merged[key]
+        if value is None and key in base:
+            merged.pop(key, None)
         elif isinstance(value, dict) and not (top and key in _WHOLE):
             if not isinstance(there, dict) or value.get("kind") not in (None, there.get("kind")):
                 there = {}

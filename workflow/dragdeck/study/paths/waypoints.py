@@ -107,8 +107,8 @@ class WaypointsPath(WorkpiecePath):
 
     @property
     def most_turned_deg(self) -> float:
-        """Between two waypoints, about the vertical."""
-        return max(abs(b.turn_deg - a.turn_deg) for a, b in pairwise(self.points))
+        """Between two waypoints, of each of the three angles."""
+        return float(np.abs(np.diff([point[4:] for point in self.points], axis=0)).max())
 
     def _stretches(self) -> Sequence[Sequence[float]]:
         """Differences between each waypoint and the next: duration, s, and x, y and z, m."""
