@@ -353,6 +353,7 @@ def test_a_bed_that_may_reach_above_the_rim_is_refused(
             filling_scene(case)
     with pytest.raises(InputError, match="more particles than fit") as caught:
         filling_scene(case)
+    assert caught.value.field == "media.count"
     most = re.match(r"(\d+) particles", caught.value.limit or "")
     assert most
     small["media"]["count"] = int(most[1])
@@ -360,6 +361,21 @@ def test_a_bed_that_may_reach_above_the_rim_is_refused(
     small["media"]["count"] = int(most[1]) + 1
     with pytest.raises(InputError, match="more particles than fit"):
         filling_scene(made())
+
+
+def test_the_largest_class_stands_on_top_of_a_bed(made: Made, small: Small) -> None:
+    """A bed whose fine first class alone would fit; the message names the total of the study."""
+    classes = {
+        name: {"material": "ceramic", "radius_mean_m": radius_m, "fraction": fraction}
+        for name, radius_m, fraction in (("fine", 1e-3, 0.05), ("coarse", 3e-3, 0.95))
+    }
+    small["media"] = {"fill_height_m": 0.02, "classes": classes}
+    bed = expected_bed(made().study)
+    assert bed.top_m == pytest.approx(bed.surface_m + 6e-3)
+    small["bowl"]["height_m"] = bed.top_m
+    with pytest.raises(InputError, match="more particles than fit") as caught:
+        filling_scene(made())
+    assert caught.value.field == "media.fill_height_m"
 
 
 @pytest.mark.parametrize(("height_m", "refused"), [(0.1, False), (0.1001, True), (9.0, True)])

@@ -7,10 +7,9 @@ from made_study import Made
 
 from dragdeck.cases.bed import bed_volume, expected_surface
 from dragdeck.errors import InputError
-from dragdeck.scenes.fit import ROOM_BELOW, ROOM_BESIDE, clearances, in_diameters
+from dragdeck.scenes.fit import LEAST_GAP, ROOM_BELOW, ROOM_BESIDE, clearances, in_diameters
 from dragdeck.scenes.process import PROCESS, process_scene
 from dragdeck.scenes.process_cautions import process_cautions
-from dragdeck.sweep.cases import LEAST_GAP
 
 ROOMY: dict[str, Any] = {
     "media.radius_mean_m": 1.5e-3, "media.radius_std_m": 1e-4, "media.count": 4000,

@@ -56,7 +56,7 @@ def _first_particles(
 def expected_bed(study: Study) -> Bed:
     """The settled bed before it exists: an estimate with a margin of two standard deviations."""
     surface = beds.expected_surface(study)
-    top = surface + 2 * study.media.typical_radius_m
+    top = surface + 2 * max(part.mean_radius_m for part in study.media.parts.values())
     return Bed(surface, top, 2 * SOLID_FRACTION_STD * surface)
 
 

@@ -174,7 +174,7 @@ def _check_capacity(case: Case) -> None:
         raise InputError(
             "more particles than fit into the bowl",
             file=case.file,
-            field="media.count",
+            field=f"media.{study.media.total}",
             value=f"{study.particle_count}, which fill it to {bed.surface_m:.4g} m +- "
             f"{bed.margin_m:.2g} m, with a particle on top",
             limit=f"{most} particles in a bowl {rim:g} m high",

@@ -53,9 +53,9 @@ JAMMING_GAP = 2.0
 """Particle diameters between workpiece and bowl below which a warning is given: in a narrower gap,
 an arch of two particles can block the workpiece (docs/development/liggghts.md)."""
 
-ROOM_BESIDE, ROOM_BELOW = 6.0, 4.0
+ROOM_BESIDE, ROOM_BELOW, LEAST_GAP = 6.0, 4.0, 2.7
 """Particle diameters beside the workpiece and below it from which the drag no longer depends on
-them within 13 and 5 % (docs/evidence/simplifications.md)."""
+them within 13 and 5 % (docs/evidence/simplifications.md), and beside it for larger particles."""
 
 
 @dataclass(frozen=True)
@@ -238,10 +238,12 @@ def _below(case: Case, tip_m: float) -> Iterator[InputError]:
         problem = "the workpiece would crush particles between its tip and the floor"
         if tip_m < 0:
             problem = "the workpiece would reach below the floor"
+        most = depth + tip_m - largest
+        limit = f"at most {limit_of(most)} m" if most > 0 else "none: the packing is too low"
         yield InputError(
             problem, file=case.file, field=_depth_field(case), value=depth,
-            limit=f"at most {limit_of(depth + tip_m - largest)} m: a packing at least "
-            f"{depth + tip_m:.4g} m high minus the diameter of the largest particle",
+            limit=f"{limit}: a packing at least {depth + tip_m:.4g} m high minus the diameter of "
+            f"the largest particle, {largest:.4g} m",
             remedy="reduce the immersion depth, or use more particles",
         )  # fmt: skip
 

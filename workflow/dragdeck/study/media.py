@@ -36,6 +36,8 @@ MOST_SIEVES = MOST_CLASSES = 100
 
 _SIZES = ("radius_mean_m", "radius_std_m", "distribution")
 
+_TOTALS = ("count", "mass_kg", "fill_height_m")
+
 INSTEAD_OF: Mapping[str, Sequence[str]] = {
     "count": ("mass_kg", "fill_height_m"),
     "mass_kg": ("count", "fill_height_m"),
@@ -227,8 +229,7 @@ class Media(Grains):
 
     @model_validator(mode="after")
     def _whole(self) -> Self:
-        totals = [self.count, self.mass_kg, self.fill_height_m]
-        if sum(total is not None for total in totals) != 1:
+        if sum(getattr(self, name) is not None for name in _TOTALS) != 1:
             raise ValueError("give one of count, mass_kg and fill_height_m")
         for name, grains in self.parts.items():
             where = f"class {name}: " if name else ""
@@ -247,6 +248,11 @@ class Media(Grains):
     def __hash__(self) -> int:
         """Of what the study says, as it has parts that have no hash."""
         return hash(self.model_dump_json())
+
+    @property
+    def total(self) -> str:
+        """Name of the field that states how many particles there are."""
+        return next(name for name in _TOTALS if getattr(self, name) is not None)
 
     @property
     def parts(self) -> Mapping[str, Grains]:

@@ -16,7 +16,7 @@ from dragdeck.errors import InputError, choices, together
 from dragdeck.mesh.files import FORMATS
 from dragdeck.physics.rounding import limit_of
 from dragdeck.scenes.bed_space import expected_bed
-from dragdeck.scenes.fit import clearances
+from dragdeck.scenes.fit import LEAST_GAP, clearances
 from dragdeck.scenes.moving_bowl import bed_in_motion
 from dragdeck.study.base import NAME, NAME_LIMIT, STUDY_FILE, Json
 from dragdeck.study.check import validate
@@ -269,11 +269,6 @@ def _set(data: dict[str, JsonValue], field: str, value: JsonValue, file: Path) -
             )  # fmt: skip
         place = below
     place[last] = value
-
-
-LEAST_GAP = 2.7
-"""Smallest gap between workpiece and wall, in diameters of the larger particles. Below
-`dragdeck.scenes.fit.ROOM_BESIDE` there is a warning (docs/evidence/simplifications.md)."""
 
 
 def with_larger_particles(case: Case) -> Case:
