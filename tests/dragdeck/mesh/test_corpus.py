@@ -340,6 +340,7 @@ REFUSED: dict[str, tuple[str | bytes, str, int | None]] = {
     "tetrahedra.vtk": (vtk([(0, 1, 2, 4)], 10), "no polygons", None),
     "cut.vtk": (vtk()[:200].replace("POINTS 8", "POINTS 800"), "not as many POINTS", None),
     "cut.vtu": ("<?xml version='1.0'?><VTKFile type='UnstructuredGrid'>", "cut short", None),
+    "lz4.vtu": ("<VTKFile compressor='vtkLZ4DataCompressor'></VTKFile>", "with LZ4", None),
 }  # fmt: skip
 
 

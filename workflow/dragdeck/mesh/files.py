@@ -183,8 +183,11 @@ def _vtu(path: Path) -> Polygons:
     """Read VTU; meshio's own `read` ends the interpreter on bad files."""
     import meshio
 
-    if not path.read_bytes().rstrip().endswith(b"</VTKFile>"):
+    data = path.read_bytes()
+    if not data.rstrip().endswith(b"</VTKFile>"):
         raise InputError("the file was cut short", limit='"</VTKFile>" at its end')
+    if b"vtkLZ4DataCompressor" in data:
+        raise InputError("the file is compressed with LZ4", limit="zlib, LZMA or no compression")
     content = meshio.vtu.read(path)
     blocks = [block for block in content.cells if block.type not in ("vertex", "line")]
     for block in blocks:
