@@ -198,7 +198,13 @@ def test_a_part_that_is_wide_in_the_bed_is_refused(with_part: Callable[..., Case
     assert workpiece_radius(deep) == pytest.approx(np.hypot(*2 * [0.004 + 0.1 * 0.0185]))
 
 
-TROUGH = {"kind": "trough", "material": "steel", "length_m": 0.06, "width_m": 0.04, "height_m": 0.05}
+TROUGH = {
+    "kind": "trough",
+    "material": "steel",
+    "length_m": 0.06,
+    "width_m": 0.04,
+    "height_m": 0.05,
+}
 LINE = {"path": {"kind": "line", "start_m": [-0.01, 0], "length_m": 0.02}, "plunge_at_m": None}
 LEANING = [[0, -0.003, 0], [0.5, 0.003, 0, 0, 0, 8, 0], [1, 0.006, 0, 0, 0, -8, 0]]
 

@@ -239,7 +239,7 @@ def _below(case: Case, tip_m: float) -> Iterator[InputError]:
         if tip_m < 0:
             problem = "the workpiece would reach below the floor"
         most = depth + tip_m - largest
-        limit = f"at most {limit_of(most)} m" if most > 0 else "none: the packing is too low"
+        limit = f"at most {limit_of(most)} m" if most > 0 else "none"
         yield InputError(
             problem, file=case.file, field=_depth_field(case), value=depth,
             limit=f"{limit}: a packing at least {depth + tip_m:.4g} m high minus the diameter of "

@@ -84,9 +84,11 @@ def _pairs(study: Study) -> _Found:
             yield field, problem, "a damping ratio above 0, such as 0.3"
         if model != "epsd" and pair.rolling_damping:
             yield field, f"the rolling model {model} has no damping", "contact.rolling_model epsd"
+    known = {*study.pairs}
     for first, other in product(study.media.materials, study.type_names()):
         key, back = f"{first}-{other}", f"{other}-{first}"
-        if key in every and not {key, back} & set(study.pairs):
+        if key in every and not {key, back} & known:
+            known.add(key)
             yield (
                 "pairs",
                 f"has no entry {key!r}, although these come into contact",
