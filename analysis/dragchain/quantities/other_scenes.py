@@ -54,7 +54,7 @@ def other_scenes(quantity: Quantity, case: CaseOfRun) -> OtherScenes | None:
     number = case.numbers.get("stiffness_number")
     if scale == 1.0 or fidelity.speed_factor != 1.0 or not math.isfinite(known.per_softness_std):
         return None
-    if number is None or case.changed_law or _attracts(case) or _wet_or_shaped(case):
+    if number is None or case.changed_law or _attracts(case) or _other_bed(case):
         return None
     difference = softening(number, scale)
     return OtherScenes(
@@ -67,6 +67,8 @@ def _attracts(case: CaseOfRun) -> bool:
     return bool(case.added_forces) or any(parts)
 
 
-def _wet_or_shaped(case: CaseOfRun) -> bool:
+def _other_bed(case: CaseOfRun) -> bool:
+    """Whether it is wet, shaken or of clumps."""
     study = study_of(case)
-    return study.compound is not None or study.sphere_count != study.particle_count
+    shaken = study.motion.bowl is not None and any(study.motion.bowl.reach_m)
+    return study.compound is not None or shaken or study.sphere_count != study.particle_count
