@@ -101,6 +101,7 @@ DRAG, CONTACTS = (
     for name in ("drag_mean", "workpiece_contacts")
 )
 NUMBERS = {"numbers": {"stiffness_number": 64_000.0}}
+CIRCLE = {"path": {"kind": "circle", "radius_m": 0.02}, "speed_m_s": 0.01, "plunge_at_m": [0, 0]}
 SHAKEN = {"kind": "vibration", "amplitude_m": [0, 0, 1e-3], "frequency_hz": 25}
 
 
@@ -126,7 +127,7 @@ def test_other_scenes_give_an_estimate_beside_the_value_of_a_soft_run() -> None:
         (DRAG, (1e-3, 1.0), NUMBERS | {"added_forces": ["cohesion sjkr2"]}),
         (DRAG, (1e-3, 1.0), NUMBERS | {"attractive": {"particle": {"cohesion_j_m3": 1e5}}}),
         (DRAG, (1e-3, 1.0), NUMBERS | {"study": {"compound": {"density_kg_m3": 1000.0}}}),
-        (DRAG, (1e-3, 1.0), NUMBERS | {"study": {"motion.bowl": SHAKEN}}),
+        (DRAG, (1e-3, 1.0), NUMBERS | {"motion": {**CIRCLE, "bowl": SHAKEN}}),
         (DRAG, (1e-3, 1.0), NUMBERS | {"changed_law": ["pair_style gran model hooke"]}),
         (CONTACTS, (1e-3, 1.0), NUMBERS),  # differs from scene to scene
         (PLAIN, (1e-3, 1.0), NUMBERS),
