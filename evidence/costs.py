@@ -16,17 +16,17 @@ from operator import attrgetter
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
+import jinja2
 import numpy as np
 
 from dragchain.statistics.estimate import Estimate, finite, mean_of
 from dragdeck import __version__
 from dragdeck.cases.case import Case
-from dragdeck.decks.templates import environment
 from dragdeck.engine.batch import Batch
 from dragdeck.engine.reports import Report, say
 from dragdeck.errors import InputError
 from dragdeck.parts import Part
-from dragdeck.project import by_run, find_project, study_templates
+from dragdeck.project import by_run, find_project
 from dragdeck.records.run import RunRecord
 from dragdeck.records.tradeoff import CostEntry, CostsFile, Machine
 from dragdeck.scenes.filling import FILLING
@@ -218,7 +218,7 @@ def cost(
 
 def time_options(
     case: Case,
-    templates: Path,
+    templates: jinja2.Environment,
     out: Path,
     report: Report,
     *,
@@ -232,8 +232,8 @@ def time_options(
     ----------
     case : Case
         Its fidelity gives modulus and step of the standard case.
-    templates : Path
-        The project's templates.
+    templates : Environment
+        Those of the study.
     out : Path
         The result; runs go to ``costs/`` beside it.
     report : callable
@@ -263,8 +263,7 @@ def time_options(
     cases = {name: timed.case for name, timed in chosen.items()}
     first, *others = cases
     folder = out.resolve().parent / "costs"
-    own_templates = environment(templates, study_templates(case))
-    filling = Batch(folder / "filling", own_templates)
+    filling = Batch(folder / "filling", templates)
     beds = {
         run: read_bed(filled(filling, of_bed))
         for run, of_bed in by_run(cases.values(), FILLING).items()
@@ -275,7 +274,7 @@ def time_options(
     }
     records: dict[str, list[RunRecord]] = {name: [] for name in cases}
     for number in range(1, rounds + 1):
-        batch = Batch(folder / f"round-{number}", own_templates)
+        batch = Batch(folder / f"round-{number}", templates)
         records[first].append(batch.result(first, scenes[first]()))
         refused = batch.each({name: scenes[name] for name in others}, report)
         for name in others:
@@ -319,4 +318,4 @@ def measure_costs(study: str, fidelity: str | None, out: Path, rounds: int) -> N
     """Time the options of a study by its name; see `time_options`."""
     project = find_project(Path.cwd())
     case = project.cases(study, fidelity)[0]
-    time_options(case, project.templates, out, say, rounds=rounds)
+    time_options(case, project.templates_of(case), out, say, rounds=rounds)

@@ -12,10 +12,9 @@ import numpy as np
 from dragchain.calibration.drops import IMPACTS, Drop, full
 from dragchain.calibration.simulated_drops import DropRun, Drops, run_drops
 from dragdeck.cases.case import Case
-from dragdeck.decks.templates import environment
 from dragdeck.engine.batch import Batch
 from dragdeck.engine.reports import say
-from dragdeck.project import project_here, study_templates
+from dragdeck.project import project_here
 from dragdeck.study.calibration import measurements
 from dragdeck.study.force_record import Record, check_samples
 
@@ -124,7 +123,7 @@ def make_record(
     """
     project = project_here()
     case = project.cases("droptest")[0]
-    batch = Batch(folder, environment(project.templates, study_templates(case)))
+    batch = Batch(folder, project.templates_of(case))
     drops = run_drops(case, [drop_of(case, seed)], batch, say)
     sensor = Sensor(rate_hz, noise_n, offset_n, drift_n_per_s, resolution_n)
     out.write_text(synthetic_record(drops, sensor, seed), encoding="utf-8")

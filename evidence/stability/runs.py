@@ -10,12 +10,11 @@ from dragdeck.cases.bed import particle_material
 from dragdeck.cases.case import Case
 from dragdeck.decks import PACKING_FILE
 from dragdeck.decks.deck import AnyScene
-from dragdeck.decks.templates import environment
 from dragdeck.engine.batch import Batch
 from dragdeck.engine.reports import say
 from dragdeck.errors import InputError
 from dragdeck.physics.packing import Bed
-from dragdeck.project import find_project, study_templates
+from dragdeck.project import find_project
 from dragdeck.scenes.filling import filling_scene
 from dragdeck.scenes.process import process_scene
 from dragdeck.scenes.scene import read_bed
@@ -101,7 +100,7 @@ def run_map(map_file: Path, folder: Path, cores: int) -> list[PointRun]:
     """
     project = find_project(Path.cwd())
     (base,) = load_cases(study_file(project.studies, "stability"))
-    templates = environment(project.templates, study_templates(base))
+    templates = project.templates_of(base)
     points = {regime: load_points(map_file, regime) for regime in REGIMES}
     starts = bed_settings(chain.from_iterable(points.values()))
     beds = {

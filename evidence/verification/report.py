@@ -11,11 +11,10 @@ from markupsafe import Markup
 from dragchain.report.campaign import write_report
 from dragchain.tables.columns import UNITS, unit_end
 from dragdeck.cases.ranks import cores_here
-from dragdeck.decks.templates import environment
 from dragdeck.engine.batch import Batch
 from dragdeck.engine.reports import say
 from dragdeck.errors import RejectedRunError
-from dragdeck.project import find_project, run_path, study_templates
+from dragdeck.project import find_project, run_path
 from evidence.verification.checks import ComparedRuns, checks_by_test
 from evidence.verification.quantity_check import JUDGED, CheckVerdict, check_rows
 from evidence.verification.recording import read_recording
@@ -51,7 +50,7 @@ def verify(study: str, fidelity: str | None, out_dir: Path, cores: int | None) -
     project = find_project(Path.cwd())
     case = project.cases(study, fidelity)[0]
     folder = project.root / run_path("verification", "collide", "")
-    batch = Batch(folder, environment(project.templates, study_templates(case)))
+    batch = Batch(folder, project.templates_of(case))
     suite = suite_of(case.study)
     batch.each({run: partial(suite.__getitem__, run) for run in suite}, say, cores or cores_here())
     return verdict(write_verification(out_dir, [folder / name for name in suite]), out_dir)

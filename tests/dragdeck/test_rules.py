@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 import yaml
+from made_run import output, run_json, write_documents
 from paths import ROOT
 from snakemake.cli import parse_config
 from snakemake_interface_common.exceptions import WorkflowError
@@ -72,6 +73,19 @@ def test_a_run_of_a_plan_is_named_by_it_unless_the_study_has_it() -> None:
     point = ours.every_point("points", "tables/quantities.json")[0].split("/")[-3]
     named = ours.cases_option("points")(SimpleNamespace(study="uhlmann2015", run=point))
     assert named == "--plan default"
+
+
+def test_tables_are_kept_whose_raw_output_was_deleted(tmp_path: Path) -> None:
+    run = write_documents(tmp_path / "run-01234567", {}, {"force": output("print", ["step"], 1, 0, 9)})
+    (run / "state.json").write_text(json.dumps(run_json()))
+    raw, table = run / "x.1.txt", run / "tables/force.parquet"
+    jobs = [SimpleNamespace(rule=SimpleNamespace(name="tabulate_process"), output=[str(table)])]
+    work("quickstart").check_raw_outputs(jobs)
+    table.touch()
+    with pytest.raises(WorkflowError, match="raw output was deleted"):
+        work("quickstart").check_raw_outputs(jobs)
+    raw.touch()
+    work("quickstart").check_raw_outputs(jobs)
 
 
 def test_a_further_workpiece_shares_the_files_of_its_run() -> None:

@@ -1,9 +1,12 @@
 """`dragdeck status` and `dragdeck open` on folders as runs leave them."""
 
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 import yaml
+from made_scenes import own_template
 from made_study import Made
 
 from dragdeck.cases.case import Case
@@ -12,6 +15,7 @@ from dragdeck.project import Project, by_run
 from dragdeck.records.run import AcceptanceCheck, RunPart, RunRecord
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import PROCESS, SCENES
+from dragdeck.study.reference import Reference, Signal
 
 
 @pytest.fixture(autouse=True)
@@ -21,6 +25,7 @@ def without_display(inside: Project, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 Said = pytest.CaptureFixture[str]
+TEMPLATE = '{% extends "base/process.in.j2" %}{% block extra %}timestep 1e-6{% endblock %}'
 
 
 def write_state(folder: Path, **values: object) -> None:
@@ -72,8 +77,16 @@ def test_the_points_of_a_plan_have_a_status(case: Case, project: Project, capsys
     assert "runs 0 % done: 10 waiting" in capsys.readouterr().out
 
 
+EDITS: Mapping[str, Callable[[Case, Made], object]] = {
+    "a remark": lambda case, made: made({"title": "another"}),
+    "a template": lambda case, made: own_template(case, TEMPLATE),
+    "a template that cannot be used": lambda case, made: own_template(case, TEMPLATE[:-2]),
+}
+
+
+@pytest.mark.parametrize("edit", EDITS.values(), ids=EDITS)
 def test_open_and_status_say_where_the_report_is_and_whether_it_is_current(
-    case: Case, made: Made, project: Project, capsys: Said
+    edit: Callable[[Case, Made], object], case: Case, made: Made, project: Project, capsys: Said
 ) -> None:
     assert main(["open", "small"]) == 1
     assert "./run all --config study=small" in capsys.readouterr().err
@@ -85,8 +98,19 @@ def test_open_and_status_say_where_the_report_is_and_whether_it_is_current(
     assert capsys.readouterr() == (f"{file}\n", "")
     assert main(["status", "small"]) == 0
     assert capsys.readouterr().out.endswith(f"report: {file}\n")
-    made({"title": "another"})
+    edit(case, made)
     assert main(["open", "small"]) == 0
     assert "the report is of other settings" in capsys.readouterr().err
     assert main(["status", "small"]) == 0
     assert "is of other settings, or not of all runs" in capsys.readouterr().out
+
+
+def test_the_state_of_a_report_has_the_measured_signal(case: Case, project: Project) -> None:
+    signal = Signal(file="force.csv", column="fx_n", orientation="fixed", low_pass_hz=9)
+    reference = Reference(source="measured", signal=signal)
+    measured = replace(case, study=case.study.model_copy(update={"reference": reference}))
+    states = set()
+    for content in ("fx_n\n1\n", "fx_n\n2\n"):
+        (case.file.parent / "force.csv").write_text(content)
+        states.add(project.state([measured]))
+    assert len(states) == 2

@@ -90,7 +90,7 @@ def test_a_measurement_is_not_overwritten(case: Case, inside: Project, capsys: A
 
 def test_no_round_is_nothing_to_time(case: Case, project: Project, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="--rounds: nothing to time"):
-        time_options(case, project.templates, tmp_path / "costs.json", silent, rounds=0)
+        time_options(case, project.templates_of(case), tmp_path / "costs.json", silent, rounds=0)
 
 
 TWO = """base: {fidelity.ranks: 1, fidelity.speed_factor: 1.0, outputs.n_checkpoints: 0}
@@ -114,10 +114,10 @@ def test_two_options_on_the_engine(
     design = tmp_path / "two.yaml"
     design.write_text(TWO)
 
+    templates = project.templates_of(case)
+
     def time_them(out: Path, rounds: int) -> dict[str, Any]:
-        time_options(
-            case, project.templates, out, silent, rounds=rounds, seconds=0.08, design=design
-        )
+        time_options(case, templates, out, silent, rounds=rounds, seconds=0.08, design=design)
         document: dict[str, Any] = json.loads(out.read_text())
         return document
 

@@ -12,7 +12,6 @@ from dragdeck.advice import forecast as forecasts
 from dragdeck.cases.case import Case
 from dragdeck.cases.ranks import cores_here
 from dragdeck.decks import render as rendering
-from dragdeck.decks.templates import environment
 from dragdeck.engine.process import find_engine
 from dragdeck.engine.reports import say
 from dragdeck.errors import DragdeckError, InputError, RecordError, together
@@ -50,7 +49,7 @@ def check_study(study: str, fidelity: str | None, verbose: bool) -> None:
 def _check(study: str, fidelity: str | None, verbose: bool) -> None:
     project = projects.find_project(Path.cwd())
     every = project.cases(study, fidelity)
-    findings = _Findings(environment(project.templates, projects.study_templates(every[0])))
+    findings = _Findings(project.templates_of(every[0]))
     runs = [
         run
         for kind in SCENES.values()

@@ -15,7 +15,6 @@ from dragdeck.advice.advise import advised_settings
 from dragdeck.cases.bed import clump_of
 from dragdeck.cases.case import Case
 from dragdeck.decks import render as rendering
-from dragdeck.decks.templates import environment
 from dragdeck.engine.reports import say
 from dragdeck.errors import DragdeckError, InputError, choices, together
 from dragdeck.files import write_bytes
@@ -57,7 +56,7 @@ def explain(study: str, fidelity: str | None, scene: str | None, verbose: bool) 
     """Show what the input scripts of a study model and leave out, and what that would cost."""
     project = projects.find_project(Path.cwd())
     every = project.cases(study, fidelity)
-    templates = environment(project.templates, projects.study_templates(every[0]))
+    templates = project.templates_of(every[0])
     for kind in [_scene_type(scene)] if scene else SCENES.values():
         cases = list(projects.by_run(every, kind).values())
         for case in cases if verbose else cases[:1]:
@@ -229,7 +228,7 @@ def render(
     case = runs[run]
     if not kind.needs_bed:
         _check_processes(case for case in every if kind.run_id(case) == run)
-    templates = environment(project.templates, projects.study_templates(case))
+    templates = project.templates_of(case)
     built = built_scene(kind, case, _bed(kind, packing))
     changes = rendering.of_its_templates(rendering.deck_text(built, templates), built, templates)
     refuse_tolerance(case, changes["changed_law"])

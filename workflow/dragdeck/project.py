@@ -2,14 +2,19 @@
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
+import jinja2
+
 from dragdeck.advice.advise import resolve
 from dragdeck.cases.case import Case, digest, of_each_workpiece
+from dragdeck.decks.templates import commands_digest, environment, template_files
 from dragdeck.errors import InputError, choices
+from dragdeck.files import file_checksum
 from dragdeck.outlook.timestep import check_timestep
 from dragdeck.records.tradeoff import TradeoffRecord
 from dragdeck.scenes.lead import FIRST_WINDOWS, LEAD, WHOLE_DRAG, with_lead, with_leads
@@ -20,6 +25,7 @@ from dragdeck.shipped import SHIPPED, own_or_shipped
 from dragdeck.study.base import NAME, NAME_LIMIT
 from dragdeck.study.check import validate
 from dragdeck.study.model import Scaling, Study
+from dragdeck.study.recorded import recorded_file
 from dragdeck.study.search import RECORD as SEARCHED
 from dragdeck.study.workpiece import MeshShape
 from dragdeck.study.yaml import located, mesh_beside, read_study, study_folders
@@ -92,6 +98,11 @@ class Project:
         """The folder of templates."""
         return own_or_shipped(self.root, "templates")
 
+    def templates_of(self, case: Case) -> jinja2.Environment:
+        """The templates of a case: of its study, of those that it extends, and the project's."""
+        folders = (folder / "templates" for folder in study_folders(case.file))
+        return environment(self.templates, *folders)
+
     @property
     def studies(self) -> Path:
         """One folder a study."""
@@ -120,11 +131,10 @@ class Project:
                 _check_timesteps(case)
         except InputError as error:
             raise located(error) from None
-        left = self._left(study, cases)
-        return [replace(case, left=left) for case in cases] if left else cases
+        return self.with_left(study, cases)
 
-    def _left(self, study: str, cases: Iterable[Case]) -> dict[str, str]:
-        """Runs by their digests that cases can use although the sweep names them otherwise now.
+    def with_left(self, study: str, cases: list[Case]) -> list[Case]:
+        """Cases that know the runs they can use although the sweep names them otherwise now.
 
         Not of a digest that several cases share, or whose run has the case's name already.
         """
@@ -133,7 +143,8 @@ class Project:
         parts = (part for case in cases for part in (with_lead(case).lead, case) if part and there)
         names = {PROCESS.run_id(part) for part in parts}
         used = Counter(name[-8:] for name in (*names, *(names & there)))
-        return {name[-8:]: name for name in sorted(there) if used[name[-8:]] < 2}
+        left = {name[-8:]: name for name in sorted(there) if used[name[-8:]] < 2}
+        return [replace(case, left=left) for case in cases] if left else cases
 
     def searched(self, study: str) -> Study:
         """A study with a search.
@@ -189,15 +200,22 @@ class Project:
         """The page that a study's results end in."""
         return self.results(study) / "report" / "report.html"
 
-    def state(self, cases: Iterable[Case]) -> str:
+    def state(self, cases: Sequence[Case]) -> str:
         """Hash of all that a report on cases shows of their study."""
-        every = list(cases)
-        return digest({name: [of.digest(case) for case in every] for name, of in SCENES.items()})
+        said = {name: [of.digest(case) for case in cases] for name, of in SCENES.items()}
+        templates, signal = self.templates_of(cases[0]), signal_file(cases[0])
+        scripts = {file for name in SCENES for file in template_files(templates, name)}
+        texts = (file.read_text(encoding="utf-8") for file in scripts)
+        said |= {"scripts": sorted(map(commands_digest, texts))}
+        said |= {"signal": [file_checksum(signal)] if signal else []}
+        return digest(said)
 
-    def report_is_current(self, study: str, cases: Iterable[Case]) -> bool:
-        """Whether the report is complete, and on the study as it stands."""
+    def report_is_current(self, study: str, cases: Sequence[Case]) -> bool:
+        """Whether the report is complete, and on the study and its templates as they stand."""
         mark = self.report(study).with_name("complete")
-        return mark.is_file() and mark.read_text(encoding="utf-8").strip() == self.state(cases)
+        with suppress(InputError):  # of a template or a signal
+            return mark.is_file() and mark.read_text(encoding="utf-8").strip() == self.state(cases)
+        return False
 
     def run_folders(
         self, cases: Iterable[Case], scene: SceneType, *, of_plan: bool = False
@@ -331,10 +349,12 @@ def project_here() -> Project:
     return project
 
 
-def study_templates(case: Case) -> Path:
-    """A study's own templates, or those of the nearest study it extends that has any."""
-    folders = [folder / "templates" for folder in study_folders(case.file)]
-    return next((folder for folder in folders if any(folder.glob("[!.]*"))), folders[0])
+def signal_file(case: Case) -> Path | None:
+    """The measured force signal of a case's study, if it names one."""
+    reference = case.study.reference
+    if reference is None or reference.signal is None:
+        return None
+    return recorded_file(reference.signal.file, case.file, "reference.signal.file")
 
 
 def study_files(cases: Iterable[Case]) -> list[Path]:

@@ -19,8 +19,8 @@ from dragdeck import project as projects
 from dragdeck.calls import V, _stop, or_stop
 from dragdeck.cases.case import Case, digest
 from dragdeck.decks import RUN_FILE
-from dragdeck.decks.templates import environment, template_files
-from dragdeck.engine.status import other_engines
+from dragdeck.decks.templates import template_files
+from dragdeck.engine.status import lacks_output, other_engines
 from dragdeck.errors import InputError
 from dragdeck.outlook.runs import StudyRun, expected_runs
 from dragdeck.scenes.lead import FIRST_WINDOWS, whole_drag, windows_of, with_lead, with_leads
@@ -172,8 +172,7 @@ class Workflow:
 
     def _templates_of(self, scene: str) -> list[str]:
         """Every template that a scene's deck is made of."""
-        folders = projects.study_templates(self.cases[0])
-        templates = or_stop(environment, self.project.templates, folders)
+        templates = or_stop(self.project.templates_of, self.cases[0])
         return [self.relative(file) for file in or_stop(template_files, templates, scene)]
 
     def templates_of_study(self, scene: str) -> Callable[[Wildcards], list[str]]:
@@ -215,11 +214,8 @@ class Workflow:
 
     def signal_file(self) -> list[str]:
         """The measured force signal of the study, if it names one."""
-        reference, study = self.cases[0].study.reference, self.cases[0].file
-        if reference is None or reference.signal is None:
-            return []
-        name = reference.signal.file
-        return [self.relative(or_stop(recorded_file, name, study, "reference.signal.file"))]
+        signal = or_stop(projects.signal_file, self.cases[0])
+        return [self.relative(signal)] if signal else []
 
     def signal_option(self) -> str:
         """How to name that signal on the command line."""
@@ -277,6 +273,18 @@ class Workflow:
         """What to say of runs that another version of LIGGGHTS made than would now be called."""
         runs = (file for name in SCENES for file in self.every(name, RUN_FILE))
         return other_engines(self.project.root / file for file in runs)
+
+    def check_raw_outputs(self, jobs: Iterable[Any]) -> None:
+        """Refuse to make tables anew that cannot be made: Snakemake would delete them first."""
+        tables = [job for job in jobs if job.rule.name.startswith("tabulate_")]
+        there = (self.project.root / job.output[0] for job in tables)
+        runs = [file.parents[1] for file in there if file.is_file()]
+        if lost := [self.relative(run) for run in runs if lacks_output(run)]:
+            _stop(InputError(
+                "tables are to be made anew of runs whose raw output was deleted",
+                value=", ".join(lost), limit="an edit, or another version of dragdeck, asks for it",
+                remedy="undo it, or move the folders of these runs away: they are run again then",
+            ))  # fmt: skip
 
     def planned_runs(self, jobs: Iterable[Any]) -> list[StudyRun]:
         """The engine runs of Snakemake's jobs: what is expected of each, and how far it is.

@@ -43,6 +43,7 @@ rule write_report:
 onstart:
     signal.signal(signal.SIGINT, interrupted)
     jobs, cores = list(workflow.dag.needrun_jobs()), workflow.cores or 1
+    WORK.check_raw_outputs(jobs)
     runs = WORK.planned_runs(jobs)
     plan = plan_in_words(runs, cores)
     if plan:

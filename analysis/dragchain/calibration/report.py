@@ -30,12 +30,11 @@ from dragchain.figures.panels import key, legend_below, new_figure, new_panels
 from dragchain.figures.style import BLUE, COLOURS, GREY, LIGHT, ORANGE
 from dragchain.report.campaign import write_report
 from dragdeck.cases.case import Case
-from dragdeck.decks.templates import environment
 from dragdeck.documents import Document
 from dragdeck.engine.batch import Batch
 from dragdeck.engine.reports import say
 from dragdeck.physics.contact_mechanics import fall_time
-from dragdeck.project import find_project, study_templates
+from dragdeck.project import find_project
 from dragdeck.study.calibration import measurements
 from dragdeck.study.force_record import Record, read_record
 from dragdeck.study.recorded import recorded_file
@@ -155,7 +154,7 @@ def calibrate_study(study: str, fidelity: str | None, out_dir: Path, cores: int)
     """
     project = find_project(Path.cwd())
     case = project.cases(study, fidelity)[0]
-    templates = environment(project.templates, study_templates(case))
+    templates = project.templates_of(case)
     measured = measurements(case.study.calibration, case.file)
     drops, angles, words = None, None, []
     if measured.record is not None:

@@ -6,6 +6,7 @@ are taken packing by packing, so that what the packings have in common cancels.
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from textwrap import fill
 from typing import Any
@@ -119,7 +120,14 @@ def read_compared(folders: Sequence[Path]) -> list[ComparedCase]:
             f"a comparison has at least two cases, and this one has only {known}: name another "
             "study, or one with a sweep (packings of one case are one case)"
         )
-    return cases
+    names = Counter(case.name for case in cases)
+    return [case if names[case.name] == 1 else _with_folder(case) for case in cases]
+
+
+def _with_folder(compared: ComparedCase) -> ComparedCase:
+    """A case whose name says where its results are."""
+    folder = compared.case.first.process.folder.resolve().parents[1]
+    return replace(compared, name=f"{folder.parent.name}/{folder.name}: {compared.name}")
 
 
 def _process_runs(folder: Path) -> list[Path]:

@@ -360,14 +360,16 @@ def cases_of(studies: Iterable[StudyRuns]) -> list[ReportedCase]:
     """Group process runs by all inputs but the seed, in the order of the first ones.
 
     A run that is given again, perhaps as a copy elsewhere, is the same packing: it counts once.
+    One that another input script made is not the same.
     """
     groups: list[list[StudyRuns]] = []
-    known: set[tuple[str, str]] = set()
+    known: set[tuple[str, str, str]] = set()
     for study in studies:
         case = study.process.case
-        if (case.study_name, case.run) in known:
+        identity = case.study_name, case.run, study.process.record.inputs
+        if identity in known:
             continue
-        known.add((case.study_name, case.run))
+        known.add(identity)
         for group in groups:
             if _same_but_seed(group[0], study):
                 group.append(study)

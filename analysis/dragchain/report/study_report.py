@@ -42,8 +42,9 @@ from dragdeck.records.figures import FIGURES, figures_of
 if TYPE_CHECKING:
     from dragchain.report.measured_signal import SignalComparison
 
-_OF_CASES = ("network*.html", "*-removal.*", "signal.*", "true_size.*")
-"""Files beside the report that an earlier one may have written of cases there are no longer."""
+_OF_CASES = ("network*.html", "*-removal.*", "signal.*", "true_size.*", "complete")
+"""Files beside the report that an earlier one may have written of cases there are no longer, and
+the mark that it has all runs of the study, which the workflow sets."""
 
 
 # --- report --------------------------------------------------------------------------------------

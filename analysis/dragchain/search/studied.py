@@ -129,7 +129,8 @@ class SearchedStudy:
     def folders(self, values: Settings) -> list[Path]:
         """The process runs of a setting, one per packing."""
         cases = [self.case(values, seed) for seed in self.study.sweep["seed"]]
-        return [self.project.run_folder(case, PROCESS) for case in cases]
+        known = self.project.with_left(self.name, cases)
+        return [self.project.run_folder(case, PROCESS) for case in known]
 
     def refusal(self, values: Settings) -> str:
         """Why the study's checks refuse a setting, in one line; empty if they accept it."""

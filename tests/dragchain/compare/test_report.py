@@ -1,5 +1,6 @@
 """Cases side by side: differences, effects of factors, and the page."""
 
+import json
 import math
 import shutil
 from itertools import product
@@ -190,6 +191,17 @@ def test_a_packing_named_again_counts_once(tmp_path: Path) -> None:
     write_comparison(tmp_path / "once", folders)
     for file in ("differences.csv", "effects.csv"):
         assert (tmp_path / "twice" / file).read_text() == (tmp_path / "once" / file).read_text()
+
+
+def test_results_before_and_after_an_edit_of_a_template_are_two_cases(tmp_path: Path) -> None:
+    after = [one for one in study(tmp_path / "after", (11,)) if "fast-0" in one.name]
+    for folder in after:
+        record = json.loads((folder / "run.json").read_text())
+        (folder / "run.json").write_text(json.dumps(record | {"inputs": "1e"}))
+    before = [one for one in study(tmp_path / "before", (11,)) if one.name == after[0].name]
+    names = [case.name for case in read_compared([*before, *after])]
+    assert len(names) == len(set(names)) == 3
+    assert names[0].startswith("before/") and names[1].startswith("after/")
 
 
 def test_a_study_is_not_compared_with_itself(tmp_path: Path) -> None:

@@ -106,8 +106,10 @@ def test_each_case_has_its_own_page_on_the_contact_network(
 def test_values_at_the_true_size_have_a_table_and_a_file(
     process: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    (tmp_path / "complete").touch()
     write_study_report(tmp_path, [process])
     assert not (tmp_path / "true_size.csv").exists()
+    assert not (tmp_path / "complete").exists(), "whether it has all runs, the workflow says"
     known = Extrapolation(
         "first", "drag_mean", "mean drag", "N", Estimate(-1.25, -1.5, -1.0), None, "1.5 (2), 2 (2)",
         "not tested",

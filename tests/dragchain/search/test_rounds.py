@@ -19,6 +19,7 @@ from dragchain.search.studied import SearchedStudy
 from dragdeck.cli import main
 from dragdeck.errors import InputError
 from dragdeck.project import Project
+from dragdeck.scenes.process import PROCESS
 from dragdeck.study.search import SearchPoint, SearchRecord, SearchRound
 
 SD, LIMIT = np.array([0.05, 0.02]), 0.7
@@ -271,6 +272,19 @@ def test_the_confirmation_at_the_searchs_own_fidelity_is_one_run(
     search(studied, StandIn())
     assert [one.values.get("fidelity") for one in points_of(studied)[6:]] == [None]
     assert project.cases("small")
+
+
+def test_runs_of_another_name_are_those_that_the_workflow_uses(
+    load: Load, project: Project
+) -> None:
+    load(CHANGES)
+    studied = SearchedStudy(project, "small")
+    advance(studied, 1, StandIn())
+    (folder, *_) = folders = studied.folders(points_of(studied)[0].values)
+    left = folder.with_name(f"another-{folder.name[-8:]}")
+    left.mkdir(parents=True)
+    assert studied.folders(points_of(studied)[0].values) == [left, *folders[1:]]
+    assert {left, *folders[1:]} < {*project.run_folders(project.cases("small"), PROCESS)}
 
 
 def bounds(low: float, high: float, field: str = "motion.speed_m_s") -> dict[str, Any]:

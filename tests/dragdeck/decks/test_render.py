@@ -15,7 +15,7 @@ from dragdeck.cases.case import Case
 from dragdeck.decks.render import deck_text, of_its_templates, write_run
 from dragdeck.decks.templates import commands_digest, environment
 from dragdeck.errors import InputError
-from dragdeck.project import Project, study_templates
+from dragdeck.project import Project
 from dragdeck.scenes.process import PROCESS, SCENES, process_scene
 
 GOLDEN = ROOT / "tests/golden"
@@ -90,7 +90,7 @@ def test_what_templates_change_is_recorded_with_its_blocks(
     for name, text in files.items():
         extended = name in ("base.in.j2", "process.in.j2") and "extends" not in text
         own_template(case, f'{{% extends "base/{name}" %}}{text}' if extended else text, name)
-    templates, scene = environment(project.templates, study_templates(case)), process_scene(case)
+    templates, scene = project.templates_of(case), process_scene(case)
     found = of_its_templates(deck_text(scene, templates), scene, templates)
     assert found["changed_scripts"] == changed
     assert len(found["changed_law"]) == law, found

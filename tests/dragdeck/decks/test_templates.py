@@ -238,3 +238,24 @@ def test_output_of_a_template_is_its_own(case: Case, project: Project) -> None:
 def test_a_loop_that_can_end_stays(case: Case, project: Project, loop: str) -> None:
     own_template(case, in_block(loop))
     assert "jump SELF" in render(case, project)
+
+
+def test_each_template_is_that_of_the_nearest_study_which_has_it(
+    case: Case, project: Project
+) -> None:
+    """Also where a file of the base, which another one includes, is of no use to the child."""
+    own_template(case, LAW, "base.in.j2")
+    own_template(case, in_block('# of the base\n{% include "more.j2" %}'))
+    own_template(case, "# more\n", "more.j2")
+    child = project.studies / "child/study.yaml"
+    child.parent.mkdir()
+    child.write_text("extends: small\n")
+    (extending,) = project.cases("child")
+    texts = [deck_text(process_scene(extending, BED), project.templates_of(extending))]
+    own_template(extending, in_block("# of the child"))
+    texts += [deck_text(process_scene(extending, BED), project.templates_of(extending))]
+    for text, said in zip(texts, ("# of the base\n# more", "# of the child"), strict=True):
+        assert "model hooke tangential history" in text
+        assert [name for name in ("# of the base\n# more", "# of the child") if name in text] == [
+            said
+        ]

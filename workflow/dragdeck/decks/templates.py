@@ -66,7 +66,7 @@ class _Sandbox(ImmutableSandboxedEnvironment):
         return math.pow(left, right)  # never a number of a million digits
 
 
-def environment(project: Path, study: Path | None = None) -> jinja2.Environment:
+def environment(project: Path, *studies: Path) -> jinja2.Environment:
     """The Jinja environment: a study's own templates first, then the project's.
 
     Parameters
@@ -75,15 +75,16 @@ def environment(project: Path, study: Path | None = None) -> jinja2.Environment:
         The project's folder of templates. Its files are also known as
         ``base/<name>``, so that a study's template of the same name can extend
         the one it replaces.
-    study : Path, optional
-        The study's folder of templates.
+    *studies : Path
+        The folders of templates of the study and of those that it extends, nearest first; each file
+        is taken from the first that has it. A folder need not exist.
 
     Raises
     ------
     InputError
-        A template of the study is used by no input script, or overrides no block.
+        A template of a study is used by no input script, or overrides no block.
     """
-    folders = [str(study)] if study is not None and study.is_dir() else []
+    folders = [study for study in studies if study.is_dir()]
     loader = jinja2.ChoiceLoader(
         [
             jinja2.FileSystemLoader([*folders, str(project)]),
@@ -102,9 +103,10 @@ def environment(project: Path, study: Path | None = None) -> jinja2.Environment:
     for name in _TRUSTING:
         del sandbox.filters[name]
     sandbox.filters.update(num=exact_number, nums=exact_numbers, comment=comment)
-    if folders and study is not None:
-        with template_errors(study):
-            _check_own(sandbox, study, project)
+    if folders:
+        environment(project, *folders[1:])  # a file may be of use to the base alone
+        with template_errors(folders[0]):
+            _check_own(sandbox, folders[0], project)
     return sandbox
 
 

@@ -156,6 +156,16 @@ def _tail(file: Path) -> str:
         return stream.read().decode("utf-8", errors="replace")
 
 
+def lacks_output(folder: Path) -> bool:
+    """Whether an output of a complete run was deleted."""
+    if run_status(folder).state != "complete":
+        return False
+    parts = RunRecord.read(folder / STATE_FILE).parts
+    outputs = ColumnsFile.read(folder / COLUMNS_FILE).outputs.values()
+    files = (part_files(folder, {"": output}, parts) for output in outputs)
+    return not all(any(file.is_file() for file in written) for written in files)
+
+
 def other_engines(records: Iterable[Path]) -> Iterator[str]:
     """What to say of runs, by their ``run.json``, that another LIGGGHTS made than is here."""
     made = Counter[str]()
