@@ -254,13 +254,17 @@ class Study:
 
     @cached_property
     def summary(self) -> pd.DataFrame:
-        """``summary.parquet`` of the report, one row per run; `TableError` without a report."""
+        """``summary.parquet`` of the report, one row per run; `TableError` without a report.
+
+        Warns of runs that the report lacks.
+        """
         table = read_table(self._summary)
+        basis = {run.case.run: " ".join(notes(run.case)) for run in self.runs}
+        if lacking := basis.keys() - set(table["run"]):
+            text = f"the report, which may be older, has no {', '.join(sorted(lacking))}"
+            warnings.warn(f"{self._summary}: {text}", stacklevel=3)
         table.attrs.update(
-            study=self.name,
-            run=[run.case.run for run in self.runs],
-            units=dict(self.units),
-            basis={run.case.run: " ".join(notes(run.case)) for run in self.runs},
+            study=self.name, run=table["run"].tolist(), units=dict(self.units), basis=basis
         )
         return table
 

@@ -76,7 +76,9 @@ def test_a_run_of_a_plan_is_named_by_it_unless_the_study_has_it() -> None:
 
 
 def test_tables_are_kept_whose_raw_output_was_deleted(tmp_path: Path) -> None:
-    run = write_documents(tmp_path / "run-01234567", {}, {"force": output("print", ["step"], 1, 0, 9)})
+    run = write_documents(
+        tmp_path / "run-01234567", {}, {"force": output("print", ["step"], 1, 0, 9)}
+    )
     (run / "state.json").write_text(json.dumps(run_json()))
     raw, table = run / "x.1.txt", run / "tables/force.parquet"
     jobs = [SimpleNamespace(rule=SimpleNamespace(name="tabulate_process"), output=[str(table)])]

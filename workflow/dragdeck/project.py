@@ -206,9 +206,8 @@ class Project:
         templates, signal = self.templates_of(cases[0]), signal_file(cases[0])
         scripts = {file for name in SCENES for file in template_files(templates, name)}
         texts = (file.read_text(encoding="utf-8") for file in scripts)
-        said |= {"scripts": sorted(map(commands_digest, texts))}
-        said |= {"signal": [file_checksum(signal)] if signal else []}
-        return digest(said)
+        said["scripts"] = sorted(map(commands_digest, texts))
+        return digest(said | {"signal": [file_checksum(signal)] if signal else []})
 
     def report_is_current(self, study: str, cases: Sequence[Case]) -> bool:
         """Whether the report is complete, and on the study and its templates as they stand."""
