@@ -104,12 +104,13 @@ def why_locked(folder: Path) -> str | None:
     others = others_at_work(folder)
     if not others:
         return None
+    stopped = "PROCESS" if others[1:] else others[0].pid  # which of several it is, nothing says
     return "\n".join(
         [
             "another call is making the same files",
             *(f"  value:  process {other.pid} on {other.host} since {other.since}: {other.call}"
               for other in others),
             "  remedy: give the same command again when it has ended; or stop it with: "
-            f"kill -INT {others[0].pid}",
+            f"kill -INT {stopped}",
         ]
     )  # fmt: skip

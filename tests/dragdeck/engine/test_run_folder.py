@@ -2,6 +2,7 @@
 
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -16,6 +17,7 @@ from made_scenes import BED, rendered
 from made_study import Made
 from run_files import rewrite
 
+from dragdeck.engine import run_folder
 from dragdeck.engine.checkpoints import checkpoint_files, checkpoint_step
 from dragdeck.engine.process import ENGINE_VARIABLE, find_engine
 from dragdeck.engine.reports import silent
@@ -95,6 +97,18 @@ def test_a_changed_deck_moves_the_old_run_aside(filling: Path) -> None:
     assert (kept / "particles.1.bin").read_bytes() == old
     assert "9.81" in (kept / "as_run/in.liggghts").read_text()
     assert any(str(kept) in line for line in lines)
+
+
+def test_a_kill_while_a_run_is_moved_aside_leaves_what_shows_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Else the next start would go on from a checkpoint of other inputs."""
+    for name in ("state.json", "screen.1.txt", "checkpoint.90.restart", "a.1.bin", "z.1.bin"):
+        (tmp_path / name).touch()
+    moved = list[str]()
+    monkeypatch.setattr(shutil, "move", lambda file, _: moved.append(Path(file).name))
+    run_folder._archive(tmp_path, "0123abcd", silent)
+    assert len(moved) == 5 and {*moved[3:]} == {"state.json", "screen.1.txt"}
 
 
 def slow_filling(made: Made, project: Project, ranks: int = 1) -> Path:

@@ -23,6 +23,7 @@ from dragdeck.records.run import CaseFile, RunRecord
 from dragdeck.script.commands import files_read
 
 _ARCHIVE = "archive"
+_SCREEN = "screen.1.txt"
 _OF_THE_WORKFLOW = ("logs", "benchmarks")
 """Folders in which Snakemake has files open while it runs a job here."""
 
@@ -76,7 +77,7 @@ def run(
         take_forced_restarts(folder)
         digest = fingerprint(folder, inputs)
         record = _record(folder)
-        if record is None and (folder / "screen.1.txt").exists():
+        if record is None and (folder / _SCREEN).exists():
             _archive(folder, "unknown", report)
         elif record and (record.inputs != digest or (again and record.state != "complete")):
             _archive(folder, record.inputs[:8], report)
@@ -193,7 +194,10 @@ def _keep_inputs(folder: Path) -> None:
 
 
 def _archive(folder: Path, name: str, report: Report) -> None:
-    """Move what an earlier run left out of the way; delete nothing."""
+    """Move what an earlier run left out of the way; delete nothing.
+
+    What shows that there is such a run goes last, lest its checkpoints are taken for others'.
+    """
     place = folder / _ARCHIVE / name
     number = 1
     while place.exists():
@@ -202,7 +206,7 @@ def _archive(folder: Path, name: str, report: Report) -> None:
     place.mkdir(parents=True)
     new = {DECK_FILE, CASE_FILE, COLUMNS_FILE, LOCK_FILE, _ARCHIVE, *_OF_THE_WORKFLOW}
     sources = {file.name for file in (*folder.glob("*.data"), *folder.glob("*.stl"))}
-    for file in folder.iterdir():
+    for file in sorted(folder.iterdir(), key=lambda file: file.name in (STATE_FILE, _SCREEN)):
         if file.name not in new | sources:
             shutil.move(str(file), str(place / file.name))
     report(f"an earlier run was moved to {place}")
