@@ -254,15 +254,9 @@ class Study:
 
     @cached_property
     def summary(self) -> pd.DataFrame:
-        """``summary.parquet`` of the report, one row per run; `TableError` without a report.
-
-        Warns of runs that the report lacks.
-        """
+        """``summary.parquet`` of the report, one row per run; `TableError` without a report."""
         table = read_table(self._summary)
         basis = {run.case.run: " ".join(notes(run.case)) for run in self.runs}
-        if lacking := basis.keys() - set(table["run"]):
-            text = f"the report, which may be older, has no {', '.join(sorted(lacking))}"
-            warnings.warn(f"{self._summary}: {text}", stacklevel=3)
         table.attrs.update(
             study=self.name, run=table["run"].tolist(), units=dict(self.units), basis=basis
         )
@@ -334,7 +328,7 @@ def load(study: Path | str) -> Study:
     Warns
     -----
     UserWarning
-        If some runs are not of the study as its file is now.
+        If some runs, or the report, are not of the study as it is now.
     """
     homes = [home / "results" for home in (Path.cwd(), *Path.cwd().parents)]
     for folder in (*(home / study for home in homes), Path(study)):
@@ -356,21 +350,26 @@ def _finished(folder: Path) -> Study:
     runs = sorted(_runs(folder, "run.json"), key=lambda run: (run.name, run.case.run))
     if not runs:
         raise RejectedRunError(f"{folder}: no process run is finished")
-    if others := _of_other_settings(folder.resolve(), [run.case.run for run in runs]):
-        text = f"runs of other settings than those of the study now: {', '.join(others)}"
-        warnings.warn(f"{folder}: {text}", stacklevel=3)
+    if outdated := _outdated(folder.resolve(), [run.case.run for run in runs]):
+        warnings.warn(f"{folder}: {outdated}", stacklevel=3)
     return Study(folder, tuple(runs))
 
 
-def _of_other_settings(folder: Path, runs: Sequence[str]) -> list[str]:
-    """Those of the runs of a study that it does not have as it stands; none without its file."""
+def _outdated(folder: Path, runs: Sequence[str]) -> str:
+    """What of a study's results is not of the study as it stands; empty without its file."""
+    study = folder.name
     try:
         project = find_project(folder)
-        cases = project.cases(folder.name) if project.results(folder.name) == folder else []
+        cases = project.cases(study) if project.results(study) == folder else []
     except InputError:
-        return []
+        return ""
     present = by_folder(with_leads(cases), PROCESS)
-    return [run for run in runs if present and run not in present]
+    if others := [run for run in runs if present and run not in present]:
+        return f"runs of other settings than those of the study now: {', '.join(others)}"
+    made = present and project.report(study).is_file()
+    if made and not project.report_is_current(study, cases):
+        return "the report is of other settings, or not of all runs"
+    return ""
 
 
 def _runs(folder: Path, having: str) -> Iterator[FinishedRun]:

@@ -1,11 +1,14 @@
 import json
 import shutil
+import warnings
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 import pytest
 from finished_runs import write_finished_run
+from made_scenes import own_template
+from paths import SMALL_STUDY
 from report_files import DROP, FILLING, make_run
 from report_files import case_json as upstream_case
 from tiny_run_files import chain_n
@@ -13,6 +16,8 @@ from tiny_run_files import chain_n
 from dragchain import DocumentError, RejectedRunError, TableError, UnknownNameError, load
 from dragchain.report.findings import FINDINGS_FILE
 from dragchain.report.run_data import write_findings
+from dragdeck.project import Project
+from dragdeck.scenes.process import PROCESS
 
 
 @pytest.fixture(scope="module")
@@ -158,12 +163,40 @@ def test_a_study_has_the_summary_of_its_report(project: Path) -> None:
         _ = load("small").summary
     write_summary(project)
     study = load("small")
-    with pytest.warns(UserWarning, match="the report, which may be older, has no two"):
-        assert study.summary["drag_mean_n"].tolist() == [-2.5]
+    assert study.summary["drag_mean_n"].tolist() == [-2.5]
+    assert study.summary.attrs["run"] == ["deep-1"]
     assert dict(study.units) == {"case": "", "run": "", "drag_mean_n": "N"}
     assert study.describe("drag_mean_n") == "mean drag (N)"
     with pytest.raises(UnknownNameError, match="did you mean 'drag_mean_n'"):
         study.describe("drag_mean")
+
+
+def test_results_of_an_edited_study_are_named(project: Path) -> None:
+    study = project / "studies/edited/study.yaml"
+    study.parent.mkdir(parents=True)
+    shutil.copy(SMALL_STUDY, study)
+    known = Project(project)
+    cases = known.cases("edited")
+    process, report = project / "results/edited/process", known.report("edited")
+    process.mkdir(parents=True)
+    (project / "results/small/process/deep-1").rename(process / "deep-1")
+    _edit(process / "deep-1/case.json", {"run": PROCESS.run_id(cases[0])})
+
+    def warned() -> str:
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always")
+            load("edited")
+        return " ".join(str(warning.message) for warning in said)
+
+    assert warned() == ""
+    report.parent.mkdir()
+    report.touch()
+    report.with_name("complete").write_text(known.state(cases))
+    assert warned() == ""
+    own_template(cases[0], '{% extends "base/process.in.j2" %}{% block end %}run 1{% endblock %}')
+    assert "the report is of other settings" in warned()
+    study.write_text(f"{study.read_text()}seed: 2\n")
+    assert "runs of other settings than those of the study now" in warned()
 
 
 def test_filling_and_drop_test_of_a_run(project: Path) -> None:
@@ -202,8 +235,8 @@ def _never(run: object) -> None:
 
 def test_tables_carry_study_run_units_and_basis(project: Path) -> None:
     write_summary(project)
-    run = load("small").run("deep")
-    study = load(run.folder)
+    study = load("small")
+    run = study.run("deep")
     about = run.force.attrs
     assert (about["study"], about["run"]) == (run.case.study_name, run.case.run)
     assert (about["units"]["drag_n"], about["units"]["time_s"]) == ("N", "s")
