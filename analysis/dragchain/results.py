@@ -1,5 +1,6 @@
 """The results of a study as Python objects: `load`."""
 
+import os
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -350,7 +351,7 @@ def _finished(folder: Path) -> Study:
     runs = sorted(_runs(folder, "run.json"), key=lambda run: (run.name, run.case.run))
     if not runs:
         raise RejectedRunError(f"{folder}: no process run is finished")
-    if outdated := _outdated(folder.resolve(), [run.case.run for run in runs]):
+    if outdated := _outdated(Path(os.path.abspath(folder)), [run.case.run for run in runs]):
         warnings.warn(f"{folder}: {outdated}", stacklevel=3)
     return Study(folder, tuple(runs))
 

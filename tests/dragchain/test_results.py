@@ -178,7 +178,8 @@ def test_results_of_an_edited_study_are_named(project: Path) -> None:
     known = Project(project)
     cases = known.cases("edited")
     process, report = project / "results/edited/process", known.report("edited")
-    process.mkdir(parents=True)
+    (project.parent / "disk/process").mkdir(parents=True)
+    (project / "results/edited").symlink_to(project.parent / "disk")
     (project / "results/small/process/deep-1").rename(process / "deep-1")
     _edit(process / "deep-1/case.json", {"run": PROCESS.run_id(cases[0])})
 

@@ -276,7 +276,8 @@ class Workflow:
 
     def check_raw_outputs(self, jobs: Iterable[Any]) -> None:
         """Refuse to make tables anew that cannot be made: Snakemake would delete them first."""
-        tables = [job for job in jobs if job.rule.name.startswith("tabulate_")]
+        makers = ("tabulate_", *(f"measure_{place}" for place in projects.OUTCOMES))
+        tables = [job for job in jobs if job.rule.name.startswith(makers)]
         there = (self.project.root / job.output[0] for job in tables)
         runs = [file.parents[1] for file in there if file.is_file()]
         if lost := [self.relative(run) for run in runs if lacks_output(run)]:
