@@ -29,6 +29,7 @@ from dragchain.calibration.simulated_drops import DropRun, Drops, run_drops
 from dragchain.figures.panels import key, legend_below, new_figure, new_panels
 from dragchain.figures.style import BLUE, COLOURS, GREY, LIGHT, ORANGE
 from dragchain.report.campaign import write_report
+from dragchain.report.page import remove_earlier
 from dragdeck.cases.case import Case
 from dragdeck.documents import Document
 from dragdeck.engine.batch import Batch
@@ -240,6 +241,7 @@ def write_calibration_report(
         if angles:
             yield "angles", draw_angles(*angles)
 
+    remove_earlier(folder, "result.json", "impacts.*", "bias.*", "angles.*")
     write_report(
         folder,
         "calibration/calibration.html.j2",

@@ -28,7 +28,14 @@ from dragchain.quantities.along import MAP_AZIMUTHS, MAP_DEPTHS
 from dragchain.quantities.registry import REPORTED
 from dragchain.report.campaign import write_report
 from dragchain.report.cases import ReportedCase, StudyRuns, cases_of, read_study_runs
-from dragchain.report.page import NETWORK_PAGE, TIMES, render_page, with_interval, write_bundle
+from dragchain.report.page import (
+    NETWORK_PAGE,
+    TIMES,
+    remove_earlier,
+    render_page,
+    with_interval,
+    write_bundle,
+)
 from dragchain.statistics.estimate import Estimate, flattened, mean_of
 from dragchain.tables.by_step import read_table
 
@@ -169,6 +176,7 @@ def write_comparison(out_dir: Path, folders: Sequence[Path]) -> None:
     )
     linked = _write_networks(out_dir, cases)
 
+    remove_earlier(out_dir, "effects.*")
     tables = {"differences": _table(rows, "difference", "relative")}
     if effects:
         tables["effects"] = _table(effects, "effect")

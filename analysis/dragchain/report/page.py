@@ -210,6 +210,13 @@ def file_uri(picture: Path) -> str | None:
 # --- files ---------------------------------------------------------------------------------------
 
 
+def remove_earlier(folder: Path, *patterns: str) -> None:
+    """Remove files of an earlier report that the next one does not always write."""
+    for pattern in patterns:
+        for file in folder.glob(pattern):
+            file.unlink()
+
+
 def write_bundle(
     out_dir: Path,
     *,

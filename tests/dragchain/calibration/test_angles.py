@@ -137,7 +137,9 @@ def test_the_report_states_the_most_likely_pair(tmp_path: Path) -> None:
     )  # fmt: skip
     found = find_friction(known, runs)
     assert found.best == pytest.approx((0.4, 0.1), rel=0.25)
+    (tmp_path / "result.json").touch()
     write_calibration_report(tmp_path, None, (found, runs))
+    assert not (tmp_path / "result.json").exists(), "of an earlier calibration"
     page = (tmp_path / "report.html").read_text()
     assert f"friction: {found.best[0]:.3g}, rolling_friction: {found.best[1]:.3g}" in page
     assert "standard uncertainties" not in page  # no warning

@@ -75,7 +75,10 @@ def test_differences_are_taken_packing_by_packing(tmp_path: Path) -> None:
 def test_a_case_whose_scripts_templates_changed_is_named(tmp_path: Path) -> None:
     folders = [one for one in study(tmp_path, (11,)) if "fast-0" in one.name]
     change_scripts(folders[1], "base.in.j2 (contact_model)")
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out/effects.csv").touch()
     write_comparison(tmp_path / "out", folders)
+    assert not (tmp_path / "out/effects.csv").exists(), "of an earlier comparison"
     page = (tmp_path / "out/comparison.html").read_text(encoding="utf-8")
     assert "Input scripts changed by templates: base.in.j2 (contact_model). (deep-1_fast-0" in page
 
