@@ -138,8 +138,8 @@ class Project:
 
         Not of a digest that several cases share, or whose run has the case's name already.
         """
-        places = [self.results(study) / place for place in (PROCESS.name, WINDOWS)]
-        there = {run.name for place in places for run in place.glob(f"*-{8 * '[0-9a-f]'}")}
+        runs = self.results(study).glob(f"*/*-{8 * '[0-9a-f]'}")
+        there = {run.name for run in runs if run.parent.name in (PROCESS.name, WINDOWS)}
         parts = (part for case in cases for part in (with_lead(case).lead, case) if part and there)
         names = {PROCESS.run_id(part) for part in parts}
         used = Counter(name[-8:] for name in (*names, *(names & there)))
@@ -202,12 +202,14 @@ class Project:
 
     def state(self, cases: Sequence[Case]) -> str:
         """Hash of all that a report on cases shows of their study."""
-        said = {name: [of.digest(case) for case in cases] for name, of in SCENES.items()}
         templates, signal = self.templates_of(cases[0]), signal_file(cases[0])
         scripts = {file for name in SCENES for file in template_files(templates, name)}
         texts = (file.read_text(encoding="utf-8") for file in scripts)
-        said["scripts"] = sorted(map(commands_digest, texts))
-        return digest(said | {"signal": [file_checksum(signal)] if signal else []})
+        return digest({
+            **{name: [of.digest(case) for case in cases] for name, of in SCENES.items()},
+            "scripts": [*sorted(map(commands_digest, texts))],
+            "signal": [file_checksum(signal)] if signal else [],
+        })  # fmt: skip
 
     def report_is_current(self, study: str, cases: Sequence[Case]) -> bool:
         """Whether the report is complete, and on the study and its templates as they stand."""
@@ -350,10 +352,8 @@ def project_here() -> Project:
 
 def signal_file(case: Case) -> Path | None:
     """The measured force signal of a case's study, if it names one."""
-    reference = case.study.reference
-    if reference is None or reference.signal is None:
-        return None
-    return recorded_file(reference.signal.file, case.file, "reference.signal.file")
+    signal = case.study.reference and case.study.reference.signal
+    return recorded_file(signal.file, case.file, "reference.signal.file") if signal else None
 
 
 def study_files(cases: Iterable[Case]) -> list[Path]:
