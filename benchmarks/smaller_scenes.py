@@ -2,7 +2,7 @@
 
     ./run all --config study=drag_finisher      # and the others below
     python benchmarks/smaller_scenes.py docs/data/scenes results/drag_finisher{,_coarse} \
-        results/stream_finisher results/stream_machine{,_whole} \
+        results/stream_finisher{,_coarse} results/stream_machine{,_whole} \
         results/{coarser,roomy}_{slow,fast} results/roomy_thick
 
 Makes three records of the runs of these studies: ``smaller_scenes.csv``, mean values over the
@@ -71,23 +71,16 @@ def main(out: Path, *results: Path) -> None:
 
 
 def _changes(table: pd.DataFrame) -> Iterator[dict[str, object]]:
-    """Relative change of the drag by the cut-out, the mean over the particle sizes of a study."""
-    for study, of_study in table.groupby("study"):
-        rows = {scene: part.set_index("factor") for scene, part in of_study.groupby("scene")}
-        if len(rows) < 2:
-            continue
-        cut, whole = (rows[scene] for scene in ("cut out", "whole"))
-        sizes = cut.index.intersection(whole.index)
-        ratio = np.log((cut["drag_n"] / whole["drag_n"])[sizes])
-        parts = [
-            (of["drag_n_ci95_high"] - of["drag_n_ci95_low"]) / 2 / of["drag_n"].abs()
-            for of in (cut, whole)
-        ]
-        weight = 1 / (parts[0][sizes] ** 2 + parts[1][sizes] ** 2)
-        mean, half = float(np.average(ratio, weights=weight)), float(weight.sum() ** -0.5)
-        change = Estimate.around(mean, half).exp(minus=1.0)
-        row = flattened({"study": study, "sizes": len(sizes), "drag": change})
-        yield {"drag_value" if name == "drag" else name: value for name, value in row.items()}
+    """Relative change of the drag by the cut-outs, for each particle size of a study."""
+    for (study, factor), of_size in table.groupby(["study", "factor"]):
+        drags = of_size.set_index("scene").filter(regex="^drag_n")
+        if len(drags) == 2:
+            value, low, high = drags.abs().to_numpy().T
+            ratio = float(np.log(value[0] / value[1]))
+            half = math.hypot(*np.abs(high - low) / 2 / value)
+            change = Estimate.around(ratio, half).exp(minus=1.0)
+            row = flattened({"study": study, "factor": factor, "drag": change})
+            yield {"drag_value" if name == "drag" else name: row[name] for name in row}
 
 
 def _kind(run: RunQuantities) -> tuple[str, float]:
