@@ -8,7 +8,6 @@ import pytest
 import yaml
 
 from dragdeck.errors import InputError
-from dragdeck.project import study_templates
 from dragdeck.study.model import Filling, Study
 from dragdeck.study.yaml import located, read_study
 from dragdeck.sweep.cases import load_cases
@@ -122,17 +121,6 @@ def test_an_error_names_the_file_and_line_that_has_the_value(extend: Callable[..
         one.field: (Path(str(one.file)).parent.name, one.line) for one in (found, *found.more)
     }
     assert places == {"motion.speed_m_s": ("middle", 3), "seed": ("child", 2)}
-
-
-def test_templates_of_the_nearest_study_are_used(extend: Callable[..., Path]) -> None:
-    middle = extend("extends: small\n", "middle")
-    (case,) = load_cases(extend("extends: middle\n"))
-    assert study_templates(case) == case.file.parent / "templates"
-    for place in (case.file, middle):
-        (place.parent / "templates").mkdir()
-        (place.parent / "templates/.gitkeep").touch()
-    (middle.parent / "templates/process.in.j2").touch()
-    assert study_templates(case) == middle.parent / "templates"
 
 
 @pytest.mark.parametrize("block", ["sweep", "outputs", "contact", "assumptions", "removal"])
