@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from dragchain.arrays import Floats, Ints
 from dragchain.errors import TableError
 from dragchain.loading.contact_events import AMOUNTS, LIMITS, POINT, SLIP
-from dragchain.run.case import attracts, friction_with
+from dragchain.run.case import attracting, friction_with
 from dragchain.run.kinematics import (
     axis_speed,
     bowl_velocity,
@@ -157,7 +157,7 @@ def _workpiece_between(file: Path, steps: Ints) -> pd.DataFrame:
 
 def _read_contacts(file: Path, run_dir: Path, case: CaseOfRun) -> Iterator[pd.DataFrame]:
     """Counted contacts with force, a row group at a time."""
-    columns = [*_CONTACT, *([ATTRACTION] if attracts(case) else [])]
+    columns = [*_CONTACT, *([ATTRACTION] if "workpiece" in attracting(case) else [])]
     for contacts in read_groups(file, columns):
         loads = contacts["in_statistics"] & (contacts[_FORCE] != 0.0).any(axis=1)
         loaded = contacts[loads].reset_index(drop=True)

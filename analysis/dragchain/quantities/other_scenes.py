@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass
 
 from dragchain.quantities.registry import Quantity
-from dragchain.run.case import study_of
+from dragchain.run.case import attracting, study_of
 from dragchain.statistics.estimate import Estimate, student_quantile
 from dragdeck.records.case import CaseOfRun
 from dragdeck.records.windows import UNKNOWN, WindowsRecord, softening
@@ -54,17 +54,13 @@ def other_scenes(quantity: Quantity, case: CaseOfRun) -> OtherScenes | None:
     number = case.numbers.get("stiffness_number")
     if scale == 1.0 or fidelity.speed_factor != 1.0 or not math.isfinite(known.per_softness_std):
         return None
-    if number is None or case.changed_law or _attracts(case) or _other_bed(case):
+    other_law = case.changed_law or case.added_forces or attracting(case)
+    if number is None or other_law or _other_bed(case):
         return None
     difference = softening(number, scale)
     return OtherScenes(
         known.per_softness * difference, known.per_softness_std * difference, known.scenes
     )
-
-
-def _attracts(case: CaseOfRun) -> bool:
-    parts = (case.attractive, *(class_.attractive for class_ in case.classes))
-    return bool(case.added_forces) or any(parts)
 
 
 def _other_bed(case: CaseOfRun) -> bool:

@@ -8,7 +8,7 @@ import base64
 import io
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 
 import jinja2
@@ -210,11 +210,11 @@ def file_uri(picture: Path) -> str | None:
 # --- files ---------------------------------------------------------------------------------------
 
 
-def remove_earlier(folder: Path, *patterns: str) -> None:
+def remove_earlier(folder: Path, *patterns: str, kept: Collection[Path | None] = ()) -> None:
     """Remove files of an earlier report that the next one does not always write."""
-    for pattern in patterns:
-        for file in folder.glob(pattern):
-            file.unlink()
+    earlier = {file.resolve() for pattern in patterns for file in folder.glob(pattern)}
+    for file in earlier.difference(kept):
+        file.unlink()
 
 
 def write_bundle(

@@ -24,7 +24,14 @@ from dragchain.report.cases import (
 from dragchain.report.coarse_grained import Extrapolation, coarse_grained, table_of_sizes
 from dragchain.report.findings import Findings
 from dragchain.report.missing_runs import MissingRun, missing_run, scene_of
-from dragchain.report.page import NETWORK_PAGE, data_uri, file_uri, render_page, write_bundle
+from dragchain.report.page import (
+    NETWORK_PAGE,
+    data_uri,
+    file_uri,
+    remove_earlier,
+    render_page,
+    write_bundle,
+)
 from dragchain.report.removal import UM_PER_H, RemovalOfCase, removal_of, touch_rows, touches_per_s
 from dragchain.report.roughness import RoughnessOfCase, roughness_of
 from dragchain.report.spreadsheet import summary_workbook
@@ -113,9 +120,7 @@ def write_study_report(
         coarse = coarse_grained([study.measured for study in studies])
         picture = file_uri(preview) if preview else None
         page = _render(sections, cases, missing, picture, removed, rough, signals, coarse)
-        earlier = {file.resolve() for name in _OF_CASES for file in out_dir.glob(name)}
-        for file in earlier - {section.network for section in sections}:
-            file.unlink()
+        remove_earlier(out_dir, *_OF_CASES, kept=[section.network for section in sections])
         for section, name in zip(sections, _network_pages(sections), strict=True):
             if section.network is not None:
                 write_bytes(out_dir / name, section.network.read_bytes())

@@ -79,10 +79,9 @@ def friction_with(case: CaseOfRun, body: str) -> FrictionLimit:
     return FrictionLimit(friction, {name: of(name) for name in names}, wall, first_ids)
 
 
-def attracts(case: CaseOfRun) -> bool:
-    """Whether the contact law attracts particles to the workpiece."""
-    parts = [case.attractive, *(kind.attractive for kind in case.classes)]
-    return any("workpiece" in part for part in parts)
+def attracting(case: CaseOfRun) -> set[str]:
+    """To what the contact law attracts particles: ``particle``, ``bowl``, ``workpiece``."""
+    return set(case.attractive).union(*(kind.attractive for kind in case.classes))
 
 
 def with_changes(run_dir: Path, case: CaseOfRun) -> CaseOfRun:

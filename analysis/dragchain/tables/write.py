@@ -12,7 +12,7 @@ import pyarrow as pa
 
 from dragchain.arrays import Floats, Ints
 from dragchain.errors import TableError
-from dragchain.run.case import attracts, friction_with
+from dragchain.run.case import attracting, friction_with
 from dragchain.run.kinematics import (
     counted_mask,
     headings,
@@ -207,7 +207,7 @@ def _write_touches(run: Run, file: Path) -> None:
 
 
 def _contact_names(case: CaseOfRun) -> tuple[str, ...]:
-    names = WORKPIECE_CONTACTS + ((ATTRACTION,) if attracts(case) else ())
+    names = WORKPIECE_CONTACTS + ((ATTRACTION,) if "workpiece" in attracting(case) else ())
     return _with_classes(names, "workpiece_contacts", case)
 
 

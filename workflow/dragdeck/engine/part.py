@@ -5,6 +5,7 @@ import time
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from signal import SIGKILL
 
 from dragdeck.decks import DECK_FILE
 from dragdeck.decks.outputs import ColumnsFile
@@ -27,9 +28,6 @@ from dragdeck.records.run import (
 )
 
 STATE_FILE = "state.json"
-_SIGNALS = 128, 193
-"""A shell and mpirun add 128 to the number of the signal that killed a program."""
-
 _UNWRITTEN = re.compile("Cannot open (?!mesh|data|clump|file variable)")
 """What LIGGGHTS says of a file that it cannot write; of some that it reads it says the same."""
 
@@ -162,7 +160,7 @@ class PartOfRun:
     def _conclude(self, ending: Ending) -> RunRecord:
         screen = self._screen.read_text(errors="replace")
         asked = checkpoints.take_forced_restarts(self.folder) or ending.asked
-        whole = log.reached_end(screen) and not ending.was_killed
+        whole = log.reached_end(screen) and ending.signal != SIGKILL
         why = None if whole else self._interruption(screen, asked, ending)
         if why is not None:
             raise self._stopped(why)
@@ -195,13 +193,13 @@ class PartOfRun:
             return f"the disk is full, or a file cannot be written ({said}); {left}"
         if errors or log.never_settled(screen):
             return None
-        died = ending.exit_status < 0 or _SIGNALS[0] < ending.exit_status < _SIGNALS[1]
-        how = "was killed" if died else "ended prematurely without a message"
-        if not died and not keeps_last_words():
+        killed = ending.signal is not None
+        how = "was killed" if killed else "ended prematurely without a message"
+        if not killed and not keeps_last_words():
             how += ": stdbuf of GNU coreutils, which would have kept it, is missing"
         if ending.exit_status == 0:  # a signal between two runs of a script leaves no other trace
             how = "was stopped on request, or its script ends early"
-        said = "" if died else f"; the last lines: {last_words(screen) or 'none'}"
+        said = "" if killed else f"; the last lines: {last_words(screen) or 'none'}"
         return f"LIGGGHTS {how} (exit status {ending.exit_status}){said}"
 
     def _refuse_new_gap(self, checks: list[AcceptanceCheck]) -> None:

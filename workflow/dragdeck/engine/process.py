@@ -37,6 +37,7 @@ OLDEST_VERSION = (3, 8, 0)
 """Oldest engine that the decks were run on."""
 
 LOCK_FILE = ".lock"
+_SIGNALS = 65
 _POLL_S = 0.2
 _PR_SET_PDEATHSIG = 1
 Watch = Callable[[float], None]
@@ -78,9 +79,10 @@ class Ending:
     cpu_time_s: float
 
     @property
-    def was_killed(self) -> bool:
-        """From outside: it may have written all, or not; a launcher adds 128 to the signal."""
-        return self.exit_status in (-signal.SIGKILL, 128 + signal.SIGKILL)
+    def signal(self) -> int | None:
+        """Number of the signal that killed it; a shell and mpirun add 128 to it."""
+        number = -self.exit_status if self.exit_status < 0 else self.exit_status - 128
+        return number if 0 < number < _SIGNALS else None
 
 
 def find_engine() -> Engine:

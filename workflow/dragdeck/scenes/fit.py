@@ -53,9 +53,12 @@ JAMMING_GAP = 2.0
 """Particle diameters between workpiece and bowl below which a warning is given: in a narrower gap,
 an arch of two particles can block the workpiece (docs/development/liggghts.md)."""
 
-ROOM_BESIDE, ROOM_BELOW, LEAST_GAP = 6.0, 4.0, 2.7
+ROOM_BESIDE, ROOM_BELOW = 6.0, 4.0
 """Particle diameters beside the workpiece and below it from which the drag no longer depends on
-them within 13 and 5 % (docs/evidence/simplifications.md), and beside it for larger particles."""
+them within 13 and 5 % (docs/evidence/simplifications.md)."""
+
+LEAST_GAP = 2.7
+"""Smallest gap between workpiece and wall that larger particles may have, in their diameters."""
 
 
 @dataclass(frozen=True)

@@ -165,7 +165,7 @@ def _refused_value(facts: Facts) -> Hits:
 
 
 def _absent(facts: Facts) -> Hits:
-    """Variables that nothing defines, and files that are not there."""
+    """Variables, files, labels and closing quotation marks that are missing."""
     script = facts.script
     for kind in ("variable", "script", "label", "quotes"):
         missing = [(command, name) for command, of_kind, name in script.missing if of_kind == kind]

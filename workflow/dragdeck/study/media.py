@@ -39,9 +39,7 @@ _SIZES = ("radius_mean_m", "radius_std_m", "distribution")
 _TOTALS = ("count", "mass_kg", "fill_height_m")
 
 INSTEAD_OF: Mapping[str, Sequence[str]] = {
-    "count": ("mass_kg", "fill_height_m"),
-    "mass_kg": ("count", "fill_height_m"),
-    "fill_height_m": ("count", "mass_kg"),
+    **{name: [other for other in _TOTALS if other != name] for name in _TOTALS},
     "radius_mean_m": ("sieve", "classes"),
     "sieve": (*_SIZES, "classes"),
     "classes": (*_SIZES, "material", "sieve"),
